@@ -1,0 +1,52 @@
+# The Python that makes the environment; 3.11 or newer: make demo PYTHON=python3.12
+PYTHON ?= python3
+# Test processes side by side.
+WORKERS ?= 2
+
+VENV := .venv
+BIN := $(VENV)/bin
+DEPENDENCIES := $(VENV)/.dependencies-installed
+INSTALLED := $(VENV)/.rigsight-installed
+NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test check bench clean
+
+help:  ## list the targets
+	@grep -E '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 16
+
+demo: $(INSTALLED)  ## run the whole chain on the built-in virtual rig; results in demo/
+	@$(BIN)/rigsight demo --out demo
+
+test: $(INSTALLED)  ## run all tests
+	@$(BIN)/python -m pytest -n $(WORKERS)
+
+check: $(INSTALLED)  ## format, lint, types, layers
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(INSTALLED)  ## measure the simulator against C and scipy
+	@$(BIN)/python benchmarks/simulation.py
+
+clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)
+	rm -rf demo out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Stamps are written last: an interrupted installation is taken up again by the next call.
+$(DEPENDENCIES): requirements.lock
+	@command -v $(PYTHON) >/dev/null || { echo "rigsight needs Python 3.11 or newer, and '$(PYTHON)' was not found. Name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3.12" >&2; exit 1; }
+	@test ! -x $(BIN)/python || $(BIN)/python -c '$(NEW_ENOUGH)' || { echo "$(VENV) holds a Python older than 3.11: remove it (rm -r $(VENV)) and call make again." >&2; exit 1; }
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 \
+		|| { $(PYTHON) -c '$(NEW_ENOUGH)' || { echo "rigsight needs Python 3.11 or newer, '$(PYTHON)' is $$($(PYTHON) -V 2>&1). Name one: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }; \
+		     $(PYTHON) -m venv --clear $(VENV); }
+	@echo "Installing pinned dependencies into $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	@touch $@
+
+# hatchling comes from the lock, so that no unpinned build tool is fetched.
+$(INSTALLED): pyproject.toml $(DEPENDENCIES)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@

@@ -1,0 +1,214 @@
+"""What a diagnosis found, as data: verdict, ranking, gap budget, traces; no pictures and no files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Verdict = Literal["effect", "parameters", "none", "unknown"]
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard error and unit; the error is infinite where the records do not determine the number."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class OutputGap:
+    """Gap budget of one output on the validation records, as NRMSE = RMS(measured - simulated) / RMS(measured - mean).
+
+    Attributes
+    ----------
+    before
+        The simulation as given; what was not given is identified.
+    reidentified
+        The same equations with the best numbers.
+    after
+        With the effects of the verdict added.
+    noise_floor
+        What a perfect model would leave.
+    """
+
+    before: float
+    reidentified: float
+    after: float
+    noise_floor: float
+
+    @property
+    def closed(self) -> float:
+        """Share of the gap that is gone, 1 at the noise floor; 1 where there was none."""
+        gap = self.before - self.noise_floor
+        return 1.0 if gap <= 0.0 else (self.before - self.after) / gap
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of effects that was fitted and scored.
+
+    Attributes
+    ----------
+    effects
+        Names, strongest first; empty for the re-identified equations without an effect.
+    probability
+        That this set is the cause, given the records and the candidates tried.
+    validation_nrmse, estimation_nrmse
+        NRMSE by output.
+    excess
+        Weighted RMS of the validation residuals in units of the noise floor; 1 is perfect.
+    parameters
+        Every fitted parameter of rig and effects.
+    success, message
+        Whether the fit converged, and the optimizer's words.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    validation_nrmse: dict[str, float]
+    estimation_nrmse: dict[str, float]
+    excess: float
+    parameters: dict[str, Estimate]
+    success: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Standard deviation of what no model can explain in an output, and how it was found."""
+
+    output: str
+    unit: str
+    std: float
+    method: str
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Measured and simulated outputs of one record.
+
+    Attributes
+    ----------
+    record, role, kind, amplitude
+        As in the campaign.
+    t
+        Shape (n_samples,) [s].
+    inputs, measured, before, reidentified, after
+        Signal name -> shape (n_samples,).
+    """
+
+    record: str
+    role: str
+    kind: str
+    amplitude: float | None
+    t: NDArray[np.float64]
+    inputs: Mapping[str, NDArray[np.float64]]
+    measured: Mapping[str, NDArray[np.float64]]
+    before: Mapping[str, NDArray[np.float64]]
+    reidentified: Mapping[str, NDArray[np.float64]]
+    after: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The result of a diagnosis.
+
+    Attributes
+    ----------
+    title, rig
+        Campaign title and rig name.
+    verdict, effects, where, ambiguous_with, candidates, gap
+        As in ``diagnosis.json``; candidates are sorted, best first.
+    noise_floors
+        Per output.
+    traces
+        Per record, validation records first.
+    units
+        Unit of each signal.
+    model
+        The diagnosed simulation, ready for ``model.json``.
+    notes
+        What was noticed on the way, one sentence each.
+    windows
+        Length [s] of the windows scored with their own initial states, None where whole records are.
+    scored_on
+        ``"validation"``, or ``"estimation"`` where the campaign has no validation records.
+    """
+
+    title: str
+    rig: str
+    verdict: Verdict
+    effects: tuple[str, ...]
+    where: tuple[str, ...]
+    ambiguous_with: tuple[tuple[str, ...], ...]
+    candidates: tuple[Candidate, ...]
+    gap: dict[str, OutputGap]
+    noise_floors: tuple[NoiseFloor, ...]
+    traces: tuple[Trace, ...]
+    units: dict[str, str]
+    model: dict[str, Any]
+    notes: tuple[str, ...]
+    windows: float | None = None
+    scored_on: str = "validation"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "title": self.title,
+            "rig": self.rig,
+            "verdict": self.verdict,
+            "effects": list(self.effects),
+            "where": list(self.where),
+            "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
+            "candidates": [_candidate(candidate) for candidate in self.candidates],
+            "gap": {
+                output: {
+                    "before": _number(gap.before),
+                    "reidentified": _number(gap.reidentified),
+                    "after": _number(gap.after),
+                    "noise_floor": _number(gap.noise_floor),
+                    "closed": _number(gap.closed),
+                }
+                for output, gap in self.gap.items()
+            },
+            "noise_floor": {
+                floor.output: {"std": _number(floor.std), "unit": floor.unit, "method": floor.method}
+                for floor in self.noise_floors
+            },
+            "gap_by_record": [],
+            "gap_by_band": [],
+            "gap_by_amplitude": [],
+            "gap_by_state": [],
+            "window": self.windows,
+            "scored_on": self.scored_on,
+            "notes": list(self.notes),
+        }
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "effects": list(candidate.effects),
+        "probability": _number(candidate.probability),
+        "validation_nrmse": {k: _number(v) for k, v in candidate.validation_nrmse.items()},
+        "estimation_nrmse": {k: _number(v) for k, v in candidate.estimation_nrmse.items()},
+        "excess": _number(candidate.excess),
+        "parameters": {
+            name: {"value": _number(e.value), "std": _number(e.std), "unit": e.unit}
+            for name, e in candidate.parameters.items()
+        },
+        "success": candidate.success,
+        "message": candidate.message,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,166 @@
+"""What an effect is: one symbolic declaration from which every other view is derived."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import sympy as sp
+
+from rigsight.parameters import Parameter
+
+
+class Place(StrEnum):
+    """Where in the signal path an effect acts."""
+
+    ACTUATOR = "actuator"
+    DYNAMICS = "dynamics"
+    DISTURBANCE = "disturbance"
+    LATERAL_DYNAMICS = "lateral_dynamics"
+    SENSOR = "sensor"
+
+
+class Energy(StrEnum):
+    """What an effect does to the mechanical energy over a closed cycle."""
+
+    CONSERVATIVE = "conservative"
+    DISSIPATIVE = "dissipative"
+    ACTIVE = "active"
+
+
+class GainTrend(StrEnum):
+    """How the gain below resonance changes with rising amplitude."""
+
+    RISES = "rises"
+    FALLS = "falls"
+    STEADY = "steady"
+
+
+@dataclass(frozen=True)
+class Signature:
+    """By what an effect shows itself in sine tests at two amplitudes; a test measures what is declared here.
+
+    Attributes
+    ----------
+    gain_trend
+        Change of the gain below resonance with amplitude.
+    even_harmonics
+        True if the response to a sine holds even harmonics or a shifted mean.
+    """
+
+    gain_trend: GainTrend
+    even_harmonics: bool = False
+
+
+@dataclass(frozen=True)
+class State:
+    """A state that an effect adds, with its rate of change.
+
+    Attributes
+    ----------
+    symbol
+        Symbol of the state in the effect's equations.
+    rate
+        Time derivative in terms of `rigsight.effects.symbols`, the effect's parameters and states.
+    dimension
+        Dimension text of `rigsight.units`.
+    """
+
+    symbol: sp.Symbol
+    rate: sp.Expr
+    dimension: str
+
+
+@dataclass(frozen=True)
+class SumAndDifference:
+    """Two parameters that a search moves as their sum and difference, because records determine those apart."""
+
+    first: str
+    second: str
+
+
+@dataclass(frozen=True)
+class Start:
+    """Start values for a fit, as formulas of the simpler model that was fitted before.
+
+    Attributes
+    ----------
+    values
+        Parameter name -> value, of the parent's parameters, of ``k`` (the fitted stiffness) and of the characteristic sizes
+        in `rigsight.effects.symbols`; the key ``"k"`` moves the stiffness itself.
+    parent
+        Effect whose fit gives the symbols their values; None for the rig without effects.
+    """
+
+    values: dict[str, sp.Expr]
+    parent: str | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect as one symbolic declaration.
+
+    Every field that is None leaves that part of the rig as it is.
+
+    Attributes
+    ----------
+    name
+        Name in campaigns, results and documentation.
+    place
+        Where in the signal path it acts.
+    summary
+        One plain sentence for people.
+    parameters
+        Its parameters; setting all those with a null value to it removes the effect exactly.
+    energy
+        What it does to mechanical energy over a closed cycle.
+    signature
+        How it shows itself in sine tests.
+    torque
+        Torque (force) that resists the motion, subtracted from the drive, of x, v, t.
+    spring
+        The spring torque in terms of ``spring_torque``, ``k``, ``deflection`` and states.
+    deflection
+        What the spring sees of the displacement, of ``x`` and states.
+    drive
+        What leaves the actuator in terms of ``u`` and states.
+    delay
+        Time by which the input arrives late [s].
+    states
+        States added, with their rates.
+    searched_as
+        Parameters that a fit moves as sum and difference.
+    starts
+        Start values worth trying; default are the combinations of the parameters' own starts. A parent named there is a
+        special or limiting case of this effect, and wins a tie.
+    special_cases
+        Parameter values that simplify the equations (an exponent of 1): tried first, released later.
+    needs_inertia
+        True if it makes no sense where the motion is prescribed.
+    """
+
+    name: str
+    place: Place
+    summary: str
+    parameters: tuple[Parameter, ...]
+    energy: Energy
+    signature: Signature
+    torque: sp.Expr | None = None
+    spring: sp.Expr | None = None
+    deflection: sp.Expr | None = None
+    drive: sp.Expr | None = None
+    delay: sp.Expr | None = None
+    states: tuple[State, ...] = ()
+    searched_as: tuple[SumAndDifference, ...] = ()
+    starts: tuple[Start, ...] = ()
+    special_cases: dict[str, float] = field(default_factory=dict)
+    needs_inertia: bool = False
+
+    @property
+    def parents(self) -> tuple[str, ...]:
+        """Effects that this one contains as a special or limiting case."""
+        return tuple(dict.fromkeys(start.parent for start in self.starts if start.parent is not None))
+
+    def null_values(self) -> dict[str, float]:
+        """Return the parameter values at which the effect vanishes."""
+        return {p.name: p.null for p in self.parameters if p.null is not None}

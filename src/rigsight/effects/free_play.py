@@ -1,0 +1,34 @@
+"""Free play: the spring acts only on the part of the displacement beyond a dead zone.
+
+Equation
+--------
+``spring deflection = x - g`` for x > g, ``x + g`` for x < -g, zero between.
+
+g: half-width of the play; the effect vanishes at 0.
+
+Applies to worn joints and loose couplings in series with the spring, without memory. Play that is carried along is backlash.
+
+Signature: soft at small amplitude, stiffening towards the full stiffness; odd harmonics.
+
+References: D. Tang, E. H. Dowell, AIAA J. 44 (2006), for free play in dynamic systems.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.symbols import beyond, x
+from rigsight.parameters import Parameter
+
+g = sp.Symbol("g", real=True)
+
+FREE_PLAY = Effect(
+    name="free_play",
+    place=Place.DYNAMICS,
+    summary="The spring is loose around its rest position.",
+    parameters=(
+        Parameter("g", "half-width of the play", "x", lower=0.0, upper=1e9, null=0.0, starts=(0.05, 0.3), search=(0.0, 1.0)),
+    ),
+    energy=Energy.CONSERVATIVE,
+    signature=Signature(gain_trend=GainTrend.FALLS),
+    deflection=beyond(x, g),
+)

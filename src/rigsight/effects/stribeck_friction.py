@@ -1,0 +1,45 @@
+"""Stribeck friction: dry friction that falls from static to Coulomb level with speed.
+
+Equation
+--------
+``resisting torque = (T_c + (T_s - T_c) exp(-(x'/w_s)^2)) sign(x')``, sticking within +-T_s.
+
+=========  =========================================
+T_c        Coulomb level at high speed [force]
+T_s        level at standstill [force]
+w_s        Stribeck velocity
+=========  =========================================
+
+Applies to lubricated contacts that pass slowly through standstill. Not told from Coulomb friction unless the records hold
+slow passes through w_s.
+
+Signature: as Coulomb friction, with stick-slip at low speed.
+
+References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.symbols import v, v_size
+from rigsight.parameters import Parameter
+
+T_c, T_s, w_s = sp.symbols("T_c T_s w_s", real=True)
+
+STRIBECK_FRICTION = Effect(
+    name="stribeck_friction",
+    place=Place.DYNAMICS,
+    summary="Dry friction that is larger at standstill and falls with speed.",
+    parameters=(
+        Parameter("T_c", "Coulomb friction at high speed", "drive", lower=0.0, upper=1e12, null=0.0, starts=(0.05, 0.2), search=(0.0, 2.0)),
+        Parameter("T_s", "friction at standstill", "drive", lower=0.0, upper=1e12, null=0.0, starts=(0.1, 0.4), search=(0.0, 4.0)),
+        Parameter("w_s", "Stribeck velocity", "x time^-1", lower=1e-12, upper=1e12, starts=(0.1, 0.02), search=(1e-3, 3.0), logarithmic=True),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.RISES),
+    torque=(T_c + (T_s - T_c) * sp.exp(-((v / w_s) ** 2))) * sp.sign(v),
+    starts=tuple(
+        Start({"T_c": T_c, "T_s": excess * T_c, "w_s": share * v_size}, parent="coulomb_friction")
+        for excess, share in ((1.5, 0.1), (1.3, 0.02), (2.0, 0.3))
+    ),
+)

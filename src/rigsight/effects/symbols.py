@@ -1,0 +1,48 @@
+"""The symbols every effect's equation is written in, and the piecewise functions they share.
+
+All kinks are written through ``Abs`` and ``sign``: the simulation finds these atoms, freezes their sign between
+events and so keeps its full order across them.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+x = sp.Symbol("x", real=True)
+"""Displacement from the rest position (psi - psi_off on the running gear)."""
+v = sp.Symbol("v", real=True)
+"""Velocity, the time derivative of `x`."""
+u = sp.Symbol("u", real=True)
+"""Input as it arrives at the effect (after the actuator effects in front of it)."""
+t = sp.Symbol("t", real=True)
+"""Time since the start of the record [s]."""
+m = sp.Symbol("m", positive=True)
+"""Inertia of the moving mass (J_z on the running gear)."""
+k = sp.Symbol("k", real=True)
+"""Stiffness of the spring (k_c on the running gear)."""
+deflection = sp.Symbol("deflection", real=True)
+"""Deflection that the spring sees: `x`, unless free play or backlash stands between."""
+deflection_rate = sp.Symbol("deflection_rate", real=True)
+"""Time derivative of `deflection`."""
+spring_torque = sp.Symbol("spring_torque", real=True)
+"""Torque (force) of the spring before the effect, ``k * deflection``."""
+
+x_size = sp.Symbol("x_size", positive=True)
+"""Size of the displacement in the records; in start values only."""
+v_size = sp.Symbol("v_size", positive=True)
+"""Size of the velocity in the records; in start values only."""
+
+
+def positive_part(expression: sp.Expr) -> sp.Expr:
+    """Return max(expression, 0)."""
+    return (expression + sp.Abs(expression)) / 2
+
+
+def beyond(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:
+    """Return the part of `expression` that lies beyond [-half_width, half_width], zero inside."""
+    return positive_part(expression - half_width) - positive_part(-expression - half_width)
+
+
+def clamp(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:
+    """Return `expression` limited to [-half_width, half_width]; exact for any half width, however large."""
+    return expression - beyond(expression, half_width)

@@ -1,0 +1,58 @@
+"""Every error a user can meet: what was wrong, what was got, what is allowed or what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+
+class RigsightError(Exception):
+    """Root of all errors that are told to the user as one message, without a traceback."""
+
+
+class InputError(RigsightError, ValueError):
+    """A file, an option or an argument cannot be used as it is."""
+
+
+class SimulationError(RigsightError, ArithmeticError):
+    """A simulation left the range of numbers, or could not reach the accuracy asked for."""
+
+
+def nearest(name: str, allowed: Iterable[str]) -> str:
+    """Return ``" Did you mean 'x'?"`` for the closest allowed name, or an empty string."""
+    matches = get_close_matches(name, list(allowed), n=1, cutoff=0.5)
+    return f" Did you mean '{matches[0]}'?" if matches else ""
+
+
+def check_option(what: str, value: str, allowed: Iterable[str]) -> str:
+    """Return `value` if it is one of `allowed`.
+
+    Raises
+    ------
+    InputError
+        Naming what was got, the nearest allowed value and all allowed values.
+    """
+    options = sorted(allowed)
+    if value in options:
+        return value
+    listed = ", ".join(f"'{option}'" for option in options)
+    raise InputError(f"{what} is '{value}'.{nearest(value, options)} Allowed: {listed}.")
+
+
+def check_in_range(what: str, value: Any, lower: float, upper: float, unit: str = "") -> float:
+    """Return `value` as a float if it lies in [lower, upper].
+
+    Raises
+    ------
+    InputError
+        Naming the range and what was got; NaN and non-numbers are outside every range.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be a number, got {value!r}.") from None
+    if not lower <= number <= upper:
+        suffix = f" {unit}" if unit else ""
+        raise InputError(f"{what} must lie in [{lower:g}, {upper:g}]{suffix}, got {number:g}.")
+    return number

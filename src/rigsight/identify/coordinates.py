@@ -1,0 +1,123 @@
+"""Search coordinates: parameters in characteristic units, logarithms of positive ones, sums and differences of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.parameters import Parameter
+from rigsight.simulate import Structure, parameter_vector
+from rigsight.units import characteristic_value
+
+STEP = 1e-4
+"""Finite-difference step of a coordinate: far above the integrator's error, far below any curvature."""
+_MARGIN = 1e-9
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Maps a vector of search coordinates to the parameters of a structure and back.
+
+    Attributes
+    ----------
+    structure
+        Rig and effects.
+    free
+        Parameters that the search moves.
+    lower, upper
+        Bounds of the coordinates, shape (n_free,).
+    """
+
+    structure: Structure
+    free: tuple[str, ...]
+    base: NDArray[np.float64]
+    index: NDArray[np.intp]
+    scale: NDArray[np.float64]
+    logarithmic: NDArray[np.bool_]
+    pairs: tuple[tuple[int, int], ...]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls,
+        structure: Structure,
+        free: Sequence[str],
+        values: Mapping[str, float],
+        scales: Mapping[str, float],
+    ) -> Coordinates:
+        """Build the coordinates of the free parameters; the others stay at `values`."""
+        parameters = {p.name: p for p in structure.parameters}
+        chosen = [parameters[name] for name in free]
+        scale = np.array([characteristic_value(p.dimension, scales) for p in chosen])
+        logarithmic = np.array([p.logarithmic for p in chosen], dtype=bool)
+        bounds = [_bounds(p, s) for p, s in zip(chosen, scale, strict=True)]
+        lower = np.array([b[0] for b in bounds], dtype=np.float64)
+        upper = np.array([b[1] for b in bounds], dtype=np.float64)
+        pairs = _pairs(structure, list(free))
+        for first, second in pairs:
+            width = upper[first] - lower[first]
+            lower[first], upper[first] = lower[first], width
+            lower[second], upper[second] = 0.0, 2.0 * width
+        return cls(
+            structure=structure,
+            free=tuple(free),
+            base=parameter_vector(structure, values),
+            index=np.array([structure.names.index(name) for name in free], dtype=np.intp),
+            scale=scale,
+            logarithmic=logarithmic,
+            pairs=pairs,
+            lower=lower,
+            upper=upper,
+        )
+
+    def to_parameters(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the full parameter vector, shape (n_parameters,), of coordinates of shape (n_free,)."""
+        own = np.array(theta, dtype=np.float64)
+        for first, second in self.pairs:
+            total, difference = theta[first], theta[second]
+            own[first], own[second] = (total + difference) / 2.0, (total - difference) / 2.0
+        own = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, own, 0.0)), own) * self.scale
+        p = self.base.copy()
+        p[self.index] = own
+        return p
+
+    def from_values(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the coordinates of parameter values, moved inside the bounds, shape (n_free,)."""
+        own = np.array([values[name] for name in self.free]) / self.scale
+        positive = np.where(self.logarithmic, np.maximum(own, 1e-300), 1.0)
+        theta = np.where(self.logarithmic, np.log(positive), own)
+        for first, second in self.pairs:
+            theta[first], theta[second] = own[first] + own[second], own[first] - own[second]
+        width = np.minimum(self.upper - self.lower, 1e6)
+        return np.clip(theta, self.lower + _MARGIN * width, self.upper - _MARGIN * width)
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return d parameters / d coordinates of the free parameters, shape (n_free, n_free)."""
+        columns = []
+        for i in range(len(self.free)):
+            moved = theta.copy()
+            moved[i] += 1e-6
+            change = self.to_parameters(moved) - self.to_parameters(theta)
+            columns.append(change[self.index] / 1e-6)
+        return np.array(columns).T.reshape(len(self.free), len(self.free))
+
+
+def _bounds(parameter: Parameter, scale: float) -> tuple[float, float]:
+    low = max(parameter.lower / scale, parameter.search[0])
+    high = min(parameter.upper / scale, parameter.search[1])
+    if parameter.logarithmic:
+        return float(np.log(max(low, 1e-12))), float(np.log(min(high, 1e12)))
+    return low, high
+
+
+def _pairs(structure: Structure, free: list[str]) -> tuple[tuple[int, int], ...]:
+    return tuple(
+        (free.index(pair.first), free.index(pair.second))
+        for effect in structure.effects
+        for pair in effect.searched_as
+        if pair.first in free and pair.second in free
+    )

@@ -1,0 +1,379 @@
+"""Output-error fit of a structure's parameters, initial states included, to any number of records at once.
+
+The residuals and their derivatives come from one call of the side-by-side integrator per record: the current parameters and
+every shifted one are its lanes. The optimizer is scipy's bounded trust-region least squares, fed with an equivalent
+compressed problem: it only uses J^T J, J^T r and r^T r, so a square root of J^T J stands for the tall Jacobian.
+
+References
+----------
+L. Ljung, *System Identification* (Prentice Hall 1999), sections 7.2 and 9.4 for output error and its covariance with colored
+residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999) 1, for the optimizer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rigsight.errors import SimulationError
+from rigsight.identify.coordinates import STEP, Coordinates
+from rigsight.identify.covariance import colored_covariance
+from rigsight.identify.fit_result import FitResult
+from rigsight.records.record import Record
+from rigsight.simulate import (
+    Structure,
+    choose_substeps,
+    record_input,
+    simulate_outputs,
+    simulate_sets,
+)
+from rigsight.simulate.input_hold import HeldInput
+from rigsight.units import characteristic_value
+
+DEFAULT_ACCURACY = 1e-4
+"""Relative accuracy of simulations inside a fit: below the noise of any bench."""
+_FALLBACK_SUBSTEPS = 8
+_STATE_RANGE = 20.0
+_WORSE = 1e3
+
+
+@dataclass(frozen=True)
+class _Data:
+    """One record as the fit sees it."""
+
+    record: Record
+    held: HeldInput
+    measured: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    first_state: NDArray[np.float64]
+
+
+class GreyBoxFit:
+    """Output-error least squares of a structure on records.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    records
+        Records to fit; a record may lack any output but the first.
+    scales
+        Size of each base quantity, see `characteristic_scales`.
+    output_noise
+        Standard deviation by which the residuals of each output are divided.
+    accuracy
+        Relative accuracy of the simulations; the number of substeps follows from it.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        records: Sequence[Record],
+        scales: Mapping[str, float],
+        output_noise: Mapping[str, float],
+        accuracy: float = DEFAULT_ACCURACY,
+    ) -> None:
+        self.structure = structure
+        self.scales = dict(scales)
+        self.accuracy = accuracy
+        self._state_scales = np.array(
+            [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
+        )
+        names = [signal.name for signal in structure.rig.outputs]
+        self._data = [self._prepared(record, names, output_noise) for record in records]
+        self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self._data))
+
+    def _prepared(
+        self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
+    ) -> _Data:
+        missing = np.full(record.n_samples, np.nan)
+        measured = np.column_stack([record[n] if n in record else missing for n in names])
+        weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
+        first_state = _first_state(self.structure, record)
+        return _Data(record, record_input(self.structure, record), measured, weights, first_state)
+
+    def fit(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        initial_states: Sequence[NDArray[np.float64]] | None = None,
+        max_evaluations: int = 60,
+        finish: bool = True,
+    ) -> FitResult:
+        """Fit the free parameters and every record's initial state.
+
+        Parameters
+        ----------
+        start
+            Value of every parameter of the structure.
+        free
+            Names of those to fit; may be empty, then only initial states are.
+        initial_states
+            Start values per record, shape (n_states,) each; default from the first samples.
+        max_evaluations
+            Limit for the optimizer.
+        finish
+            Compute standard errors, and residuals with the accurate integrator. False for a first look.
+
+        Returns
+        -------
+        The result; ``success`` is False, with the reason as ``message``, where the start cannot be simulated or the
+        optimizer ran out of evaluations.
+        """
+        coordinates = Coordinates.of(self.structure, free, start, self.scales)
+        n_free, n_states = len(free), len(self.structure.states)
+        states = list(initial_states) if initial_states is not None else [d.first_state for d in self._data]
+        theta = np.concatenate(
+            [coordinates.from_values(start), *(s / self._state_scales for s in states)]
+        )
+        lower = np.concatenate([coordinates.lower, *(s / self._state_scales - _STATE_RANGE for s in states)])
+        upper = np.concatenate([coordinates.upper, *(s / self._state_scales + _STATE_RANGE for s in states)])
+        problem = _Problem(self, coordinates, n_states, lower, upper)
+        problem.choose_substeps(theta)
+        if not np.isfinite(problem.at(theta).cost):
+            return self._failed(coordinates, theta, "The start values cannot be simulated.")
+        if theta.size == 0:
+            return self._result(problem, theta, True, "Nothing to fit.", finish)
+        solution = least_squares(
+            problem.residual,
+            theta,
+            jac=problem.jacobian,
+            bounds=(lower, upper),
+            method="trf",
+            x_scale="jac",
+            ftol=1e-7,
+            xtol=1e-8,
+            gtol=1e-10,
+            max_nfev=max_evaluations,
+        )
+        return self._result(problem, solution.x, bool(solution.status > 0), solution.message, finish)
+
+    def _failed(self, coordinates: Coordinates, theta: NDArray[np.float64], message: str) -> FitResult:
+        p = coordinates.to_parameters(theta[: len(coordinates.free)])
+        n = len(coordinates.free)
+        return FitResult(
+            structure=self.structure,
+            success=False,
+            message=message,
+            values=dict(zip(self.structure.names, map(float, p), strict=True)),
+            standard_errors=dict.fromkeys(coordinates.free, float("inf")),
+            initial_states=tuple(d.first_state for d in self._data),
+            cost=float("inf"),
+            n_samples=self.n_samples,
+            n_evaluations=1,
+            free=coordinates.free,
+            covariance=np.full((n, n), np.inf),
+            residuals=(),
+        )
+
+    def _result(
+        self, problem: _Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
+    ) -> FitResult:
+        coordinates = problem.coordinates
+        n_free = len(coordinates.free)
+        p = coordinates.to_parameters(theta[:n_free])
+        states = problem.states(theta)
+        cost = problem.at(theta).cost
+        residuals: tuple[NDArray[np.float64], ...] = ()
+        covariance = np.full((n_free, n_free), np.nan)
+        if finish:
+            try:
+                residuals = tuple(
+                    d.measured
+                    - simulate_outputs(self.structure, d.held, p, s, d.record.n_samples, self.accuracy)
+                    for d, s in zip(self._data, states, strict=True)
+                )
+            except SimulationError as error:
+                return self._failed(coordinates, theta, str(error))
+            cost = float(
+                sum(
+                    np.nansum((r * d.weights) ** 2)
+                    for r, d in zip(residuals, self._data, strict=True)
+                )
+            )
+            covariance = colored_covariance(problem.sensitivities(theta), n_free)
+            chain = coordinates.jacobian(theta[:n_free])
+            covariance = chain @ covariance @ chain.T
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
+        return FitResult(
+            structure=self.structure,
+            success=success,
+            message=message,
+            values=dict(zip(self.structure.names, map(float, p), strict=True)),
+            standard_errors=dict(zip(coordinates.free, map(float, errors), strict=True)),
+            initial_states=tuple(states),
+            cost=cost,
+            n_samples=self.n_samples,
+            n_evaluations=problem.n_evaluations,
+            free=coordinates.free,
+            covariance=covariance,
+            residuals=residuals,
+        )
+
+    @property
+    def data(self) -> list[_Data]:
+        """The records as the fit sees them."""
+        return self._data
+
+    @property
+    def state_scales(self) -> NDArray[np.float64]:
+        """Size of each state, shape (n_states,)."""
+        return self._state_scales
+
+
+@dataclass(frozen=True)
+class _Evaluation:
+    theta: NDArray[np.float64]
+    cost: float
+    normal: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+
+
+class _Problem:
+    """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
+
+    def __init__(
+        self,
+        fit: GreyBoxFit,
+        coordinates: Coordinates,
+        n_states: int,
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+    ) -> None:
+        self.fit = fit
+        self.coordinates = coordinates
+        self.n_states = n_states
+        self.upper = upper
+        self.n_free = len(coordinates.free)
+        self.n_evaluations = 0
+        self.substeps = [_FALLBACK_SUBSTEPS] * len(fit.data)
+        self._last: _Evaluation | None = None
+        self._best = float("inf")
+
+    def states(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Return the initial states per record."""
+        own = theta[self.n_free :].reshape(len(self.fit.data), self.n_states)
+        return [row * self.fit.state_scales for row in own]
+
+    def choose_substeps(self, theta: NDArray[np.float64]) -> None:
+        """Choose the substeps of each record from the accuracy wish at these coordinates."""
+        p = self.coordinates.to_parameters(theta[: self.n_free])
+        for i, (data, state) in enumerate(zip(self.fit.data, self.states(theta), strict=True)):
+            try:
+                self.substeps[i] = choose_substeps(
+                    self.fit.structure, data.held, p, state, data.record.n_samples, self.fit.accuracy
+                )
+            except SimulationError:
+                self.substeps[i] = _FALLBACK_SUBSTEPS
+
+    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a vector with the same cost and the same projection on the derivatives as the residuals."""
+        evaluation = self.at(theta)
+        if not np.isfinite(evaluation.cost):
+            stand_in = np.zeros(theta.size + 1)
+            stand_in[-1] = np.sqrt(_WORSE * self._best)
+            return stand_in
+        root, projection = _compressed(evaluation)
+        rest = max(evaluation.cost - float(projection @ projection), 0.0)
+        return np.append(projection, np.sqrt(rest))
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives that go with `residual`."""
+        root, _ = _compressed(self.at(theta))
+        return np.vstack([root, np.zeros(theta.size)])
+
+    def at(self, theta: NDArray[np.float64]) -> _Evaluation:
+        """Evaluate, or return the last evaluation if it was here."""
+        if self._last is not None and np.array_equal(self._last.theta, theta):
+            return self._last
+        n = theta.size
+        normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
+        for index, (residual, derivative) in enumerate(self.sensitivities(theta)):
+            columns = self._columns(index)
+            cost += float(residual @ residual)
+            normal[np.ix_(columns, columns)] += derivative.T @ derivative
+            gradient[columns] += derivative.T @ residual
+        if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
+            cost = float("inf")
+        self._best = min(self._best, cost)
+        self._last = _Evaluation(theta.copy(), cost, normal, gradient)
+        self.n_evaluations += 1
+        return self._last
+
+    def _columns(self, index: int) -> NDArray[np.intp]:
+        own = self.n_free + index * self.n_states + np.arange(self.n_states)
+        return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
+
+    def sensitivities(
+        self, theta: NDArray[np.float64]
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
+        shifts = np.where(theta + STEP > self.upper, -STEP, STEP)
+        base = self.coordinates.to_parameters(theta[: self.n_free])
+        shifted = []
+        for i in range(self.n_free):
+            moved = theta[: self.n_free].copy()
+            moved[i] += shifts[i]
+            shifted.append(self.coordinates.to_parameters(moved))
+        p = np.column_stack([base, *shifted, *[base] * self.n_states])
+        results = []
+        for index, (data, state) in enumerate(zip(self.fit.data, self.states(theta), strict=True)):
+            columns = self._columns(index)
+            step = shifts[columns]
+            x0 = np.repeat(state[:, None], p.shape[1], axis=1)
+            for i in range(self.n_states):
+                x0[i, 1 + self.n_free + i] += step[self.n_free + i] * self.fit.state_scales[i]
+            with np.errstate(all="ignore"):
+                out = simulate_sets(
+                    self.fit.structure, data.held, p, x0, data.record.n_samples, self.substeps[index]
+                )
+                results.append(_weighted(data, out, step))
+        return results
+
+
+def _weighted(
+    data: _Data, out: NDArray[np.float64], step: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    residuals, derivatives = [], []
+    for i, weight in enumerate(data.weights):
+        if weight > 0.0:
+            residuals.append((data.measured[:, i] - out[:, i, 0]) * weight)
+            derivatives.append((out[:, i, :1] - out[:, i, 1:]) * (weight / step))
+    return np.concatenate(residuals), np.concatenate(derivatives)
+
+
+def _compressed(evaluation: _Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
+    size = np.sqrt(np.diag(evaluation.normal))
+    size[size == 0.0] = 1.0
+    eigenvalues, vectors = np.linalg.eigh(evaluation.normal / np.outer(size, size))
+    kept = np.maximum(eigenvalues, 0.0)
+    floor = 1e-13 * max(float(kept[-1]), 1e-300)
+    root = np.sqrt(kept)
+    inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
+    projection = inverse * (vectors.T @ (evaluation.gradient / size))
+    return (root[:, None] * vectors.T) * size, projection
+
+
+def _first_state(structure: Structure, record: Record) -> NDArray[np.float64]:
+    """Guess the initial state from the first samples: measured outputs, their slope, no memory, settled lags."""
+    state = np.zeros(len(structure.states))
+    if not structure.rig.is_driven:
+        return state
+    count = min(7, record.n_samples)
+    time = np.arange(count) * record.dt
+    displacement = record[structure.rig.outputs[0].name][:count]
+    slope, level = np.polyfit(time, displacement, 1)
+    state[0], state[1] = level, slope
+    for i, (name, dimension) in enumerate(
+        zip(structure.state_names, structure.state_dimensions, strict=True)
+    ):
+        if name in record and i > 1:
+            state[i] = float(np.mean(record[name][:count]))
+        elif dimension == "input":
+            state[i] = record[structure.rig.inputs[0].name][0]
+    return state

@@ -1,0 +1,127 @@
+"""A physical parameter (name, unit, bounds, null value) and sets of their values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, check_in_range, nearest
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a model.
+
+    Attributes
+    ----------
+    name
+        Identifier, the symbol of the equations (``k_c``).
+    unit
+        SI unit as text (``"N m/rad"``), ``"1"`` if dimensionless.
+    description
+        What the number means, one line.
+    lower, upper
+        Physically admissible range; the simulation stays finite on all of it.
+    null
+        Value at which the effect that owns the parameter vanishes; None if another of its parameters does that.
+    default
+        Value used when none is given; a fit leaves a parameter with ``fitted=False`` there.
+    dimension
+        Product of powers of base quantities (`rigsight.units`); gives unit and characteristic size on any rig.
+    starts
+        Start values for a search, in characteristic units.
+    search
+        Range that a search explores, in characteristic units, inside [lower, upper].
+    logarithmic
+        True for positive quantities that are searched over decades.
+    fitted
+        False for a redundant or purely conventional number that no record can determine.
+    """
+
+    name: str
+    description: str
+    dimension: str = ""
+    unit: str = ""
+    lower: float = -math.inf
+    upper: float = math.inf
+    null: float | None = None
+    default: float | None = None
+    starts: tuple[float, ...] = ()
+    search: tuple[float, float] = (-math.inf, math.inf)
+    logarithmic: bool = False
+    fitted: bool = True
+
+    def check(self, value: float) -> float:
+        """Return `value` as a float.
+
+        Raises
+        ------
+        InputError
+            If it lies outside the admissible range.
+        """
+        return check_in_range(f"Parameter '{self.name}'", value, self.lower, self.upper, self.unit)
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """An ordered set of parameters with their values, convertible to a vector and back."""
+
+    parameters: tuple[Parameter, ...]
+    values: tuple[float, ...]
+
+    @classmethod
+    def from_mapping(
+        cls, parameters: Iterable[Parameter], values: Mapping[str, float]
+    ) -> ParameterSet:
+        """Order `values` as `parameters` are.
+
+        Raises
+        ------
+        InputError
+            Listing every missing and every unknown name, or a value outside its range.
+        """
+        parameters = tuple(parameters)
+        names = [parameter.name for parameter in parameters]
+        missing = [name for name in names if name not in values]
+        unknown = [name for name in values if name not in names]
+        if unknown:
+            hint = nearest(unknown[0], names)
+            raise InputError(
+                f"Unknown parameters: {', '.join(unknown)}.{hint} Known: {', '.join(names)}."
+            )
+        if missing:
+            raise InputError(f"Missing parameters: {', '.join(missing)}.")
+        return cls(parameters, tuple(p.check(values[p.name]) for p in parameters))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameter names in order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    def to_vector(self) -> NDArray[np.float64]:
+        """Return the values, shape (n_parameters,)."""
+        return np.array(self.values, dtype=np.float64)
+
+    def to_mapping(self) -> dict[str, float]:
+        """Return name -> value."""
+        return dict(zip(self.names, self.values, strict=True))
+
+    def replace(self, **values: float) -> ParameterSet:
+        """Return a copy with some values changed.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or a value is out of range.
+        """
+        return ParameterSet.from_mapping(self.parameters, {**self.to_mapping(), **values})
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[self.names.index(name)]
+
+    def __iter__(self) -> Iterator[tuple[Parameter, float]]:
+        return iter(zip(self.parameters, self.values, strict=True))

@@ -1,0 +1,169 @@
+"""Are the samples equally spaced, and if nearly, how do they become so?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rigsight.errors import InputError
+from rigsight.records.record import Hold
+
+FEWEST_SAMPLES = 50
+# Of the sample time: above the first a record is refused; below the second interpolation adds more error than it mends.
+LARGEST_JITTER = 0.01
+NEGLIGIBLE_JITTER = 1e-4
+# Of the sample time: with stamps printed more coarsely, rounding cannot be told from a repeated or missing row.
+COARSEST_STAMPS = 0.2
+# Of the printed resolution: a half, and a little for the fitted grid.
+LARGEST_ROUNDING = 0.6
+STAMPS_LOOKED_AT = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class TimeBase:
+    """The even grid of a record.
+
+    Attributes
+    ----------
+    t0, dt
+        First stamp and sample time, in the unit of the stamps.
+    stamps
+        Measured stamps, shape (n_samples,), where the samples must be resampled; None where they lie on the grid.
+    notes
+        What was found.
+    """
+
+    t0: float
+    dt: float
+    stamps: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
+
+    def resample(self, samples: NDArray[np.float64], hold: Hold | None = None) -> NDArray[np.float64]:
+        """Return samples on the even grid, shape (n_samples,).
+
+        An input is interpolated as its `hold` says it ran between the samples; None is an output, smooth by nature.
+        """
+        if self.stamps is None or hold == "zoh":
+            return samples
+        grid = np.linspace(self.stamps[0], self.stamps[-1], self.stamps.size)
+        if hold == "foh":
+            return np.interp(grid, self.stamps, samples)
+        return np.asarray(CubicSpline(self.stamps, samples)(grid), dtype=np.float64)
+
+
+def time_base(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) -> TimeBase:
+    """Return the even grid on which the stamps lie.
+
+    Parameters
+    ----------
+    stamps
+        Time stamps as they stand in the file, shape (n_samples,).
+    lines
+        Line number of every stamp, shape (n_samples,).
+    file
+        Name for messages.
+
+    Raises
+    ------
+    InputError
+        Naming the line: too few samples, time not increasing, duplicate stamps, gaps, or jitter above 1 %.
+    """
+    if stamps.size < FEWEST_SAMPLES:
+        raise InputError(
+            f"{file} has {stamps.size} samples; at least {FEWEST_SAMPLES} are needed for a record."
+        )
+    index = np.arange(stamps.size, dtype=np.float64)
+    slope, start = np.polyfit(index, stamps - stamps[0], 1)
+    deviation = np.abs(stamps - stamps[0] - start - slope * index)
+    rounding = resolution(stamps)
+    coarse = bool(rounding.max() > COARSEST_STAMPS * slope)
+    tolerated = np.full(stamps.size, NEGLIGIBLE_JITTER * slope)
+    if not coarse:
+        tolerated = np.maximum(tolerated, LARGEST_ROUNDING * rounding)
+    if slope > 0.0 and bool(np.all(deviation <= tolerated)):
+        return TimeBase(float(stamps[0]), _plain(float(slope), float(rounding[-1]) / stamps.size))
+    _check_order(stamps, lines, file)
+    _check_gaps(stamps, lines, file)
+    steps = np.diff(stamps)
+    dt = float((stamps[-1] - stamps[0]) / (stamps.size - 1))
+    # A clock that wanders keeps its steps even but not its stamps; scattered stamps the other way round.
+    jitter = min(float(deviation.max()) / float(slope), float(np.abs(steps - dt).max()) / dt)
+    if jitter > LARGEST_JITTER:
+        worst = int(np.argmax(np.abs(steps - dt)))
+        mend = (
+            "Write the time with more digits."
+            if coarse
+            else "Resample the record onto an even grid, or record with a fixed sample time."
+        )
+        raise InputError(
+            f"{file}, line {lines[worst + 1]}: the samples are not equally spaced; the step to t = {stamps[worst + 1]:.9g} is "
+            f"{steps[worst]:.4g}, the mean step {dt:.4g} (jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
+            f"{mend}"
+        )
+    note = f"{file}: stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
+    return TimeBase(float(stamps[0]), dt, stamps, (note,))
+
+
+def resolution(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the spacing of the numbers that the file's digits can express at each stamp, shape (n_samples,).
+
+    Files print either a fixed number of decimals or of significant digits; the coarser of both explains a stamp's rounding.
+    """
+    chosen = np.unique(np.linspace(0, stamps.size - 1, STAMPS_LOOKED_AT).astype(np.int64))
+    digits = [_digits(float(stamp)) for stamp in stamps[chosen]]
+    decimals = max(after_point for _, after_point in digits)
+    significant = max(count for count, _ in digits)
+    magnitude = np.floor(np.log10(np.maximum(np.abs(stamps), 10.0**-decimals))) + 1.0
+    return np.asarray(np.maximum(10.0**-decimals, 10.0 ** (magnitude - significant)), dtype=np.float64)
+
+
+def _digits(number: float) -> tuple[int, int]:
+    """Return the counts of significant digits and of decimals in the shortest text that gives the number."""
+    mantissa, _, exponent = f"{number!r}".lower().lstrip("-").partition("e")
+    whole, _, fraction = mantissa.partition(".")
+    fraction = fraction.rstrip("0")
+    return len((whole + fraction).lstrip("0")), max(len(fraction) - int(exponent or 0), 0)
+
+
+def _plain(dt: float, uncertainty: float) -> float:
+    """Return `dt` with as few digits as stay within the uncertainty that rounding leaves on it."""
+    for n_digits in range(2, 16):
+        rounded = float(f"{dt:.{n_digits}g}")
+        if abs(rounded - dt) <= 0.5 * uncertainty:
+            return rounded
+    return dt
+
+
+def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) -> None:
+    steps = np.diff(stamps)
+    if np.all(steps > 0.0):
+        return
+    first = int(np.argmax(steps <= 0.0))
+    where = f"{file}, line {lines[first + 1]}: "
+    if steps[first] < 0.0:
+        raise InputError(
+            f"{where}time is not increasing: {stamps[first + 1]:.9g} follows {stamps[first]:.9g}. "
+            "Sort the rows, or split the file where a new record begins."
+        )
+    count = int(np.count_nonzero(steps == 0.0))
+    mend = "Write the time with more digits." if count > stamps.size // 10 else "Delete the repeated row."
+    raise InputError(f"{where}duplicate time stamp {stamps[first]:.9g} ({count} in the file). {mend}")
+
+
+def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) -> None:
+    """Refuse missing samples; steps that vary everywhere are jitter, not gaps."""
+    steps = np.diff(stamps)
+    dt = float(np.median(steps))
+    gaps = np.flatnonzero(steps > 1.5 * dt)
+    if gaps.size == 0 or gaps.size > 0.05 * steps.size:
+        return
+    first = int(gaps[0])
+    missing = round(float(steps[first]) / dt) - 1
+    more = f" ({gaps.size} gaps in the file)" if gaps.size > 1 else ""
+    raise InputError(
+        f"{file}, between lines {lines[first]} and {lines[first + 1]}: {missing} samples are missing, "
+        f"the time jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}{more}. Split the record there into two files."
+    )

@@ -1,0 +1,102 @@
+"""How is a text file delimited: separator, decimal sign, comment lines, header and units rows?"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+COMMENT_SIGNS = ("#", "%", "//")
+# Earlier wins a tie: a comma may also be a decimal sign, and white space surrounds other separators.
+SEPARATORS = (";", "\t", "|", ",", " ")
+LINES_LOOKED_AT = 60
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How cells and numbers are written.
+
+    Attributes
+    ----------
+    separator
+        Between cells; a blank stands for any run of white space.
+    decimal
+        ``"."`` or ``","``.
+    """
+
+    separator: str
+    decimal: str
+
+    def cells(self, line: str) -> list[str]:
+        """Return the cells of a line, without quotes and surrounding blanks."""
+        if self.separator == " ":
+            parts = (
+                line.split() if '"' not in line else next(csv.reader([" ".join(line.split())], delimiter=" "))
+            )
+        elif '"' in line:
+            parts = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True))
+        else:
+            parts = line.split(self.separator)
+        return [part.strip().strip("\"'").strip() for part in parts]
+
+    def number(self, cell: str) -> float | None:
+        """Return the number a cell holds (NaN and Inf included), or None."""
+        if self.decimal == ",":
+            if "." in cell:
+                return None
+            cell = cell.replace(",", ".")
+        try:
+            return None if "_" in cell else float(cell)
+        except ValueError:
+            return None
+
+    def is_text(self, cell: str) -> bool:
+        """Return True if a cell is no number, nor one with the other decimal sign."""
+        return all(Dialect(self.separator, sign).number(cell) is None for sign in (".", ","))
+
+
+def is_comment(line: str, comment: str | None) -> bool:
+    """Return True for a comment line; `comment` is the sign in use, None for any usual one."""
+    return line.lstrip().startswith(comment or COMMENT_SIGNS)
+
+
+def sniff(lines: Sequence[str], separator: str | None, decimal: str | None) -> Dialect:
+    """Return the dialect in which most cells of equally wide rows are numbers.
+
+    Parameters
+    ----------
+    lines
+        Lines without comments and blank lines, at least one.
+    separator, decimal
+        What is already known, else None.
+    """
+    sample = lines[:LINES_LOOKED_AT]
+    best, best_score = Dialect(separator or ",", decimal or "."), -math.inf
+    for candidate in SEPARATORS if separator is None else (separator,):
+        for sign in (".", ",") if decimal is None else (decimal,):
+            if candidate == sign:
+                continue
+            dialect = Dialect(candidate, sign)
+            score = _share_of_numbers(dialect, sample, alone=separator is not None)
+            if score > best_score:
+                best, best_score = dialect, score
+    return best
+
+
+def _share_of_numbers(dialect: Dialect, lines: Sequence[str], alone: bool) -> float:
+    """Return the share of cells that are numbers, in rows as wide as most rows; 0 if that is one cell."""
+    rows = [dialect.cells(line) for line in lines]
+    width = Counter(len(row) for row in rows).most_common(1)[0][0]
+    if width < 2 and not alone:
+        return 0.0
+    numbers = sum(dialect.number(cell) is not None for row in rows if len(row) == width for cell in row)
+    # Where nothing is a number, a separator that splits is still better than one that does not.
+    return numbers / sum(len(row) for row in rows) + (1e-3 if width > 1 else 0.0)
+
+
+def looks_like_names(dialect: Dialect, cells: Sequence[str]) -> bool:
+    """Return True for a header or units row: mostly text, so that one broken number is not taken for a header."""
+    filled = [cell for cell in cells if cell]
+    return sum(dialect.is_text(cell) for cell in filled) * 2 > len(filled)

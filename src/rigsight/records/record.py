@@ -1,0 +1,161 @@
+"""What one record is: equally spaced samples of named signals in SI units, measured or simulated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigsight.errors import InputError, check_option, nearest
+
+Role = Literal["estimation", "validation"]
+Kind = Literal["sweep", "step", "multisine", "operation"]
+Hold = Literal["zoh", "foh", "band_limited"]
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Equally spaced samples of named signals.
+
+    Attributes
+    ----------
+    name
+        How results call the record.
+    dt
+        Sample time [s].
+    signals
+        Signal name -> read-only samples, each of shape (n_samples,).
+    units
+        Signal name -> unit; a signal without an entry is dimensionless.
+    t0
+        Time of the first sample [s].
+    role
+        ``"estimation"`` may be fitted, ``"validation"`` is only ever scored.
+    kind
+        What drove the rig.
+    amplitude
+        Amplitude of the input, in its unit, where one is meaningful.
+    hold
+        The input between samples.
+    source
+        The file it was read from, None for a simulated record.
+    notes
+        What was found or repaired while reading, one sentence each.
+
+    Raises
+    ------
+    InputError
+        If the signals differ in length, are not one-dimensional and finite, or `dt` is not a positive number.
+    """
+
+    name: str
+    dt: float
+    signals: Mapping[str, NDArray[np.float64]]
+    units: Mapping[str, str]
+    t0: float = 0.0
+    role: Role = "estimation"
+    kind: Kind = "operation"
+    amplitude: float | None = None
+    hold: Hold = "foh"
+    source: Path | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.dt) and self.dt > 0.0):
+            raise InputError(
+                f"Record '{self.name}': dt must be a positive number of seconds, got {self.dt!r}."
+            )
+        if not self.signals:
+            raise InputError(f"Record '{self.name}' has no signals: give at least one.")
+        check_option(f"Record '{self.name}': role", self.role, get_args(Role))
+        check_option(f"Record '{self.name}': kind", self.kind, get_args(Kind))
+        check_option(f"Record '{self.name}': hold", self.hold, get_args(Hold))
+        signals = {signal: self._checked(signal, samples) for signal, samples in self.signals.items()}
+        lengths = {signal: samples.size for signal, samples in signals.items()}
+        if len(set(lengths.values())) > 1:
+            listed = ", ".join(f"{signal} {length}" for signal, length in lengths.items())
+            raise InputError(
+                f"Record '{self.name}': signals must have the same number of samples, got {listed}."
+            )
+        object.__setattr__(self, "signals", MappingProxyType(signals))
+        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+
+    def _checked(self, signal: str, samples: ArrayLike) -> NDArray[np.float64]:
+        """Return a private, read-only copy: a caller that goes on writing to its array must not change the record."""
+        array = np.array(samples, dtype=np.float64)
+        if array.ndim != 1 or array.size == 0:
+            raise InputError(
+                f"Record '{self.name}': signal '{signal}' must have shape (n_samples,), got {array.shape}."
+            )
+        finite = np.isfinite(array)
+        if not finite.all():
+            raise InputError(
+                f"Record '{self.name}': signal '{signal}' is {array[~finite][0]} at sample {int(np.argmin(finite))}; "
+                "all samples must be finite."
+            )
+        array.flags.writeable = False
+        return array
+
+    # A mappingproxy cannot be pickled, and records travel to worker processes.
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "signals": dict(self.signals), "units": dict(self.units)}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return next(iter(self.signals.values())).size
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """Time stamps [s], shape (n_samples,)."""
+        return self.t0 + self.dt * np.arange(self.n_samples, dtype=np.float64)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return self.dt * (self.n_samples - 1)
+
+    def __getitem__(self, signal: str) -> NDArray[np.float64]:
+        try:
+            return self.signals[signal]
+        except KeyError:
+            hint = nearest(signal, self.signals)
+            listed = ", ".join(self.signals)
+            raise InputError(
+                f"Record '{self.name}' has no signal '{signal}'.{hint} It has: {listed}."
+            ) from None
+
+    def __contains__(self, signal: object) -> bool:
+        return signal in self.signals
+
+    def with_signals(self, **signals: ArrayLike) -> Record:
+        """Return a copy in which `signals`, each of shape (n_samples,), are added or replaced."""
+        added = {signal: np.asarray(samples, dtype=np.float64) for signal, samples in signals.items()}
+        return replace(self, signals={**self.signals, **added})
+
+    def slice(self, start: int | None, stop: int | None) -> Record:
+        """Return samples `start` to `stop` (exclusive), counted as Python slices are.
+
+        Raises
+        ------
+        InputError
+            If nothing is left.
+        """
+        first, last, _ = slice(start, stop).indices(self.n_samples)
+        if last <= first:
+            raise InputError(f"Record '{self.name}': no samples in [{start}, {stop}) of {self.n_samples}.")
+        return replace(
+            self,
+            t0=self.t0 + first * self.dt,
+            signals={signal: samples[first:last] for signal, samples in self.signals.items()},
+        )

@@ -1,0 +1,25 @@
+"""Rig and effects -> compiled kernel -> outputs for a record's input."""
+
+from rigsight.simulate.rest import rest_state as rest_state
+from rigsight.simulate.simulation import choose_substeps as choose_substeps
+from rigsight.simulate.simulation import parameter_vector as parameter_vector
+from rigsight.simulate.simulation import record_input as record_input
+from rigsight.simulate.simulation import simulate as simulate
+from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
+from rigsight.simulate.simulation import simulate_sets as simulate_sets
+from rigsight.simulate.structure import Structure as Structure
+from rigsight.simulate.structure import compose as compose
+from rigsight.simulate.structure import structure_named as structure_named
+
+__all__ = [
+    "Structure",
+    "choose_substeps",
+    "compose",
+    "parameter_vector",
+    "record_input",
+    "rest_state",
+    "simulate",
+    "simulate_outputs",
+    "simulate_sets",
+    "structure_named",
+]

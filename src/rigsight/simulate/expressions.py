@@ -1,0 +1,106 @@
+"""Printing of symbolic equations as Python statements that numba compiles, with shared subexpressions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import sympy as sp
+from sympy.printing.pycode import PythonCodePrinter
+
+
+class KernelPrinter(PythonCodePrinter):
+    """Prints expressions in the vocabulary of the kernel: products for small powers, selects for signs."""
+
+    def __init__(self) -> None:
+        super().__init__({"fully_qualified_modules": True, "strict": False})
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
+        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
+            base = self.parenthesize(expr.base, 1000)
+            product = "*".join([base] * abs(int(expr.exp)))
+            return f"({product})" if expr.exp > 0 else f"(1.0/({product}))"
+        text: str = super()._print_Pow(expr, rational)
+        return text
+
+    def _print_Abs(self, expr: sp.Abs) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return f"sign_of({self._print(expr.args[0])})"
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        return repr(float(expr))
+
+    def _print_Half(self, expr: sp.Expr) -> str:
+        return "0.5"
+
+
+def hoist_constants(
+    expressions: Sequence[sp.Expr], constants: set[sp.Symbol]
+) -> tuple[list[sp.Expr], dict[sp.Symbol, sp.Expr]]:
+    """Replace every largest subexpression of constants alone by a symbol.
+
+    Returns
+    -------
+    expressions
+        The expressions with those subexpressions replaced.
+    hoisted
+        Symbol -> the subexpression it stands for.
+    """
+    hoisted: dict[sp.Expr, sp.Symbol] = {}
+
+    def symbol_for(expression: sp.Expr) -> sp.Symbol:
+        return hoisted.setdefault(expression, sp.Symbol(f"q{len(hoisted)}", real=True))
+
+    def walk(expression: sp.Expr) -> sp.Expr:
+        if expression.is_number:
+            return expression
+        if expression.free_symbols <= constants:
+            return symbol_for(expression)
+        if not expression.args:
+            return expression
+        if expression.is_Add or expression.is_Mul:
+            fixed = [a for a in expression.args if a.free_symbols and a.free_symbols <= constants]
+            numbers = [a for a in expression.args if a.is_number]
+            if fixed and (len(fixed) > 1 or numbers):
+                rest = [a for a in expression.args if a not in fixed and a not in numbers]
+                combined = expression.func(*fixed, *numbers)
+                return expression.func(symbol_for(combined), *[walk(a) for a in rest])
+        return expression.func(*[walk(argument) for argument in expression.args])
+
+    replaced = [walk(expression) for expression in expressions]
+    return replaced, {symbol: expression for expression, symbol in hoisted.items()}
+
+
+def assignments(
+    targets: Sequence[str], expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str], prefix: str
+) -> list[str]:
+    """Return statements that assign expressions to targets, sharing common subexpressions.
+
+    Parameters
+    ----------
+    targets
+        Left-hand sides.
+    expressions
+        Right-hand sides, same length.
+    names
+        Name in the code of each symbol; symbols that are not listed keep their own.
+    prefix
+        Prefix of the names of shared subexpressions, unique in the code around.
+    """
+    printer = KernelPrinter()
+    counter = (sp.Symbol(f"{prefix}{i}", real=True) for i in range(10_000))
+    renamed = [
+        expression.xreplace({s: sp.Symbol(n, real=True) for s, n in names.items()})
+        for expression in expressions
+    ]
+    shared, reduced = sp.cse(renamed, symbols=counter, optimizations=None)
+    lines = [f"{symbol} = {printer.doprint(expression)}" for symbol, expression in shared]
+    lines += [
+        f"{target} = {printer.doprint(expression.evalf() if expression.is_number else expression)}"
+        for target, expression in zip(targets, reduced, strict=True)
+    ]
+    return lines

@@ -1,0 +1,113 @@
+"""Samples of an input -> what it does between them, as cubic polynomials per interval.
+
+The hold decides how well a model can fit: a sampled analog signal that is interpolated linearly looks like a small delay and
+a gain error that grows with frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import firwin, upfirdn
+
+Hold = Literal["zoh", "foh", "band_limited"]
+
+BAND_LIMITED_INTERVALS = 2
+"""Cubic pieces per sample of a band-limited input."""
+_OVERSAMPLING = 16
+_HALF_LENGTH = 48
+
+
+@dataclass(frozen=True)
+class HeldInput:
+    """An input between its samples.
+
+    Attributes
+    ----------
+    coefficients
+        Shape (n_intervals + 1, 4): ``c0 + c1 tau + c2 tau^2 + c3 tau^3`` with tau [s] from the start of each interval; row 0
+        is the input before the record, held at its first value.
+    interval
+        Length of an interval [s].
+    per_sample
+        Intervals per sample time.
+    continuous
+        False if the input jumps between intervals.
+    """
+
+    coefficients: NDArray[np.float64]
+    interval: float
+    per_sample: int
+    continuous: bool
+
+
+def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
+    """Return the input between its samples.
+
+    Parameters
+    ----------
+    samples
+        Shape (n_samples,).
+    dt
+        Sample time [s].
+    hold
+        ``"zoh"`` (constant until the next sample), ``"foh"`` (linear) or ``"band_limited"`` (sampled analog signal: windowed
+        sinc interpolation; beyond the ends the signal is continued by its point reflection).
+    """
+    samples = np.asarray(samples, dtype=np.float64)
+    if hold == "band_limited":
+        nodes, slopes = _band_limited_nodes(samples, dt)
+        per_sample = BAND_LIMITED_INTERVALS
+    else:
+        nodes, slopes = samples, np.zeros(0)
+        per_sample = 1
+    interval = dt / per_sample
+    coefficients = np.zeros((nodes.size, 4))
+    coefficients[0, 0] = nodes[0]
+    rows = coefficients[1:]
+    rows[:, 0] = nodes[:-1]
+    rise = np.diff(nodes)
+    if hold == "foh":
+        rows[:, 1] = rise / interval
+    elif hold == "band_limited":
+        first, last = slopes[:-1] * interval, slopes[1:] * interval
+        rows[:, 1] = slopes[:-1]
+        rows[:, 2] = (3.0 * rise - 2.0 * first - last) / interval**2
+        rows[:, 3] = (first + last - 2.0 * rise) / interval**3
+    return HeldInput(coefficients, interval, per_sample, continuous=hold != "zoh")
+
+
+def hold_motion(values: NDArray[np.float64], rates: NDArray[np.float64], dt: float) -> HeldInput:
+    """Return a prescribed motion between samples from displacement and velocity, both of shape (n_samples,)."""
+    rows = np.zeros((values.size, 4))
+    rows[0, 0] = values[0]
+    rise = np.diff(values)
+    first, last = rates[:-1] * dt, rates[1:] * dt
+    rows[1:, 0] = values[:-1]
+    rows[1:, 1] = rates[:-1]
+    rows[1:, 2] = (3.0 * rise - 2.0 * first - last) / dt**2
+    rows[1:, 3] = (first + last - 2.0 * rise) / dt**3
+    return HeldInput(rows, dt, 1, continuous=True)
+
+
+def _band_limited_nodes(
+    samples: NDArray[np.float64], dt: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return values and slopes at the interval boundaries, from a finely oversampled windowed-sinc interpolation."""
+    fine = _OVERSAMPLING * BAND_LIMITED_INTERVALS
+    n_taps = 2 * _HALF_LENGTH * fine + 1
+    taps = fine * firwin(n_taps, 1.0 / fine, window=("kaiser", 10.0))
+    pad = min(_HALF_LENGTH + 2, samples.size - 1)
+    before = 2.0 * samples[0] - samples[pad:0:-1]
+    after = 2.0 * samples[-1] - samples[-2 : -pad - 2 : -1]
+    extended = np.concatenate([before, samples, after])
+    dense = upfirdn(taps, extended, up=fine)[_HALF_LENGTH * fine :]
+    start = pad * fine
+    stop = start + (samples.size - 1) * fine
+    index = np.arange(start, stop + 1, _OVERSAMPLING)
+    step = dt / fine
+    slopes = (8.0 * (dense[index + 1] - dense[index - 1]) - (dense[index + 2] - dense[index - 2])) / (12.0 * step)
+    return dense[index], slopes

@@ -1,0 +1,94 @@
+"""Source text of a kernel -> compiled module, cached on disk under the hash of that text.
+
+A stale kernel is impossible: the file's name is the hash of all that its machine code depends on in our hands (its complete
+source), its text is compared before use, and numba keys its own cache on that file, its own version and the processor.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from rigsight.errors import InputError
+from rigsight.simulate.kernel_source import kernel_source
+from rigsight.simulate.structure import Structure
+
+CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
+
+_modules: dict[str, ModuleType] = {}
+_lock = threading.RLock()
+
+
+def cache_folder() -> Path:
+    """Return where compiled kernels live: $RIGSIGHT_CACHE_DIR, else the platform's place for a user's caches."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return base / "rigsight" / "kernels"
+
+
+def kernels(structure: Structure) -> Any:
+    """Return the module of compiled kernels of a structure, generating and loading it if needed.
+
+    Raises
+    ------
+    InputError
+        If the cache folder cannot be written.
+    """
+    with _lock:
+        key = id(structure)
+        source = _sources_by_identity.get(key)
+        if source is None or source[0] is not structure:
+            source = (structure, kernel_source(structure))
+            _sources_by_identity[key] = source
+        text = source[1]
+        name = f"rigsight_kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
+        module = _modules.get(name)
+        if module is None:
+            module = _load(name, _written(name, text))
+            _modules[name] = module
+        return module
+
+
+_sources_by_identity: dict[int, tuple[Structure, str]] = {}
+
+
+def _written(name: str, text: str) -> Path:
+    """Return the file that holds `text`, written whole or not at all."""
+    folder = cache_folder()
+    path = folder / f"{name}.py"
+    try:
+        if path.is_file() and path.read_text("utf-8") == text:
+            return path
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8") as file:
+            file.write(text)
+        os.replace(file.name, path)
+    except OSError as error:
+        raise InputError(
+            f"Cannot keep compiled kernels in {folder} ({error.strerror}). "
+            f"Set {CACHE_VARIABLE} to a folder that can be written."
+        ) from error
+    return path
+
+
+def _load(name: str, path: Path) -> ModuleType:
+    specification = importlib.util.spec_from_file_location(name, path)
+    assert specification is not None and specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module
+    specification.loader.exec_module(module)
+    return module

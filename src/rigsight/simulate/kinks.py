@@ -1,0 +1,91 @@
+"""Where the equations of a structure are not smooth: every Abs and sign, as a mode that is frozen between events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from rigsight.simulate.structure import Structure
+
+absolute = sp.Function("absolute", real=True)
+"""Absolute value that stays one: the base of a power with a real exponent, smooth enough not to be an event."""
+
+
+@dataclass(frozen=True)
+class FrozenStructure:
+    """A structure with each kink's sign as a symbol.
+
+    Attributes
+    ----------
+    rates, outputs
+        Expressions in states, parameters and `modes`; smooth between events.
+    modes
+        Symbols that take the values -1 and +1.
+    switches
+        Expression whose sign each mode is.
+    friction_mode
+        Index of the mode whose flip makes the acceleration jump (dry friction: the velocity can stay at zero), or None.
+    """
+
+    rates: tuple[sp.Expr, ...]
+    outputs: tuple[sp.Expr, ...]
+    modes: tuple[sp.Symbol, ...]
+    switches: tuple[sp.Expr, ...]
+    friction_mode: int | None
+
+
+def freeze(structure: Structure) -> FrozenStructure:
+    """Replace every Abs and sign in a structure's equations by a mode symbol."""
+    constant = set(structure.parameter_symbols)
+    expressions = [*structure.rates, *structure.outputs]
+    modes: dict[sp.Expr, sp.Symbol] = {}
+    while True:
+        kink = _innermost_kink(expressions, constant)
+        if kink is None:
+            break
+        argument = kink.args[0]
+        flipped = argument.could_extract_minus_sign()
+        switch = -argument if flipped else argument
+        mode = modes.setdefault(switch, sp.Symbol(f"mode_{len(modes)}", real=True))
+        powers = {
+            power: absolute(switch) ** power.exp
+            for expression in expressions
+            for power in expression.atoms(sp.Pow)
+            if power.base == sp.Abs(argument) and not power.exp.is_Integer
+        }
+        signed = -mode if flipped else mode
+        replacement = {**powers, sp.Abs(argument): mode * switch, sp.sign(argument): signed}
+        expressions = [expression.xreplace(replacement) for expression in expressions]
+    n_states = len(structure.states)
+    return FrozenStructure(
+        rates=tuple(expressions[:n_states]),
+        outputs=tuple(expressions[n_states:]),
+        modes=tuple(modes.values()),
+        switches=tuple(modes),
+        friction_mode=_friction_mode(structure, modes, expressions),
+    )
+
+
+def _innermost_kink(expressions: list[sp.Expr], constant: set[sp.Symbol]) -> sp.Expr | None:
+    candidates = {
+        atom
+        for expression in expressions
+        for atom in expression.atoms(sp.Abs, sp.sign)
+        if not atom.args[0].atoms(sp.Abs, sp.sign) and not atom.free_symbols <= constant
+    }
+    return min(candidates, key=sp.default_sort_key) if candidates else None
+
+
+def _friction_mode(
+    structure: Structure, modes: dict[sp.Expr, sp.Symbol], expressions: list[sp.Expr]
+) -> int | None:
+    if structure.velocity_index is None:
+        return None
+    velocity = structure.states[structure.velocity_index]
+    for index, (switch, mode) in enumerate(modes.items()):
+        if switch == velocity:
+            at_rest = expressions[structure.velocity_index].subs(velocity, 0)
+            if sp.simplify(sp.diff(at_rest, mode)) != 0:
+                return index
+    return None

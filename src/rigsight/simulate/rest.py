@@ -1,0 +1,118 @@
+"""Static equilibrium from which a record starts when nothing else is known."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.simulate.input_hold import HeldInput, hold_input
+from rigsight.simulate.kernel_cache import kernels
+from rigsight.simulate.structure import Structure
+
+_RAMP_PERIODS = 20.0
+"""Length of the slow rise of the input in periods of the linear rig."""
+_SETTLED = 1e-10
+"""Relative change of the states over one wait below which they rest."""
+_WAITS = 10
+_TOLERANCE = 1e-9
+
+
+def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
+    """Return the static equilibrium at the first input sample, reached from rest without memory.
+
+    The input is raised slowly from zero, so that hysteresis and friction hold what they would on a rig. A rig without a
+    spring has no equilibrium: it starts at its rest position.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    p
+        Parameter values in the order of the structure, shape (n_parameters,).
+    held
+        Input between its samples.
+
+    Returns
+    -------
+    Shape (n_states,).
+    """
+    state = np.zeros(max(1, len(structure.states)))
+    motion = structure.rig.motion
+    if motion.inertia is None:
+        return state
+    inertia = _value(structure, p, motion.inertia)
+    stiffness = _value(structure, p, motion.stiffness)
+    state[0] = _value(structure, p, motion.rest)
+    if stiffness <= 0.0:
+        return state
+    period = 2.0 * math.pi * math.sqrt(inertia / stiffness)
+    quiet = _quiet_parameters(structure, p, critical_damping=2.0 * math.sqrt(stiffness * inertia))
+    module = kernels(structure)
+    first = float(held.coefficients[0, 0])
+    for start, stop in ((0.0, 0.0), (0.0, first)) if first != 0.0 else ((0.0, 0.0),):
+        reached = _settled(structure, module, quiet, state, (start, stop), _RAMP_PERIODS * period)
+        if reached is None:
+            return state
+        state = reached
+    return state
+
+
+def _value(structure: Structure, p: NDArray[np.float64], expression: sp.Expr) -> float:
+    """Return the value of an expression of the rig's own symbols."""
+    return float(expression.subs({s: p[structure.names.index(s.name)] for s in expression.free_symbols}))
+
+
+def _quiet_parameters(
+    structure: Structure, p: NDArray[np.float64], critical_damping: float
+) -> NDArray[np.float64]:
+    """Return parameters with the same equilibria that are reached without swinging past them and without waiting.
+
+    Swinging past an equilibrium would leave a memory in hysteresis and friction that a rig at rest does not have.
+    """
+    quiet = p.copy()
+    damping = structure.names.index(structure.rig.motion.damping.name)
+    quiet[damping] = max(p[damping], critical_damping)
+    for effect in structure.effects:
+        if effect.delay is not None:
+            for own_name, null in effect.null_values().items():
+                name = structure.parameter_name(effect, own_name)
+                if name in structure.names:
+                    quiet[structure.names.index(name)] = null
+    return quiet
+
+
+def _settled(
+    structure: Structure,
+    module: Any,
+    p: NDArray[np.float64],
+    state: NDArray[np.float64],
+    ramp: tuple[float, float],
+    duration: float,
+) -> NDArray[np.float64] | None:
+    """Return the state after a ramp of the input and waits until nothing moves; None if the motion has no end."""
+    velocity = structure.velocity_index or 0
+    n_intervals = 100
+    samples = np.linspace(*ramp, n_intervals + 1)
+    state = state.copy()
+    for _ in range(1 + _WAITS):
+        before = state.copy()
+        held = hold_input(samples, duration / n_intervals, "foh")
+        out = np.zeros((n_intervals + 1, len(structure.outputs)))
+        status = module.simulate_one(
+            held.coefficients, held.interval, 1, True, 0.0, p, state, _TOLERANCE, out
+        )
+        if status != module.OK:
+            return None
+        moved = np.abs(state - before)
+        moved[velocity] = 0.0
+        if np.all(moved <= _SETTLED * np.abs(state)):
+            break
+        if samples[0] == samples[-1]:
+            duration *= 2.0
+        samples = np.full(n_intervals + 1, ramp[1])
+    state[velocity] = 0.0
+    return state

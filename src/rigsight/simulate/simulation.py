@@ -1,0 +1,218 @@
+"""Simulate a structure for a record's input: one parameter set accurately, or many side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, SimulationError
+from rigsight.records.record import Record
+from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
+from rigsight.simulate.kernel_cache import kernels
+from rigsight.simulate.kernel_source import LANES
+from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.simulate.rest import rest_state
+from rigsight.simulate.structure import Structure, without_vanished_effects
+
+DEFAULT_ACCURACY = 1e-6
+"""Relative RMS error of the first output that `simulate` aims for."""
+_LOCAL_PER_GLOBAL = 0.3
+"""Error allowed per step for one unit of global error; measured on sets R, B, P of the thesis and stiffer ones."""
+_SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+
+_REASONS = {
+    1: "more than 20000 steps were needed within one sample; the model is too stiff or chatters",
+    2: "the motion left the range of numbers; the model is unstable with these parameters",
+}
+
+
+def record_input(structure: Structure, record: Record) -> HeldInput:
+    """Return the input of a record between its samples, with the record's hold.
+
+    Where the motion is prescribed, it is the smoothing spline through the measured displacement.
+    """
+    signal = record[structure.rig.inputs[0].name]
+    if structure.rig.is_driven:
+        return hold_input(signal, record.dt, record.hold)
+    return hold_motion(*smooth_motion(signal, record.dt), record.dt)
+
+
+def simulate(
+    structure: Structure,
+    values: Mapping[str, float],
+    record: Record,
+    initial_state: NDArray[np.float64] | None = None,
+    accuracy: float = DEFAULT_ACCURACY,
+) -> Record:
+    """Simulate a record's input and return the outputs as a record of the same form.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    values
+        Value of each of the structure's parameters, by name.
+    record
+        Input samples and hold; its outputs are not read.
+    initial_state
+        Shape (n_states,), in the order of ``structure.states``; default is the static equilibrium at the first input sample.
+    accuracy
+        Relative RMS error to aim for.
+
+    Raises
+    ------
+    SimulationError
+        If the motion leaves the range of numbers or the model is too stiff.
+    """
+    complete = structure
+    structure, values = without_vanished_effects(complete, values)
+    held = record_input(structure, record)
+    p = parameter_vector(structure, values)
+    if initial_state is None:
+        initial_state = rest_state(structure, p, held)
+    elif structure is not complete:
+        initial_state = np.asarray(initial_state)[[complete.states.index(state) for state in structure.states]]
+    outputs = simulate_outputs(structure, held, p, initial_state, record.n_samples, accuracy)
+    names = [signal.name for signal in structure.rig.outputs]
+    return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
+
+
+def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArray[np.float64]:
+    """Return the parameter values in the order of the structure, shape (n_parameters,).
+
+    A missing value is the parameter's default; values of other names are not read.
+
+    Raises
+    ------
+    InputError
+        Listing what is missing and has no default.
+    """
+    known = {p.name: values.get(p.name, p.default) for p in structure.parameters}
+    missing = [name for name, value in known.items() if value is None]
+    if missing:
+        raise InputError(f"Missing parameters: {', '.join(missing)}. The model has: {', '.join(structure.names)}.")
+    return np.array(list(known.values()), dtype=np.float64)
+
+
+def simulate_outputs(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_state: NDArray[np.float64],
+    n_samples: int,
+    accuracy: float = DEFAULT_ACCURACY,
+) -> NDArray[np.float64]:
+    """Return the outputs of one parameter set, shape (n_samples, n_outputs).
+
+    Raises
+    ------
+    SimulationError
+        If the motion leaves the range of numbers or the model is too stiff.
+    """
+    module = kernels(structure)
+    out = np.zeros((n_samples, len(structure.outputs)))
+    status = module.simulate_one(
+        held.coefficients,
+        held.interval,
+        held.per_sample,
+        held.continuous,
+        0.0,
+        p,
+        _state_vector(structure, initial_state),
+        _LOCAL_PER_GLOBAL * accuracy,
+        out,
+    )
+    if status != module.OK:
+        effects = ", ".join(structure.effect_names) or "no effect"
+        raise SimulationError(f"Simulation of {structure.rig.name} with {effects}: {_REASONS[status]}.")
+    return out
+
+
+def simulate_sets(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+    n_samples: int,
+    substeps: int,
+) -> NDArray[np.float64]:
+    """Simulate many parameter sets side by side.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    held
+        Input between its samples.
+    p
+        Shape (n_parameters, n_sets).
+    initial_states
+        Shape (n_states, n_sets).
+    n_samples
+        Samples of the record.
+    substeps
+        Runge-Kutta steps per interval of the input, see `choose_substeps`.
+
+    Returns
+    -------
+    Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
+    """
+    module = kernels(structure)
+    n_sets = p.shape[1]
+    n_states = module.N_STATES
+    out = np.empty((n_samples, len(structure.outputs), n_sets))
+    block_out = np.empty((n_samples, len(structure.outputs), LANES))
+    for start in range(0, n_sets, LANES):
+        stop = min(start + LANES, n_sets)
+        lanes = np.minimum(np.arange(start, start + LANES), n_sets - 1)
+        state = np.zeros((n_states, LANES))
+        state[: initial_states.shape[0]] = initial_states[:, lanes]
+        module.simulate_lanes(
+            held.coefficients,
+            held.interval,
+            held.per_sample,
+            substeps,
+            0.0,
+            np.ascontiguousarray(p[:, lanes]),
+            state,
+            block_out,
+        )
+        out[:, :, start:stop] = block_out[:, :, : stop - start]
+    return out
+
+
+def choose_substeps(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_state: NDArray[np.float64],
+    n_samples: int,
+    accuracy: float,
+) -> int:
+    """Return the smallest number of substeps whose error against the accurate integrator is below `accuracy`.
+
+    Raises
+    ------
+    SimulationError
+        If no number of substeps reaches it, or the accurate integrator itself fails.
+    """
+    exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5))
+    size = np.std(exact, axis=0) + 1e-300
+    state = np.asarray(initial_state, dtype=np.float64)[:, None]
+    for substeps in _SUBSTEPS:
+        fast = simulate_sets(structure, held, p[:, None], state, n_samples, substeps)[:, :, 0]
+        error = np.sqrt(np.mean((fast - exact) ** 2, axis=0)) / size
+        if np.all(error <= accuracy):
+            return substeps
+    raise SimulationError(
+        f"{_SUBSTEPS[-1]} substeps per sample do not reach a relative accuracy of {accuracy:g}; "
+        f"the model is too stiff for its sample time."
+    )
+
+
+def _state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    vector = np.zeros(max(1, len(structure.states)))
+    vector[: len(structure.states)] = np.asarray(state, dtype=np.float64)[: len(structure.states)]
+    return vector

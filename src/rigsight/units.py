@@ -1,0 +1,65 @@
+"""Units and characteristic scales of products of powers, written once as ``"force x^-3"``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+DIMENSIONLESS = "1"
+
+
+def parse_dimension(dimension: str) -> dict[str, int]:
+    """Return base quantity -> exponent of a text like ``"force time^2 x^-1"``.
+
+    ``""`` is dimensionless.
+    """
+    exponents: dict[str, int] = {}
+    for factor in dimension.split():
+        base, _, exponent = factor.partition("^")
+        exponents[base] = exponents.get(base, 0) + int(exponent or 1)
+    return exponents
+
+
+def unit_text(dimension: str, units: Mapping[str, str]) -> str:
+    """Return the unit of a dimension, e.g. ``"N m/rad^3"`` for ``"force x^-3"``.
+
+    Parameters
+    ----------
+    dimension
+        Product of powers of base quantities, see `parse_dimension`.
+    units
+        Unit of each base quantity, e.g. ``{"force": "N m", "x": "rad"}``.
+
+    Raises
+    ------
+    KeyError
+        If a base quantity has no unit.
+    """
+    above: list[str] = []
+    below: list[str] = []
+    for base, exponent in parse_dimension(dimension).items():
+        unit = units[base]
+        if unit == DIMENSIONLESS or exponent == 0:
+            continue
+        power = abs(exponent)
+        grouped = f"({unit})" if power > 1 and " " in unit else unit
+        (above if exponent > 0 else below).append(grouped if power == 1 else f"{grouped}^{power}")
+    if not below:
+        return " ".join(above) or DIMENSIONLESS
+    denominator = below[0] if len(below) == 1 and " " not in below[0] else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{denominator}"
+
+
+def characteristic_value(dimension: str, scales: Mapping[str, float]) -> float:
+    """Return the size that a quantity of this dimension naturally has in a record.
+
+    Parameters
+    ----------
+    dimension
+        Product of powers of base quantities, see `parse_dimension`.
+    scales
+        Size of each base quantity in the record (peak displacement, peak drive force, ...).
+    """
+    value = 1.0
+    for base, exponent in parse_dimension(dimension).items():
+        value *= float(scales[base]) ** exponent
+    return value

@@ -1,0 +1,1 @@
+"""What each command does, from a campaign to results on disk; callable from a notebook."""

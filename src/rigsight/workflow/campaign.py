@@ -1,0 +1,220 @@
+"""What is a campaign: one rig, its known numbers, the simulation in question, and the records about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rigsight.errors import InputError, nearest
+from rigsight.parameters import Parameter
+from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records.read_record import TIME
+from rigsight.rigs import RIGS, Rig
+from rigsight.workflow.campaign_file import CampaignTable, RecordTable, locate, read_campaign_table
+
+NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
+# What an alternative parameter determines, and so must not be given beside.
+DETERMINES = {"delta_0": "c_y"}
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """A campaign, read and checked.
+
+    Attributes
+    ----------
+    title
+        What a report calls it.
+    path, folder
+        The toml file and the folder that holds it.
+    rig
+        The declared rig.
+    constants
+        All constants of the rig, defaults filled in [SI].
+    parameters
+        The parameters that were given, as they were given [SI]; what is missing is to be identified.
+    records
+        In the order of the file, with distinct names.
+    notes
+        What was noticed about the campaign as a whole.
+    """
+
+    title: str
+    path: Path
+    folder: Path
+    rig: Rig
+    constants: dict[str, float]
+    parameters: dict[str, float]
+    records: tuple[Record, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def estimation(self) -> tuple[Record, ...]:
+        """Records that may be fitted."""
+        return tuple(record for record in self.records if record.role == "estimation")
+
+    @property
+    def validation(self) -> tuple[Record, ...]:
+        """Records that are only ever scored."""
+        return tuple(record for record in self.records if record.role == "validation")
+
+
+def read_campaign(campaign: str | Path) -> Campaign:
+    """Read a campaign and all its records.
+
+    Parameters
+    ----------
+    campaign
+        The toml file or its folder.
+
+    Raises
+    ------
+    InputError
+        Naming file and key, or file, line and column, of what cannot be used, and the mend.
+    """
+    path = locate(Path(campaign))
+    table = read_campaign_table(path)
+    if table.rig.model not in RIGS:
+        raise InputError(
+            f"{path.name}: rig.model: is '{table.rig.model}'.{nearest(table.rig.model, RIGS)} Allowed: {', '.join(RIGS)}."
+        )
+    rig = RIGS[table.rig.model]
+    constants = _constants(path, rig, table.rig.constants)
+    parameters = _parameters(path, rig, table.rig.parameters)
+    if all(record.role != "estimation" for record in table.records):
+        raise InputError(
+            f'{path.name}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
+        )
+    files = [_inside(path, number, record) for number, record in enumerate(table.records, 1)]
+    records = tuple(
+        _read(path, rig, number, record, file)
+        for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
+    )
+    notes = (
+        ()
+        if any(record.role == "validation" for record in records)
+        else (NO_VALIDATION.format(file=path.name),)
+    )
+    return Campaign(
+        title=table.title or path.parent.resolve().name,
+        path=path,
+        folder=path.parent,
+        rig=rig,
+        constants=constants,
+        parameters=parameters,
+        records=_with_distinct_names(table, records),
+        notes=notes,
+    )
+
+
+def _constants(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
+    checked = _checked(path, "rig.constants", rig, rig.constants, given)
+    for constant in rig.constants:
+        if constant.name in checked:
+            continue
+        if constant.default is None:
+            raise InputError(
+                f"{path.name}: rig.constants.{constant.name}: is missing; {rig.name} needs it "
+                f"({constant.description} [{constant.unit}])."
+            )
+        checked[constant.name] = constant.default
+    return {constant.name: checked[constant.name] for constant in rig.constants}
+
+
+def _parameters(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
+    checked = _checked(path, "rig.parameters", rig, (*rig.parameters, *rig.alternative_parameters), given)
+    for alternative, determined in DETERMINES.items():
+        if alternative in checked and determined in checked:
+            raise InputError(
+                f"{path.name}: rig.parameters.{alternative}: stands beside {determined}, which it determines; give one of the two."
+            )
+    return checked
+
+
+def _checked(
+    path: Path, key: str, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
+) -> dict[str, float]:
+    known = {parameter.name: parameter for parameter in allowed}
+    checked = {}
+    for name, value in given.items():
+        if name not in known:
+            listed = ", ".join(known) or "none"
+            raise InputError(
+                f"{path.name}: {key}.{name}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}."
+            )
+        try:
+            checked[name] = known[name].check(value)
+        except InputError as error:
+            raise InputError(f"{path.name}: {key}.{name}: {error}") from None
+    return checked
+
+
+def _inside(path: Path, number: int, record: RecordTable) -> Path:
+    """Return the record's file; a campaign that was sent to someone must not read what is none of its business."""
+    key = f"{path.name}: record {number}: file"
+    folder = path.parent.resolve()
+    asked = Path(record.file)
+    if "\x00" in record.file:
+        raise InputError(f"{key}: is no file name.")
+    if asked.is_absolute() or ".." in asked.parts or not (folder / asked).resolve().is_relative_to(folder):
+        raise InputError(
+            f"{key}: '{record.file}' leaves the campaign's folder; put the file beside {path.name}."
+        )
+    if not (folder / asked).is_file():
+        files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
+        raise InputError(
+            f"{key}: '{record.file}' does not exist in {path.parent}.{nearest(record.file, files)} Check the name."
+        )
+    return path.parent / asked
+
+
+def _read(path: Path, rig: Rig, number: int, record: RecordTable, file: Path) -> Record:
+    key = f"{path.name}: record {number} ({record.file})"
+    known = [TIME, *(signal.name for signal in (*rig.inputs, *rig.outputs))]
+    columns = {}
+    for signal, column in record.columns.items():
+        if signal not in known:
+            raise InputError(
+                f"{key}: columns.{signal}: no signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
+            )
+        try:
+            if isinstance(column, str | int):
+                columns[signal] = ColumnMapping(column)
+            else:
+                columns[signal] = ColumnMapping(column.name, column.scale, column.offset)
+        except InputError as error:
+            raise InputError(f"{key}: columns.{signal}: {error}") from None
+    try:
+        return read_record(
+            file,
+            rig.inputs,
+            rig.outputs,
+            columns=columns,
+            name=record.name,
+            role=record.role,
+            kind=record.kind,
+            amplitude=record.amplitude,
+            hold=record.hold,
+            separator=record.separator,
+            decimal=record.decimal,
+            header=record.header,
+            comment=record.comment,
+        )
+    except InputError as error:
+        raise InputError(f"{path.name}: record {number}: {error}") from None
+
+
+def _with_distinct_names(table: CampaignTable, records: tuple[Record, ...]) -> tuple[Record, ...]:
+    """Give every record a name of its own: results are keyed by it."""
+    taken = {record.name for record in table.records if record.name is not None}
+    named: list[Record] = []
+    used: set[str] = set()
+    for asked, record in zip(table.records, records, strict=True):
+        name, count = record.name, 1
+        while name in used or (asked.name is None and name in taken):
+            count += 1
+            name = f"{record.name}_{count}"
+        used.add(name)
+        named.append(replace(record, name=name))
+    return tuple(named)

@@ -1,0 +1,190 @@
+"""What may stand in a `campaign.toml`, and how is a user told what does not belong there?"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigsight.errors import InputError, nearest
+from rigsight.records import Hold, Kind, Role
+
+MOST_RECORDS = 1000
+LARGEST_FILE = 10_000_000
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class ColumnTable(_Table):
+    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset."""
+
+    name: str | int
+    scale: Number = 1.0
+    offset: Number = 0.0
+
+
+class RigTable(_Table):
+    """``[rig]``: which rig, its known constants, and the parameters of the simulation in question."""
+
+    model: str
+    constants: dict[str, Number] = {}
+    parameters: dict[str, Number] = {}
+
+
+class RecordTable(_Table):
+    """``[[records]]``: one measured file, what it is for, and how it is written."""
+
+    file: Annotated[str, Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1)] | None = None
+    role: Role = "estimation"
+    kind: Kind = "operation"
+    amplitude: Number | None = None
+    hold: Hold = "foh"
+    columns: dict[str, str | int | ColumnTable] = {}
+    separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None
+    header: bool | None = None
+    comment: Annotated[str, Field(min_length=1)] | None = None
+
+
+class CampaignTable(_Table):
+    """The whole file."""
+
+    title: str = ""
+    rig: RigTable
+    records: Annotated[list[RecordTable], Field(min_length=1, max_length=MOST_RECORDS)]
+
+
+def locate(campaign: Path) -> Path:
+    """Return the toml file for a toml file or its folder.
+
+    Raises
+    ------
+    InputError
+        If there is none; a folder's other toml files are listed.
+    """
+    if not campaign.exists():
+        raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that holds one.")
+    if not campaign.is_dir():
+        return campaign
+    path = campaign / "campaign.toml"
+    if path.is_file():
+        return path
+    others = ", ".join(sorted(other.name for other in campaign.glob("*.toml"))[:10])
+    mend = f"Name one of its files: {others}." if others else "Write one beside the records."
+    raise InputError(f"Folder {campaign} holds no campaign.toml. {mend}")
+
+
+def read_campaign_table(path: Path) -> CampaignTable:
+    """Return the checked contents of a campaign file.
+
+    Raises
+    ------
+    InputError
+        Naming the file with line and column for a syntax error, or with the key for anything else.
+    """
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no campaign.toml.")
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            f"{path.name} is not valid TOML: {error}. Texts stand in quotes, tables in [brackets]."
+        ) from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    try:
+        return CampaignTable.model_validate(data)
+    except ValidationError as error:
+        told = [_tell(path, data, dict(problem)) for problem in error.errors(include_url=False)]
+        told = list(dict.fromkeys(told))
+        more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
+        raise InputError("\n".join(told[:5]) + more) from None
+
+
+def key_text(location: tuple[str | int, ...], data: dict[str, Any]) -> str:
+    """Return a location as a user reads it: ``rig.constants.v``, ``record 2 (step.csv): role``."""
+    if len(location) >= 2 and location[0] == "records" and isinstance(location[1], int):
+        table = data["records"][location[1]]
+        file = table.get("file") if isinstance(table, dict) else None
+        record = f"record {location[1] + 1}" + (f" ({file})" if isinstance(file, str) and file else "")
+        rest = ".".join(map(str, location[2:]))
+        return f"{record}: {rest}" if rest else record
+    return ".".join(map(str, location))
+
+
+def _tell(path: Path, data: dict[str, Any], problem: dict[str, Any]) -> str:
+    location = _without_union_members(problem["loc"], data)
+    key = key_text(location, data)
+    kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
+    if kind == "extra_forbidden":
+        allowed = _allowed_keys(location)
+        return f"{path.name}: {key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
+    if kind == "missing":
+        return f"{path.name}: {key}: is missing.{_how_to_write(location)}"
+    if kind == "literal_error":
+        allowed = context["expected"].replace(" or ", ", ")
+        hint = (
+            nearest(got, [option.strip("' ") for option in allowed.split(",")])
+            if isinstance(got, str)
+            else ""
+        )
+        return f"{path.name}: {key}: is {got!r}.{hint} Allowed: {allowed}."
+    if kind == "finite_number":
+        return f"{path.name}: {key}: must be a finite number, got {got}."
+    if kind == "float_type":
+        return f"{path.name}: {key}: must be a number, got {got!r}. Write numbers without quotes and units."
+    if location == ("records",) and kind in ("too_short", "too_long"):
+        count = len(got)
+        return f"{path.name}: records: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
+    if location[-1] == "decimal":
+        return f'{path.name}: {key}: must be "." or ",", got {got!r}.'
+    if location[-1] == "separator":
+        return f"{path.name}: {key}: must be one character, got {got!r}; a blank stands for any white space."
+    if "columns" in location[:-1]:
+        return (
+            f"{path.name}: {key}: got {got!r}. Write the column's name, its number counted from 1, "
+            'or { name = "...", scale = 1.0, offset = 0.0 }.'
+        )
+    return f"{path.name}: {key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {got!r}.{_how_to_write(location)}"
+
+
+def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:
+    """Drop the names of alternatives that pydantic puts into a location: no key of the file."""
+    kept: list[str | int] = []
+    here: Any = data
+    for i, part in enumerate(location):
+        if "columns" in kept and i >= kept.index("columns") + 2 and part in ("str", "int", "ColumnTable"):
+            continue
+        kept.append(part)
+        try:
+            here = here[part]
+        except (KeyError, IndexError, TypeError):
+            here = None
+    return tuple(kept)
+
+
+def _allowed_keys(location: tuple[str | int, ...]) -> list[str]:
+    table: type[BaseModel] = CampaignTable
+    if location[0] == "rig" and len(location) > 1:
+        table = RigTable
+    elif location[0] == "records" and len(location) > 1:
+        table = ColumnTable if "columns" in location else RecordTable
+    return list(table.model_fields)
+
+
+def _how_to_write(location: tuple[str | int, ...]) -> str:
+    return {
+        "rig": ' Write [rig] and model = "running_gear", "axis" or "element".',
+        "model": ' Write model = "running_gear", "axis" or "element".',
+        "records": ' Write [[records]] and file = "..." for every record.',
+        "file": ' Write file = "name.csv".',
+    }.get(str(location[-1]), "")

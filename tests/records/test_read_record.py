@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.records import ColumnMapping, read_record
+
+
+@dataclass(frozen=True)
+class Named:
+    name: str
+    unit: str
+
+
+INPUTS = (Named("u", "A"),)
+OUTPUTS = (Named("psi", "rad"), Named("y", "m"))
+WriteCsv = Callable[..., Path]
+
+
+def replaced(column: int, value: str) -> Callable[[list[str]], None]:
+    def change(lines: list[str]) -> None:
+        for i in range(1, len(lines)):
+            cells = lines[i].split(",")
+            cells[column] = value
+            lines[i] = ",".join(cells)
+
+    return change
+
+
+def test_a_file_becomes_a_record_in_si(write_csv: WriteCsv) -> None:
+    path = write_csv(header="ms,mA,psi,y")
+    columns = {"t": ColumnMapping("ms", scale=1e-3, offset=5.0), "u": ColumnMapping("mA", scale=1e-3, offset=0.25)}
+    record = read_record(path, INPUTS, OUTPUTS, columns=columns, role="validation", kind="sweep", amplitude=0.5)
+    assert record.name == "sweep"
+    assert (record.dt, record.t0, record.n_samples) == (pytest.approx(1e-5), 5.0, 200)
+    assert record["u"][0] == 0.25
+    assert dict(record.units) == {"t": "s", "u": "A", "psi": "rad", "y": "m"}
+    assert (record.role, record.kind, record.amplitude, record.source) == ("validation", "sweep", 0.5, path)
+
+
+def test_second_output_may_be_missing_but_not_the_first(write_csv: WriteCsv) -> None:
+    assert "y" not in read_record(write_csv(header="t,u,psi,other"), INPUTS, OUTPUTS)
+    with pytest.raises(InputError, match="no column 'psi'"):
+        read_record(write_csv(header="t,u,angle,y"), INPUTS, OUTPUTS)
+
+
+def test_a_second_output_that_was_mapped_must_be_there(write_csv: WriteCsv) -> None:
+    with pytest.raises(InputError, match="no column 'lateral' for signal 'y'"):
+        read_record(write_csv(), INPUTS, OUTPUTS, columns={"y": ColumnMapping("lateral")})
+
+
+def test_time_and_input_suffice_to_simulate(write_csv: WriteCsv) -> None:
+    rows = np.column_stack([0.01 * np.arange(60), np.ones(60)])
+    record = read_record(write_csv(rows=rows, header="t,u"), INPUTS, OUTPUTS, require_outputs=False)
+    assert list(record.signals) == ["u"]
+
+
+def test_still_second_output_is_left_out_and_said(write_csv: WriteCsv) -> None:
+    record = read_record(write_csv(change=replaced(3, "0.5")), INPUTS, OUTPUTS)
+    assert "y" not in record
+    assert "y never changes" in record.notes[0]
+
+
+@pytest.mark.parametrize(("column", "told"), [(1, "input u is constant"), (2, "output psi never changes")])
+def test_still_signals_cannot_be_fitted(write_csv: WriteCsv, column: int, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        read_record(write_csv(change=replaced(column, "0.5")), INPUTS, OUTPUTS)
+
+
+def test_free_decay_may_be_scored(write_csv: WriteCsv) -> None:
+    record = read_record(write_csv(change=replaced(1, "0")), INPUTS, OUTPUTS, role="validation")
+    assert not record["u"].any()
+
+
+def test_clipped_output_is_a_warning(write_csv: WriteCsv) -> None:
+    t = 0.01 * np.arange(500)
+    rows = np.column_stack([t, np.sin(5 * t), np.clip(np.sin(5 * t), -0.7, 0.7), np.cos(t)])
+    record = read_record(write_csv(rows=rows), INPUTS, OUTPUTS)
+    assert [note.split(":")[0] for note in record.notes] == ["Warning", "Warning"]
+    assert "'psi'" in record.notes[0]
+
+
+def test_time_that_runs_backwards_by_its_scale_is_refused(write_csv: WriteCsv) -> None:
+    with pytest.raises(InputError, match="scale of time must be positive"):
+        read_record(write_csv(), INPUTS, OUTPUTS, columns={"t": ColumnMapping("t", scale=-1.0)})

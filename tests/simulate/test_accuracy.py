@@ -1,0 +1,137 @@
+"""Both integrators against an independent truth: DOP853 restarted at every sample, equations written by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rigsight.errors import SimulationError
+from rigsight.simulate import (
+    choose_substeps, parameter_vector, record_input, rest_state, simulate, simulate_outputs, simulate_sets,
+)  # fmt: skip
+
+SETS = ("R", "B", "P", "stiff")
+DT = 5e-3
+
+
+def hysteretic_truth(values, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Yaw angle for a linearly interpolated current."""
+    torque_per_ampere = values["b"] * values["k_tau"] / values["r_0"]
+    inertia, stiffness, damping = values["J_z"], values["k_c"], values["k_d"]
+    A, a, beta, gamma = (values[name] for name in ("A", "a", "beta", "gamma"))
+    yaw = np.zeros(samples.size)
+    state = np.zeros(3)
+    for i in range(samples.size - 1):
+        first, slope = samples[i], (samples[i + 1] - samples[i]) / DT
+
+        def rates(t, state, first=first, slope=slope):
+            psi, w, z = state
+            spring = stiffness * (a * psi + (1.0 - a) * z)
+            return (
+                w,
+                (torque_per_ampere * (first + slope * t) - damping * w - spring) / inertia,
+                A * w - beta * abs(w) * z - gamma * w * abs(z),
+            )
+
+        state = solve_ivp(rates, (0.0, DT), state, method="DOP853", rtol=1e-10, atol=1e-14).y[:, -1]
+        yaw[i + 1] = state[0]
+    return yaw
+
+
+@pytest.fixture(scope="module")
+def truths(hysteresis_sets, sweep):
+    return {name: hysteretic_truth(hysteresis_sets[name], sweep) for name in SETS}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_default_accuracy_is_met_on_the_published_hysteresis(
+    name, hysteretic, hysteresis_sets, sweep, truths, make_record, error_of
+):
+    simulated = simulate(hysteretic, hysteresis_sets[name], make_record(sweep))
+    assert error_of(simulated["psi"], truths[name]) <= 1e-6
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-5, 1e-7])
+def test_accuracy_wish_is_met(accuracy, hysteretic, hysteresis_sets, sweep, truths, make_record, error_of):
+    for name in SETS:
+        simulated = simulate(hysteretic, hysteresis_sets[name], make_record(sweep), accuracy=accuracy)
+        assert error_of(simulated["psi"], truths[name]) <= accuracy
+
+
+def prepared(structure, values, record):
+    held = record_input(structure, record)
+    p = parameter_vector(structure, values)
+    return held, p, rest_state(structure, p, held)
+
+
+def test_lanes_converge_to_the_truth(hysteretic, hysteresis_sets, sweep, truths, make_record, error_of):
+    record = make_record(sweep)
+    prepared_sets = [prepared(hysteretic, hysteresis_sets[name], record) for name in SETS]
+    held = prepared_sets[0][0]
+    p = np.stack([p for _, p, _ in prepared_sets], axis=1)
+    states = np.stack([state for _, _, state in prepared_sets], axis=1)
+    errors = []
+    for substeps in (2, 8, 32):
+        out = simulate_sets(hysteretic, held, p, states, record.n_samples, substeps)
+        errors.append([error_of(out[:, 0, i], truths[name]) for i, name in enumerate(SETS)])
+    # Kinks are not events in the lanes, so second order is what is left of Runge-Kutta's fourth.
+    assert np.all(np.array(errors[0]) > 8.0 * np.array(errors[1]))
+    assert np.all(np.array(errors[1]) > 4.0 * np.array(errors[2]))
+    assert np.all(np.array(errors[2]) < 3e-6)
+
+
+def test_lanes_are_of_fourth_order_where_the_model_is_smooth(axis, axis_values, make_record):
+    time = 0.05 * np.arange(400)
+    held, p, state = prepared(axis, axis_values, make_record(np.sin(2.0 * time), dt=0.05))
+    exact = simulate_outputs(axis, held, p, state, time.size, accuracy=1e-10)
+    errors = [
+        np.max(np.abs(simulate_sets(axis, held, p[:, None], state[:, None], time.size, n)[:, :, 0] - exact))
+        for n in (2, 4, 8)
+    ]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(np.abs(orders - 4.0) < 0.3)
+
+
+def test_chosen_substeps_reach_the_wish(hysteretic, hysteresis_sets, sweep, truths, make_record, error_of):
+    record = make_record(sweep)
+    chosen = []
+    for name in SETS:
+        held, p, state = prepared(hysteretic, hysteresis_sets[name], record)
+        substeps = choose_substeps(hysteretic, held, p, state, record.n_samples, 1e-4)
+        out = simulate_sets(hysteretic, held, p[:, None], state[:, None], record.n_samples, substeps)
+        assert error_of(out[:, 0, 0], truths[name]) <= 1.3e-4
+        chosen.append(substeps)
+    assert max(chosen) <= 16
+
+
+def test_sets_do_not_depend_on_their_neighbors(hysteretic, hysteresis_sets, sweep, make_record):
+    record = make_record(sweep[:1500])
+    held, p, state = prepared(hysteretic, hysteresis_sets["R"], record)
+    factors = np.random.default_rng(3).uniform(0.8, 1.2, 37)
+    index = hysteretic.names.index("k_c")
+    many = np.repeat(p[:, None], factors.size, axis=1)
+    many[index] *= factors
+    states = np.repeat(state[:, None], factors.size, axis=1)
+    together = simulate_sets(hysteretic, held, many, states, record.n_samples, 4)
+    assert together.shape == (1500, 2, 37)
+    for i in (0, 15, 16, 36):
+        alone = simulate_sets(hysteretic, held, many[:, i : i + 1], states[:, :1], record.n_samples, 4)
+        np.testing.assert_array_equal(together[:, :, i], alone[:, :, 0])
+
+
+def test_unstable_model_is_an_error_not_nan(hysteretic, hysteresis_sets, sweep, make_record):
+    values = {**hysteresis_sets["R"], "beta": -1e7}
+    with pytest.raises(SimulationError, match="bouc_wen_hysteresis"):
+        simulate(hysteretic, values, make_record(sweep))
+
+
+def test_diverging_lane_leaves_its_neighbors_alone(hysteretic, hysteresis_sets, sweep, make_record):
+    record = make_record(sweep)
+    held, p, state = prepared(hysteretic, hysteresis_sets["R"], record)
+    both = np.stack([p, p], axis=1)
+    both[hysteretic.names.index("beta"), 1] = -1e7
+    out = simulate_sets(hysteretic, held, both, np.stack([state, state], axis=1), record.n_samples, 8)
+    assert np.all(np.isfinite(out[:, :, 0]))
+    assert not np.all(np.isfinite(out[:, :, 1]))
