@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+
+from rigsight.effects import effect_named
+from rigsight.excitation import linear_sweep
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
 
 SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
 
@@ -43,6 +51,87 @@ def write_csv(tmp_path: Path) -> Callable[..., Path]:
             change(lines)
         path = tmp_path / name
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    return write
+
+
+AXIS_NOISE = 2e-5
+AXIS_MODEL: dict[str, Any] = {
+    "schema_version": 1,
+    "rig": "axis",
+    "hold": "foh",
+    "constants": {"gain": 1.0},
+    "parameters": {"m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0},
+    "effects": ["cubic_stiffness"],
+    "effect_parameters": {"k_3": 5e6},
+    "units": {"k_3": "N/m^3"},
+}
+AXIS_CAMPAIGN = """\
+title = "stage"
+
+[rig]
+model = "axis"
+
+[rig.parameters]
+m = 2.0
+d = 5.0
+k = 800.0
+
+[[records]]
+file = "fit.csv"
+role = "estimation"
+kind = "sweep"
+amplitude = 4.0
+
+[[records]]
+file = "score.csv"
+role = "validation"
+kind = "sweep"
+amplitude = 3.0
+"""
+
+
+def axis_record(name: str, amplitude: float, seed: int) -> Record:
+    """A sweep of an axis with a cubic spring, with sensor noise, after a second of rest."""
+    t = 5e-3 * np.arange(2000)
+    u = np.concatenate([np.zeros(200), linear_sweep(t[200:], amplitude, 3.0, 60.0)])
+    record = Record(name=name, dt=5e-3, signals={"u": u}, units={"u": "N"})
+    values = {**AXIS_MODEL["constants"], **AXIS_MODEL["parameters"], **AXIS_MODEL["effect_parameters"]}
+    clean = simulate(compose(AXIS, [effect_named("cubic_stiffness")]), values, record)
+    noise = np.random.default_rng(seed).normal(scale=AXIS_NOISE, size=t.size)
+    return clean.with_signals(x=clean["x"] + noise)
+
+
+@pytest.fixture(scope="session")
+def axis_rows() -> dict[str, np.ndarray]:
+    """Time, input and displacement of the records of the axis campaign, by file name."""
+    records = {"fit.csv": axis_record("fit", 4.0, 1), "score.csv": axis_record("score", 3.0, 2)}
+    return {name: np.column_stack([r.t, r["u"], r["x"]]) for name, r in records.items()}
+
+
+@pytest.fixture
+def axis_campaign(tmp_path: Path, axis_rows: dict[str, np.ndarray]) -> Path:
+    """The folder of a campaign that a diagnosis solves in seconds: the given axis lacks a cubic spring."""
+    folder = tmp_path / "stage"
+    folder.mkdir()
+    (folder / "campaign.toml").write_text(AXIS_CAMPAIGN, encoding="utf-8")
+    for name, rows in axis_rows.items():
+        lines = ["t,u,x", *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+        (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def write_model(tmp_path: Path) -> Callable[..., Path]:
+    """Write the model of the axis with changes and return its file."""
+
+    def write(change: Callable[[dict[str, Any]], object] | None = None, text: str | None = None) -> Path:
+        content = json.loads(json.dumps(AXIS_MODEL))
+        if change is not None:
+            change(content)
+        path = tmp_path / "model.json"
+        path.write_text(json.dumps(content, indent=2) if text is None else text, encoding="utf-8")
         return path
 
     return write

@@ -74,9 +74,7 @@ class ParameterSet:
     values: tuple[float, ...]
 
     @classmethod
-    def from_mapping(
-        cls, parameters: Iterable[Parameter], values: Mapping[str, float]
-    ) -> ParameterSet:
+    def from_mapping(cls, parameters: Iterable[Parameter], values: Mapping[str, float]) -> ParameterSet:
         """Order `values` as `parameters` are.
 
         Raises
@@ -90,9 +88,7 @@ class ParameterSet:
         unknown = [name for name in values if name not in names]
         if unknown:
             hint = nearest(unknown[0], names)
-            raise InputError(
-                f"Unknown parameters: {', '.join(unknown)}.{hint} Known: {', '.join(names)}."
-            )
+            raise InputError(f"Unknown parameters: {', '.join(unknown)}.{hint} Known: {', '.join(names)}.")
         if missing:
             raise InputError(f"Missing parameters: {', '.join(missing)}.")
         return cls(parameters, tuple(p.check(values[p.name]) for p in parameters))

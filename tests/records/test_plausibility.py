@@ -23,7 +23,9 @@ def test_cut_peaks_are_found_after_a_converter() -> None:
 
 
 def test_cut_peaks_are_found_in_a_noisy_multisine() -> None:
-    multisine = sum(np.cos(2 * np.pi * f * T + p) for f, p in zip(range(1, 9), RNG.uniform(0, 6, 8), strict=True))
+    multisine = sum(
+        np.cos(2 * np.pi * f * T + p) for f, p in zip(range(1, 9), RNG.uniform(0, 6, 8), strict=True)
+    )
     limit = 0.7 * np.abs(multisine).max()
     assert clipping(multisine + 0.001 * RNG.normal(size=T.size)) == ()
     assert clipping(np.minimum(multisine, limit))[0][0] == limit
@@ -42,7 +44,17 @@ def test_cut_peaks_are_found_in_a_noisy_multisine() -> None:
         RNG.normal(size=4000),
         np.ones(100),
     ],
-    ids=["sweep", "step", "square", "held levels", "rest before", "step response", "coarse", "noise", "constant"],
+    ids=[
+        "sweep",
+        "step",
+        "square",
+        "held levels",
+        "rest before",
+        "step response",
+        "coarse",
+        "noise",
+        "constant",
+    ],
 )
 def test_signals_that_stand_still_for_other_reasons_are_not_called_clipped(samples: np.ndarray) -> None:
     assert clipping(samples) == ()

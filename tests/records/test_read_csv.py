@@ -19,17 +19,23 @@ def text(separator: str = ",", decimal: str = ".", header: str = "t{0}u{0}x\n", 
     return (header.format(separator) + "\n".join(rows) + "\n").replace("\n", end)
 
 
-def read(tmp_path: Path, content: str | bytes, columns: dict[str, ColumnMapping] = BY_NAME, **options: object) -> np.ndarray:
+def read(
+    tmp_path: Path, content: str | bytes, columns: dict[str, ColumnMapping] = BY_NAME, **options: object
+) -> np.ndarray:
     path = tmp_path / "log.csv"
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     return np.column_stack(list(read_csv(path, columns, **options).values.values()))
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", "|", " ", "  ", ", ", " ; "])
-@pytest.mark.parametrize("decimal", [".", ","])
+SEPARATORS = [",", ";", "\t", "|", " ", "  ", ", ", " ; "]
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"),
+    [(separator, ".") for separator in SEPARATORS]
+    + [(separator, ",") for separator in SEPARATORS if "," not in separator],
+)
 def test_separator_and_decimal_sign_are_found_out(tmp_path: Path, separator: str, decimal: str) -> None:
-    if separator.strip() == decimal:
-        pytest.skip("a comma cannot be both")
     np.testing.assert_allclose(read(tmp_path, text(separator, decimal)), ROWS)
 
 
@@ -87,7 +93,9 @@ def test_rows_know_their_line_in_the_file(tmp_path: Path) -> None:
 
 
 def test_scale_and_offset_give_si() -> None:
-    np.testing.assert_allclose(ColumnMapping("u", scale=2.0, offset=-1.0).to_si(np.array([0.0, 3.0])), [-1.0, 5.0])
+    np.testing.assert_allclose(
+        ColumnMapping("u", scale=2.0, offset=-1.0).to_si(np.array([0.0, 3.0])), [-1.0, 5.0]
+    )
 
 
 def test_long_files_keep_every_row(tmp_path: Path) -> None:
@@ -98,7 +106,12 @@ def test_long_files_keep_every_row(tmp_path: Path) -> None:
 
 
 BROKEN: list[tuple[str, str | bytes, dict[str, object], list[str]]] = [
-    ("text in a cell", text().replace("-7.000000", "seven"), {}, ["line 4", "column 'u'", "'seven' is not a number"]),
+    (
+        "text in a cell",
+        text().replace("-7.000000", "seven"),
+        {},
+        ["line 4", "column 'u'", "'seven' is not a number"],
+    ),
     ("empty cell", text().replace("-7.000000", ""), {}, ["line 4", "column 'u'", "empty"]),
     ("NaN", text().replace("4.125000", "NaN"), {}, ["line 4", "column 'x'", "nan is not a finite number"]),
     ("Inf", text().replace("4.125000", "-inf"), {}, ["line 4", "column 'x'", "-inf"]),
@@ -119,7 +132,9 @@ BROKEN: list[tuple[str, str | bytes, dict[str, object], list[str]]] = [
 ]
 
 
-@pytest.mark.parametrize(("content", "options", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN])
+@pytest.mark.parametrize(
+    ("content", "options", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
+)
 def test_broken_files_are_told_with_place_and_mend(
     tmp_path: Path, content: str | bytes, options: dict[str, object], told: list[str]
 ) -> None:
@@ -141,7 +156,9 @@ def test_missing_file_and_folder_are_told(tmp_path: Path) -> None:
         read_csv(tmp_path, BY_NAME)
 
 
-def test_too_large_a_file_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_large_a_file_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("rigsight.records.read_csv.LARGEST_FILE", 10)
     with pytest.raises(InputError, match="more than the 1e-08 GB"):
         read(tmp_path, text())

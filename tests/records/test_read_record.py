@@ -34,8 +34,13 @@ def replaced(column: int, value: str) -> Callable[[list[str]], None]:
 
 def test_a_file_becomes_a_record_in_si(write_csv: WriteCsv) -> None:
     path = write_csv(header="ms,mA,psi,y")
-    columns = {"t": ColumnMapping("ms", scale=1e-3, offset=5.0), "u": ColumnMapping("mA", scale=1e-3, offset=0.25)}
-    record = read_record(path, INPUTS, OUTPUTS, columns=columns, role="validation", kind="sweep", amplitude=0.5)
+    columns = {
+        "t": ColumnMapping("ms", scale=1e-3, offset=5.0),
+        "u": ColumnMapping("mA", scale=1e-3, offset=0.25),
+    }
+    record = read_record(
+        path, INPUTS, OUTPUTS, columns=columns, role="validation", kind="sweep", amplitude=0.5
+    )
     assert record.name == "sweep"
     assert (record.dt, record.t0, record.n_samples) == (pytest.approx(1e-5), 5.0, 200)
     assert record["u"][0] == 0.25

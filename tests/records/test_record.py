@@ -10,7 +10,12 @@ from rigsight.records import Record
 
 
 def ramp(**changes: object) -> Record:
-    arguments = {"name": "ramp", "dt": 0.5, "signals": {"u": np.arange(5.0), "x": np.arange(5.0) ** 2}, "units": {"u": "A"}}
+    arguments = {
+        "name": "ramp",
+        "dt": 0.5,
+        "signals": {"u": np.arange(5.0), "x": np.arange(5.0) ** 2},
+        "units": {"u": "A"},
+    }
     return Record(**{**arguments, **changes})
 
 
@@ -52,7 +57,7 @@ def test_with_signals_returns_a_new_record() -> None:
 
 def test_unknown_signal_names_the_nearest() -> None:
     record = ramp(signals={"force": np.ones(3)})
-    with pytest.raises(InputError, match="no signal 'fource'. Did you mean 'force'"):
+    with pytest.raises(InputError, match=r"no signal 'fource'\. Did you mean 'force'"):
         record["fource"]
 
 

@@ -26,7 +26,14 @@ HYSTERESIS_SETS: Mapping[str, Mapping[str, float]] = {
         "A": 1.0, "a": 0.09, "beta": 2660.0, "gamma": -960.0,
     },
 }  # fmt: skip
-AXIS_VALUES: Mapping[str, float] = {"gain": 1.0, "m": 1.0, "d": 0.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+AXIS_VALUES: Mapping[str, float] = {
+    "gain": 1.0,
+    "m": 1.0,
+    "d": 0.6,
+    "k": 100.0,
+    "x_off": 0.0,
+    "force_off": 0.0,
+}
 
 MakeRecord = Callable[..., Record]
 

@@ -9,7 +9,13 @@ from scipy.integrate import solve_ivp
 
 from rigsight.errors import SimulationError
 from rigsight.simulate import (
-    choose_substeps, parameter_vector, record_input, rest_state, simulate, simulate_outputs, simulate_sets,
+    choose_substeps,
+    parameter_vector,
+    record_input,
+    rest_state,
+    simulate,
+    simulate_outputs,
+    simulate_sets,
 )  # fmt: skip
 
 SETS = ("R", "B", "P", "stiff")

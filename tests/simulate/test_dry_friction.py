@@ -26,7 +26,9 @@ def free_decay(time, start, frequency, center):
     raise AssertionError
 
 
-def test_free_oscillation_loses_a_fixed_amplitude_per_period(axis_with_friction, axis_values, make_record, error_of):
+def test_free_oscillation_loses_a_fixed_amplitude_per_period(
+    axis_with_friction, axis_values, make_record, error_of
+):
     values = {**axis_values, "d": 0.0, "T_c": 0.7}
     record = make_record(np.zeros(2000), dt=DT)
     simulated = simulate(axis_with_friction, values, record, initial_state=np.array([0.1, 0.0]))["x"]
@@ -69,7 +71,9 @@ def stick_slip_truth(values, samples, dt):
                 return state[1]
 
             stopped.terminal, stopped.direction = True, -sign
-            solution = solve_ivp(rates, (t, dt), (x, v), method="DOP853", rtol=1e-11, atol=1e-15, events=stopped)
+            solution = solve_ivp(
+                rates, (t, dt), (x, v), method="DOP853", rtol=1e-11, atol=1e-15, events=stopped
+            )
             t, (x, v) = solution.t[-1], solution.y[:, -1]
             if solution.t_events[0].size:
                 v = 0.0
@@ -121,5 +125,8 @@ def test_step_of_a_held_input_breaks_loose(axis_with_friction, axis_values, make
     # Until its first reversal a mass under dry friction is a linear oscillator with a smaller force.
     time = DT * np.arange(1, 20)
     frequency, decay = np.sqrt(100.0 - 0.3**2), 0.3
-    exact = 0.02 * (1.0 - np.exp(-decay * time) * (np.cos(frequency * time) + decay / frequency * np.sin(frequency * time)))
+    exact = 0.02 * (
+        1.0
+        - np.exp(-decay * time) * (np.cos(frequency * time) + decay / frequency * np.sin(frequency * time))
+    )
     np.testing.assert_allclose(simulated[101:120], exact, rtol=1e-5)

@@ -23,7 +23,12 @@ def test_hold_is_the_exact_discrete_system(hold, axis, axis_values, make_record,
     samples = random_steps(2000)
     samples[0] = 0.0
     m, d, k = axis_values["m"], axis_values["d"], axis_values["k"]
-    continuous = (np.array([[0.0, 1.0], [-k / m, -d / m]]), np.array([[0.0], [1.0 / m]]), np.eye(1, 2), np.zeros((1, 1)))
+    continuous = (
+        np.array([[0.0, 1.0], [-k / m, -d / m]]),
+        np.array([[0.0], [1.0 / m]]),
+        np.eye(1, 2),
+        np.zeros((1, 1)),
+    )
     _, exact, _ = dlsim(cont2discrete(continuous, DT, method=hold), samples[:, None])
     simulated = simulate(axis, axis_values, make_record(samples, dt=DT, hold=hold), accuracy=1e-8)["x"]
     assert error_of(simulated, exact[:, 0]) <= 1e-8
@@ -56,12 +61,16 @@ def test_band_limited_input_is_the_analog_signal(axis, axis_values, make_record,
 
 @pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])
 @pytest.mark.parametrize("periods", [0, 1, 7])
-def test_delay_by_whole_samples_shifts_the_response(hold, periods, axis, axis_with_delay, axis_values, make_record):
+def test_delay_by_whole_samples_shifts_the_response(
+    hold, periods, axis, axis_with_delay, axis_values, make_record
+):
     samples = random_steps(600)
     record = make_record(samples, dt=DT, hold=hold)
     plain = simulate(axis, axis_values, record, accuracy=1e-9)["x"]
     late = simulate(axis_with_delay, {**axis_values, "T_d": periods * DT}, record, accuracy=1e-9)["x"]
-    np.testing.assert_allclose(late[periods:], plain[: plain.size - periods], atol=1e-9 * np.max(np.abs(plain)))
+    np.testing.assert_allclose(
+        late[periods:], plain[: plain.size - periods], atol=1e-9 * np.max(np.abs(plain))
+    )
     np.testing.assert_allclose(late[:periods], plain[0], rtol=1e-9)
 
 
@@ -69,7 +78,11 @@ def test_delay_by_whole_samples_shifts_the_response(hold, periods, axis, axis_wi
 def test_delay_by_a_fraction_of_a_sample(hold, axis, axis_with_delay, axis_values, make_record):
     """A four times finer record of the same input, shifted by whole fine samples, is the reference."""
     samples = random_steps(600)
-    fine = np.repeat(samples, 4)[:-3] if hold == "zoh" else np.interp(np.arange(2397), 4 * np.arange(600), samples)
+    fine = (
+        np.repeat(samples, 4)[:-3]
+        if hold == "zoh"
+        else np.interp(np.arange(2397), 4 * np.arange(600), samples)
+    )
     shift = 13
     late_fine = np.concatenate([np.full(shift, samples[0]), fine[:-shift]])
     exact = simulate(axis, axis_values, make_record(late_fine, dt=DT / 4, hold=hold), accuracy=1e-9)["x"][::4]

@@ -26,7 +26,17 @@ ACTUATOR_LAG = Effect(
     place=Place.ACTUATOR,
     summary="The drive follows its command with a first-order lag.",
     parameters=(
-        Parameter("T_a", "time constant", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.3), search=(1e-3, 10.0), logarithmic=True),
+        Parameter(
+            "T_a",
+            "time constant",
+            "time",
+            lower=0.0,
+            upper=1e6,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(1e-3, 10.0),
+            logarithmic=True,
+        ),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

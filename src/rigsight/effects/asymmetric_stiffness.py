@@ -27,7 +27,16 @@ ASYMMETRIC_STIFFNESS = Effect(
     place=Place.DYNAMICS,
     summary="The spring is stiffer to one side than to the other.",
     parameters=(
-        Parameter("k_2", "quadratic stiffness", "force x^-2", lower=-1e24, upper=1e24, null=0.0, starts=(0.2, -0.2), search=(-1.0, 1.0)),
+        Parameter(
+            "k_2",
+            "quadratic stiffness",
+            "force x^-2",
+            lower=-1e24,
+            upper=1e24,
+            null=0.0,
+            starts=(0.2, -0.2),
+            search=(-1.0, 1.0),
+        ),
     ),
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.RISES, even_harmonics=True),

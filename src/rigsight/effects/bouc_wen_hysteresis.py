@@ -63,7 +63,7 @@ BOUC_WEN_HYSTERESIS = Effect(
     parameters=(
         Parameter("A", "scale of z, redundant", "", lower=1e-6, upper=1e6, default=1.0, fitted=False),
         Parameter("a", "share of the stiffness without memory", "", lower=0.0, upper=1.0, null=1.0, starts=(0.3, 0.7), search=(0.0, 1.0)),
-        Parameter("beta", "loop shape, even part", "x^-1", lower=-1e12, upper=1e12, starts=(3.0, 10.0), search=(-1.0, 1e3)),
+        Parameter("beta", "loop shape, even part", "x^-1", lower=-1e12, upper=1e12, starts=(3.0, 10.0), search=(0.0, 1e3)),
         Parameter("gamma", "loop shape, odd part", "x^-1", lower=-1e12, upper=1e12, starts=(0.0, -5.0), search=(-1e3, 1e3)),
         Parameter("n", "sharpness of the transition", "", lower=1.0, upper=20.0, default=1.0, starts=(1.0,), search=(1.0, 20.0)),
     ),
@@ -79,7 +79,7 @@ BOUC_WEN_HYSTERESIS = Effect(
             "x",
         ),
     ),
-    searched_as=(SumAndDifference("beta", "gamma"),),
+    searched_as=(SumAndDifference("beta", "gamma", sum_range=(-1.0, 1e3), difference_range=(0.0, 2e3)),),
     starts=(
         _from_secant(0.5, 2.0, 2.0),
         _from_secant(0.3, 0.5, 20.0),

@@ -28,7 +28,16 @@ COULOMB_FRICTION = Effect(
     place=Place.DYNAMICS,
     summary="Dry friction of constant size opposes the motion and holds the mass when the torque is small.",
     parameters=(
-        Parameter("T_c", "Coulomb friction", "drive", lower=0.0, upper=1e12, null=0.0, starts=(0.05, 0.3), search=(0.0, 2.0)),
+        Parameter(
+            "T_c",
+            "Coulomb friction",
+            "drive",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(0.0, 2.0),
+        ),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

@@ -27,7 +27,16 @@ CUBIC_STIFFNESS = Effect(
     place=Place.DYNAMICS,
     summary="The spring hardens (or softens) with the cube of the deflection.",
     parameters=(
-        Parameter("k_3", "cubic stiffness", "force x^-3", lower=-1e18, upper=1e30, null=0.0, starts=(0.3, -0.1), search=(-0.5, 1e3)),
+        Parameter(
+            "k_3",
+            "cubic stiffness",
+            "force x^-3",
+            lower=-1e18,
+            upper=1e30,
+            null=0.0,
+            starts=(0.3, -0.1),
+            search=(-0.5, 1e3),
+        ),
     ),
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

@@ -73,10 +73,20 @@ class State:
 
 @dataclass(frozen=True)
 class SumAndDifference:
-    """Two parameters that a search moves as their sum and difference, because records determine those apart."""
+    """Two parameters that a search moves as their sum and difference, because records determine those apart.
+
+    Attributes
+    ----------
+    first, second
+        Names of the parameters.
+    sum_range, difference_range
+        Ranges that a search explores, in characteristic units.
+    """
 
     first: str
     second: str
+    sum_range: tuple[float, float]
+    difference_range: tuple[float, float]
 
 
 @dataclass(frozen=True)

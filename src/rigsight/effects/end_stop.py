@@ -29,7 +29,16 @@ END_STOP = Effect(
     place=Place.DYNAMICS,
     summary="Beyond a clearance the mass meets a second, stiffer spring.",
     parameters=(
-        Parameter("k_s", "stiffness of the stop", "force x^-1", lower=0.0, upper=1e18, null=0.0, starts=(1.0, 5.0), search=(0.0, 300.0)),
+        Parameter(
+            "k_s",
+            "stiffness of the stop",
+            "force x^-1",
+            lower=0.0,
+            upper=1e18,
+            null=0.0,
+            starts=(1.0, 5.0),
+            search=(0.0, 300.0),
+        ),
         Parameter("s", "clearance", "x", lower=0.0, upper=1e9, starts=(0.7, 0.3), search=(0.0, 1.0)),
     ),
     energy=Energy.CONSERVATIVE,

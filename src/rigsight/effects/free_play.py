@@ -26,7 +26,16 @@ FREE_PLAY = Effect(
     place=Place.DYNAMICS,
     summary="The spring is loose around its rest position.",
     parameters=(
-        Parameter("g", "half-width of the play", "x", lower=0.0, upper=1e9, null=0.0, starts=(0.05, 0.3), search=(0.0, 1.0)),
+        Parameter(
+            "g",
+            "half-width of the play",
+            "x",
+            lower=0.0,
+            upper=1e9,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(0.0, 1.0),
+        ),
     ),
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

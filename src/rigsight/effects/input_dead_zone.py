@@ -26,7 +26,16 @@ INPUT_DEAD_ZONE = Effect(
     place=Place.ACTUATOR,
     summary="Small drive inputs have no effect.",
     parameters=(
-        Parameter("u_0", "half-width of the dead zone", "input", lower=0.0, upper=1e300, null=0.0, starts=(0.05, 0.2), search=(0.0, 1.0)),
+        Parameter(
+            "u_0",
+            "half-width of the dead zone",
+            "input",
+            lower=0.0,
+            upper=1e300,
+            null=0.0,
+            starts=(0.05, 0.2),
+            search=(0.0, 1.0),
+        ),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.RISES),

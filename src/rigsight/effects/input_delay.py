@@ -26,7 +26,9 @@ INPUT_DELAY = Effect(
     place=Place.ACTUATOR,
     summary="The drive acts later than it was commanded.",
     parameters=(
-        Parameter("T_d", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)),
+        Parameter(
+            "T_d", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
+        ),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -26,7 +26,16 @@ INPUT_SATURATION = Effect(
     place=Place.ACTUATOR,
     summary="The drive cannot exceed a limit.",
     parameters=(
-        Parameter("u_max", "largest drive input", "input", lower=0.0, upper=1e300, null=1e300, starts=(0.8, 0.4), search=(0.02, 1.0)),
+        Parameter(
+            "u_max",
+            "largest drive input",
+            "input",
+            lower=0.0,
+            upper=1e300,
+            null=1e300,
+            starts=(0.8, 0.4),
+            search=(0.02, 1.0),
+        ),
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

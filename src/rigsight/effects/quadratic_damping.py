@@ -26,7 +26,16 @@ QUADRATIC_DAMPING = Effect(
     place=Place.DYNAMICS,
     summary="Damping that grows with the square of the speed (fluid drag).",
     parameters=(
-        Parameter("c_2", "drag coefficient", "force time^2 x^-2", lower=0.0, upper=1e15, null=0.0, starts=(0.1, 1.0), search=(0.0, 1e3)),
+        Parameter(
+            "c_2",
+            "drag coefficient",
+            "force time^2 x^-2",
+            lower=0.0,
+            upper=1e15,
+            null=0.0,
+            starts=(0.1, 1.0),
+            search=(0.0, 1e3),
+        ),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

@@ -21,7 +21,7 @@ References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083.
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
-from rigsight.effects.symbols import v, v_size
+from rigsight.effects.symbols import drive_size, v, v_size
 from rigsight.parameters import Parameter
 
 T_c, T_s, w_s = sp.symbols("T_c T_s w_s", real=True)
@@ -38,8 +38,11 @@ STRIBECK_FRICTION = Effect(
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),
     torque=(T_c + (T_s - T_c) * sp.exp(-((v / w_s) ** 2))) * sp.sign(v),
-    starts=tuple(
-        Start({"T_c": T_c, "T_s": excess * T_c, "w_s": share * v_size}, parent="coulomb_friction")
-        for excess, share in ((1.5, 0.1), (1.3, 0.02), (2.0, 0.3))
+    starts=(
+        Start({"T_c": 0.05 * drive_size, "T_s": 0.1 * drive_size, "w_s": 0.1 * v_size}),
+        *(
+            Start({"T_c": T_c, "T_s": excess * T_c, "w_s": share * v_size}, parent="coulomb_friction")
+            for excess, share in ((1.5, 0.1), (1.3, 0.02), (2.0, 0.3))
+        ),
     ),
 )

@@ -1,10 +1,12 @@
 """The symbols every effect's equation is written in, and the piecewise functions they share.
 
-All kinks are written through ``Abs`` and ``sign``: the simulation finds these atoms, freezes their sign between
+All kinks are written through ``Abs``, ``sign`` and `positive_part`: the simulation finds these atoms, freezes their sign between
 events and so keeps its full order across them.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import sympy as sp
 
@@ -29,13 +31,27 @@ spring_torque = sp.Symbol("spring_torque", real=True)
 
 x_size = sp.Symbol("x_size", positive=True)
 """Size of the displacement in the records; in start values only."""
+drive_size = sp.Symbol("drive_size", positive=True)
+"""Size of the drive's force in the records; in start values only."""
 v_size = sp.Symbol("v_size", positive=True)
 """Size of the velocity in the records; in start values only."""
 
 
-def positive_part(expression: sp.Expr) -> sp.Expr:
-    """Return max(expression, 0)."""
-    return (expression + sp.Abs(expression)) / 2
+class positive_part(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """max(expression, 0).
+
+    A function of its own, because (e + Abs(e))/2 cancels: below a threshold it leaves rounding noise instead of zero, and
+    above a huge one nothing of a small signal.
+    """
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
+        """Return the slope: 0 below, 1 above."""
+        return (1 + sp.sign(self.args[0])) / 2
+
+    def _latex(self, printer: Any) -> str:
+        return rf"\max\left(0,\ {printer.doprint(self.args[0])}\right)"
 
 
 def beyond(expression: sp.Expr, half_width: sp.Expr) -> sp.Expr:

@@ -57,11 +57,13 @@ class Coordinates:
         bounds = [_bounds(p, s) for p, s in zip(chosen, scale, strict=True)]
         lower = np.array([b[0] for b in bounds], dtype=np.float64)
         upper = np.array([b[1] for b in bounds], dtype=np.float64)
-        pairs = _pairs(structure, list(free))
-        for first, second in pairs:
-            width = upper[first] - lower[first]
-            lower[first], upper[first] = lower[first], width
-            lower[second], upper[second] = 0.0, 2.0 * width
+        pairs = []
+        for pair in (pair for effect in structure.effects for pair in effect.searched_as):
+            if pair.first in free and pair.second in free:
+                first, second = free.index(pair.first), free.index(pair.second)
+                lower[first], upper[first] = pair.sum_range
+                lower[second], upper[second] = pair.difference_range
+                pairs.append((first, second))
         return cls(
             structure=structure,
             free=tuple(free),
@@ -69,7 +71,7 @@ class Coordinates:
             index=np.array([structure.names.index(name) for name in free], dtype=np.intp),
             scale=scale,
             logarithmic=logarithmic,
-            pairs=pairs,
+            pairs=tuple(pairs),
             lower=lower,
             upper=upper,
         )
@@ -112,12 +114,3 @@ def _bounds(parameter: Parameter, scale: float) -> tuple[float, float]:
     if parameter.logarithmic:
         return float(np.log(max(low, 1e-12))), float(np.log(min(high, 1e12)))
     return low, high
-
-
-def _pairs(structure: Structure, free: list[str]) -> tuple[tuple[int, int], ...]:
-    return tuple(
-        (free.index(pair.first), free.index(pair.second))
-        for effect in structure.effects
-        for pair in effect.searched_as
-        if pair.first in free and pair.second in free
-    )

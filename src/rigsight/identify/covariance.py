@@ -54,9 +54,7 @@ def colored_covariance(
     return covariance[:n_common, :n_common]
 
 
-def _spectral_product(
-    residual: NDArray[np.float64], derivative: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _spectral_product(residual: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDArray[np.float64]:
     n = residual.size
     power = np.abs(np.fft.rfft(residual)) ** 2 / n
     width = max(5, int(np.sqrt(power.size)))

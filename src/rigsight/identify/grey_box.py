@@ -87,11 +87,9 @@ class GreyBoxFit:
         self._data = [self._prepared(record, names, output_noise) for record in records]
         self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self._data))
 
-    def _prepared(
-        self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
-    ) -> _Data:
+    def _prepared(self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]) -> _Data:
         missing = np.full(record.n_samples, np.nan)
-        measured = np.column_stack([record[n] if n in record else missing for n in names])
+        measured = np.column_stack([record.signals.get(n, missing) for n in names])
         weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
         first_state = _first_state(self.structure, record)
         return _Data(record, record_input(self.structure, record), measured, weights, first_state)
@@ -102,6 +100,7 @@ class GreyBoxFit:
         free: Sequence[str],
         initial_states: Sequence[NDArray[np.float64]] | None = None,
         max_evaluations: int = 60,
+        tolerance: float = 1e-7,
         finish: bool = True,
     ) -> FitResult:
         """Fit the free parameters and every record's initial state.
@@ -116,6 +115,8 @@ class GreyBoxFit:
             Start values per record, shape (n_states,) each; default from the first samples.
         max_evaluations
             Limit for the optimizer.
+        tolerance
+            Relative change of the cost at which the optimizer stops.
         finish
             Compute standard errors, and residuals with the accurate integrator. False for a first look.
 
@@ -125,14 +126,12 @@ class GreyBoxFit:
         optimizer ran out of evaluations.
         """
         coordinates = Coordinates.of(self.structure, free, start, self.scales)
-        n_free, n_states = len(free), len(self.structure.states)
+        n_states = len(self.structure.states)
         states = list(initial_states) if initial_states is not None else [d.first_state for d in self._data]
-        theta = np.concatenate(
-            [coordinates.from_values(start), *(s / self._state_scales for s in states)]
-        )
+        theta = np.concatenate([coordinates.from_values(start), *(s / self._state_scales for s in states)])
         lower = np.concatenate([coordinates.lower, *(s / self._state_scales - _STATE_RANGE for s in states)])
         upper = np.concatenate([coordinates.upper, *(s / self._state_scales + _STATE_RANGE for s in states)])
-        problem = _Problem(self, coordinates, n_states, lower, upper)
+        problem = _Problem(self, coordinates, n_states, upper)
         problem.choose_substeps(theta)
         if not np.isfinite(problem.at(theta).cost):
             return self._failed(coordinates, theta, "The start values cannot be simulated.")
@@ -145,9 +144,9 @@ class GreyBoxFit:
             bounds=(lower, upper),
             method="trf",
             x_scale="jac",
-            ftol=1e-7,
-            xtol=1e-8,
-            gtol=1e-10,
+            ftol=tolerance,
+            xtol=0.1 * tolerance,
+            gtol=1e-3 * tolerance,
             max_nfev=max_evaluations,
         )
         return self._result(problem, solution.x, bool(solution.status > 0), solution.message, finish)
@@ -190,10 +189,7 @@ class GreyBoxFit:
             except SimulationError as error:
                 return self._failed(coordinates, theta, str(error))
             cost = float(
-                sum(
-                    np.nansum((r * d.weights) ** 2)
-                    for r, d in zip(residuals, self._data, strict=True)
-                )
+                sum(np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self._data, strict=True))
             )
             covariance = colored_covariance(problem.sensitivities(theta), n_free)
             chain = coordinates.jacobian(theta[:n_free])
@@ -241,7 +237,6 @@ class _Problem:
         fit: GreyBoxFit,
         coordinates: Coordinates,
         n_states: int,
-        lower: NDArray[np.float64],
         upper: NDArray[np.float64],
     ) -> None:
         self.fit = fit
@@ -277,7 +272,7 @@ class _Problem:
             stand_in = np.zeros(theta.size + 1)
             stand_in[-1] = np.sqrt(_WORSE * self._best)
             return stand_in
-        root, projection = _compressed(evaluation)
+        _, projection = _compressed(evaluation)
         rest = max(evaluation.cost - float(projection @ projection), 0.0)
         return np.append(projection, np.sqrt(rest))
 

@@ -51,7 +51,7 @@ def linear_start(
     elif rig.name == "axis":
         found = _axis(records, constants, no_spring=known.get("k") == 0.0)
     else:
-        found = _element(rig, records)
+        found = _element(records)
     parameters = {p.name: p for p in rig.parameters}
     clipped = {
         name: float(np.clip(value, parameters[name].lower, parameters[name].upper))
@@ -84,9 +84,7 @@ def _running_gear(records: Sequence[Record], constants: Mapping[str, float]) -> 
     return found
 
 
-def _axis(
-    records: Sequence[Record], constants: Mapping[str, float], no_spring: bool
-) -> dict[str, float]:
+def _axis(records: Sequence[Record], constants: Mapping[str, float], no_spring: bool) -> dict[str, float]:
     gain = constants["gain"]
     inertia, damping, stiffness = second_order(records, "u", "x", gain, no_spring)
     x_mean = float(np.mean([np.mean(r["x"]) for r in records]))
@@ -95,7 +93,7 @@ def _axis(
     return {"m": inertia, "d": damping, "k": stiffness, "x_off": offset, "force_off": 0.0}
 
 
-def _element(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
+def _element(records: Sequence[Record]) -> dict[str, float]:
     rows, forces = [], []
     for record in records:
         x, v = smooth_motion(record["x"], record.dt)
@@ -138,7 +136,9 @@ def _equation_error(
     """Solve ``sum_i a_i (j omega)^order_i X = gain U + transient`` for the a_i."""
     blocks = [_spectra(record, source, response) for record in records]
     if not any(np.any(block[2] != 0.0) for block in blocks):
-        raise InputError(f"Signal '{response}' does not move in any estimation record; nothing can be identified.")
+        raise InputError(
+            f"Signal '{response}' does not move in any estimation record; nothing can be identified."
+        )
     top = max(float(np.max(omega)) for omega, _, _ in blocks)
     n_transient = _TRANSIENT_ORDER + 1
     n_columns = len(orders) + n_transient * len(blocks)

@@ -87,7 +87,5 @@ def _size(signals: Sequence[NDArray[np.float64]]) -> float:
 
 def _typical_omega(rig: Rig, records: Sequence[Record]) -> float:
     name = rig.outputs[0].name
-    ratios = [
-        _size([np.gradient(record[name], record.dt)]) / _size([record[name]]) for record in records
-    ]
+    ratios = [_size([np.gradient(record[name], record.dt)]) / _size([record[name]]) for record in records]
     return float(np.median(ratios))

@@ -20,6 +20,8 @@ COARSEST_STAMPS = 0.2
 # Of the printed resolution: a half, and a little for the fitted grid.
 LARGEST_ROUNDING = 0.6
 STAMPS_LOOKED_AT = 3000
+# Relative error that the least squares line leaves on a sample time.
+ARITHMETIC = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +132,7 @@ def _digits(number: float) -> tuple[int, int]:
 
 def _plain(dt: float, uncertainty: float) -> float:
     """Return `dt` with as few digits as stay within the uncertainty that rounding leaves on it."""
+    uncertainty = max(uncertainty, ARITHMETIC * dt)
     for n_digits in range(2, 16):
         rounded = float(f"{dt:.{n_digits}g}")
         if abs(rounded - dt) <= 0.5 * uncertainty:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,27 +72,26 @@ def sniff(lines: Sequence[str], separator: str | None, decimal: str | None) -> D
         What is already known, else None.
     """
     sample = lines[:LINES_LOOKED_AT]
-    best, best_score = Dialect(separator or ",", decimal or "."), -math.inf
-    for candidate in SEPARATORS if separator is None else (separator,):
-        for sign in (".", ",") if decimal is None else (decimal,):
-            if candidate == sign:
-                continue
-            dialect = Dialect(candidate, sign)
-            score = _share_of_numbers(dialect, sample, alone=separator is not None)
-            if score > best_score:
-                best, best_score = dialect, score
-    return best
+    candidates = [
+        Dialect(candidate, sign)
+        for candidate in (SEPARATORS if separator is None else (separator,))
+        for sign in ((".", ",") if decimal is None else (decimal,))
+        if candidate != sign
+    ]
+    return max(candidates, key=lambda dialect: _plausibility(dialect, sample, alone=separator is not None))
 
 
-def _share_of_numbers(dialect: Dialect, lines: Sequence[str], alone: bool) -> float:
-    """Return the share of cells that are numbers, in rows as wide as most rows; 0 if that is one cell."""
+def _plausibility(dialect: Dialect, lines: Sequence[str], alone: bool) -> tuple[bool, float, bool]:
+    """Return what makes a dialect plausible, most telling first; tuples compare in that order.
+
+    A header as wide as the rows, then the share of cells that are numbers, then that there are columns at all.
+    """
     rows = [dialect.cells(line) for line in lines]
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
     if width < 2 and not alone:
-        return 0.0
+        return False, 0.0, False
     numbers = sum(dialect.number(cell) is not None for row in rows if len(row) == width for cell in row)
-    # Where nothing is a number, a separator that splits is still better than one that does not.
-    return numbers / sum(len(row) for row in rows) + (1e-3 if width > 1 else 0.0)
+    return len(rows[0]) == width, numbers / sum(len(row) for row in rows), True
 
 
 def looks_like_names(dialect: Dialect, cells: Sequence[str]) -> bool:

@@ -11,6 +11,8 @@ FEWEST_PLATEAUS = 2
 # Of the root mean square step: slower approaches are the rounded top of a peak, not a cut.
 SLOWEST_ENTRY = 0.15
 LARGEST_SHARE_HELD = 0.1
+# A signal that is nearly always at an extreme switches between two levels.
+SMALLEST_SHARE_MOVING = 0.1
 
 
 def is_constant(samples: NDArray[np.float64]) -> bool:
@@ -30,12 +32,15 @@ def clipping(samples: NDArray[np.float64]) -> tuple[tuple[float, int], ...]:
     moving = np.abs(steps[steps != 0.0])
     if moving.size == 0:
         return ()
+    levels = (float(samples.min()), float(samples.max()))
+    extreme = (samples == levels[0]) | (samples == levels[1])
+    elsewhere = ~(extreme[1:] & extreme[:-1])
+    moves = (
+        np.mean(~extreme) > SMALLEST_SHARE_MOVING and np.mean(steps[elsewhere] == 0.0) < LARGEST_SHARE_HELD
+    )
     found = []
-    for level in (float(samples.min()), float(samples.max())):
+    for level in levels if moves else ():
         at_level = samples == level
-        elsewhere = ~(at_level[1:] & at_level[:-1])
-        if np.mean(steps[elsewhere] == 0.0) > LARGEST_SHARE_HELD:
-            continue
         edges = np.diff(at_level.astype(np.int8), prepend=0, append=0)
         starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
         inside = (stops - starts >= SHORTEST_PLATEAU) & (starts > 0) & (stops < samples.size)

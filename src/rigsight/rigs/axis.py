@@ -19,16 +19,37 @@ AXIS = Rig(
     summary="A drive force moves one mass against a spring and a damper.",
     inputs=(Signal("u", "input", "drive input"),),
     outputs=(Signal("x", "m", "displacement"),),
-    constants=(Parameter("gain", "force per unit of input", "force input^-1", "N/input", lower=-1e12, upper=1e12, default=1.0),),
+    constants=(
+        Parameter(
+            "gain",
+            "force per unit of input",
+            "force input^-1",
+            "N/input",
+            lower=-1e12,
+            upper=1e12,
+            default=1.0,
+        ),
+    ),
     parameters=(
         Parameter("m", "moving mass", "force time^2 x^-1", "kg", lower=1e-15, upper=1e15, logarithmic=True),
         Parameter("d", "viscous damping", "force time x^-1", "N s/m", lower=0.0, upper=1e15),
-        Parameter("k", "stiffness; 0 for an axis without a spring", "force x^-1", "N/m", lower=0.0, upper=1e18),
+        Parameter(
+            "k", "stiffness; 0 for an axis without a spring", "force x^-1", "N/m", lower=0.0, upper=1e18
+        ),
         Parameter("x_off", "displacement at rest", "x", "m", lower=-1e9, upper=1e9, default=0.0),
-        Parameter("force_off", "constant force beside the drive", "force", "N", lower=-1e12, upper=1e12, default=0.0),
+        Parameter(
+            "force_off", "constant force beside the drive", "force", "N", lower=-1e12, upper=1e12, default=0.0
+        ),
     ),
     motion=Motion(
-        displacement=x, velocity=w, stiffness=k, damping=d, drive_gain=gain, rest=x_off, bias=force_off, inertia=m
+        displacement=x,
+        velocity=w,
+        stiffness=k,
+        damping=d,
+        drive_gain=gain,
+        rest=x_off,
+        bias=force_off,
+        inertia=m,
     ),
     units={"x": "m", "force": "N", "input": "input", "time": "s"},
 )

@@ -23,8 +23,14 @@ ELEMENT = Rig(
         Parameter("force_off", "constant force", "force", "N", lower=-1e12, upper=1e12, default=0.0),
     ),
     motion=Motion(
-        displacement=x, velocity=w, stiffness=k, damping=d, drive_gain=sp.Integer(0),
-        rest=sp.Integer(0), bias=force_off, inertia=None,
+        displacement=x,
+        velocity=w,
+        stiffness=k,
+        damping=d,
+        drive_gain=sp.Integer(0),
+        rest=sp.Integer(0),
+        bias=force_off,
+        inertia=None,
     ),
     units={"x": "m", "force": "N", "time": "s"},
 )

@@ -35,11 +35,35 @@ RUNNING_GEAR = Rig(
         Parameter("k_tau", "motor constant", "force input^-1", "N m/A", lower=1e-9, upper=1e6),
     ),
     parameters=(
-        Parameter("J_z", "yaw inertia of the axle bridge", "force time^2 x^-1", "kg m^2", lower=1e-9, upper=1e9, logarithmic=True),
-        Parameter("k_c", "equivalent yaw stiffness", "force x^-1", "N m/rad", lower=1e-9, upper=1e12, logarithmic=True),
+        Parameter(
+            "J_z",
+            "yaw inertia of the axle bridge",
+            "force time^2 x^-1",
+            "kg m^2",
+            lower=1e-9,
+            upper=1e9,
+            logarithmic=True,
+        ),
+        Parameter(
+            "k_c",
+            "equivalent yaw stiffness",
+            "force x^-1",
+            "N m/rad",
+            lower=1e-9,
+            upper=1e12,
+            logarithmic=True,
+        ),
         Parameter("k_d", "equivalent yaw damping", "force time x^-1", "N m s/rad", lower=0.0, upper=1e12),
         Parameter("psi_off", "yaw angle at rest", "x", "rad", lower=-10.0, upper=10.0, default=0.0),
-        Parameter("l_0", "distance wheel carrier to middle frame", "length", "m", lower=1e-6, upper=1e3, logarithmic=True),
+        Parameter(
+            "l_0",
+            "distance wheel carrier to middle frame",
+            "length",
+            "m",
+            lower=1e-6,
+            upper=1e3,
+            logarithmic=True,
+        ),
         Parameter("c_y", "lateral creep factor (2.12)", "", "1", lower=1e-6, upper=1e3, logarithmic=True),
         Parameter("y_off", "lateral offset", "length", "m", lower=-10.0, upper=10.0, default=0.0),
     ),
@@ -47,8 +71,14 @@ RUNNING_GEAR = Rig(
         Parameter("delta_0", "equivalent conicity, gives c_y by (2.12)", "", "rad", lower=1e-6, upper=1.5),
     ),
     motion=Motion(
-        displacement=psi, velocity=w, stiffness=k_c, damping=k_d, drive_gain=b * k_tau / r_0,
-        rest=psi_off, bias=sp.Integer(0), inertia=J_z,
+        displacement=psi,
+        velocity=w,
+        stiffness=k_c,
+        damping=k_d,
+        drive_gain=b * k_tau / r_0,
+        rest=psi_off,
+        bias=sp.Integer(0),
+        inertia=J_z,
     ),
     downstream={y: speed * c_y * (psi - psi_off) - speed * c_y / (2 * l_0) * (y - y_off - 2 * l_0 * psi_off)},
     units={"x": "rad", "force": "N m", "input": "A", "time": "s", "length": "m"},
@@ -71,5 +101,7 @@ def conicity(c_y: float, r_0: float, b: float) -> float:
     """
     lowest = math.pi / 2
     if not creep_factor(lowest, r_0, b) - 1e-12 <= c_y < 1.0:
-        raise InputError(f"No positive conicity gives c_y = {c_y:g}; c_y must lie in [0, 1). Give c_y itself instead of delta_0.")
+        raise InputError(
+            f"No positive conicity gives c_y = {c_y:g}; c_y must lie in [0, 1). Give c_y itself instead of delta_0."
+        )
     return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, 0.0, math.atan2(b, 2.0 * r_0)))

@@ -109,5 +109,7 @@ def _band_limited_nodes(
     stop = start + (samples.size - 1) * fine
     index = np.arange(start, stop + 1, _OVERSAMPLING)
     step = dt / fine
-    slopes = (8.0 * (dense[index + 1] - dense[index - 1]) - (dense[index + 2] - dense[index - 2])) / (12.0 * step)
+    slopes = (8.0 * (dense[index + 1] - dense[index - 1]) - (dense[index + 2] - dense[index - 2])) / (
+        12.0 * step
+    )
     return dense[index], slopes

@@ -21,6 +21,8 @@ from rigsight.simulate.kernel_source import kernel_source
 from rigsight.simulate.structure import Structure
 
 CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
+ENTRY_POINTS = ("simulate_one", "simulate_lanes")
+"""Functions of a kernel module that are called from outside it."""
 
 _modules: dict[str, ModuleType] = {}
 _lock = threading.RLock()
@@ -63,7 +65,49 @@ def kernels(structure: Structure) -> Any:
         return module
 
 
+def run_kernel(structure: Structure, function: str, *arguments: Any) -> Any:
+    """Call a function of a structure's kernels, compiling it if this machine has not yet done so.
+
+    Raises
+    ------
+    InputError
+        If the cache folder cannot be written.
+    """
+    module = kernels(structure)
+    try:
+        return getattr(module, function)(*arguments)
+    except (TypeError, AttributeError):
+        raise
+    # Kernels raise nothing themselves: what arrives here is machine code on disk that is damaged or cannot be written.
+    except Exception as error:
+        path = Path(str(module.__file__))
+        try:
+            for file in (path.parent / "__pycache__").glob(f"{path.stem}.*"):
+                file.unlink()
+            with _lock:
+                _modules[path.stem] = _load(path.stem, path)
+            return getattr(_modules[path.stem], function)(*arguments)
+        except Exception:
+            raise InputError(
+                f"Cannot use the compiled kernels in {path.parent} ({error}). "
+                f"Remove that folder, or set {CACHE_VARIABLE} to one that can be written."
+            ) from error
+
+
 _sources_by_identity: dict[int, tuple[Structure, str]] = {}
+
+
+def compiled(structure: Structure) -> bool:
+    """Return True if this machine seems to hold the machine code of a structure's kernels already.
+
+    A hint: code of another processor or numba version is only found out, and compiled anew, when it is called.
+    """
+    path = Path(str(kernels(structure).__file__))
+    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    return all(
+        any((path.parent / "__pycache__").glob(f"{path.stem}.{function}-*.{version}*.nbi"))
+        for function in ENTRY_POINTS
+    )
 
 
 def _written(name: str, text: str) -> Path:
@@ -74,9 +118,11 @@ def _written(name: str, text: str) -> Path:
         if path.is_file() and path.read_text("utf-8") == text:
             return path
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8") as file:
+        with tempfile.NamedTemporaryFile(
+            "w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8"
+        ) as file:
             file.write(text)
-        os.replace(file.name, path)
+        Path(file.name).replace(path)
     except OSError as error:
         raise InputError(
             f"Cannot keep compiled kernels in {folder} ({error.strerror}). "
@@ -87,7 +133,8 @@ def _written(name: str, text: str) -> Path:
 
 def _load(name: str, path: Path) -> ModuleType:
     specification = importlib.util.spec_from_file_location(name, path)
-    assert specification is not None and specification.loader is not None
+    assert specification is not None
+    assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
     specification.loader.exec_module(module)

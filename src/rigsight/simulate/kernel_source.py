@@ -140,16 +140,14 @@ class _Writer:
         return _indent(lines, 1)
 
     def _prepare(self) -> str:
-        parameters = {
-            s: f"p[{i}]" for i, s in enumerate(self.structure.parameter_symbols)
-        }
+        parameters = {s: f"p[{i}]" for i, s in enumerate(self.structure.parameter_symbols)}
         targets = [f"q[{i}]" for i in range(len(self.constants))]
         lines = assignments(targets, list(self.hoisted.values()), parameters, "c") or ["pass"]
         return _indent(lines, 1)
 
     def _delay(self) -> str:
         names = {symbol: f"q[{i}]" for i, symbol in enumerate(self.hoisted)}
-        return _indent(assignments(["delay"], [self.delay], names, "c") + ["return delay"], 1)
+        return _indent([*assignments(["delay"], [self.delay], names, "c"), "return delay"], 1)
 
     def _array_names(self) -> dict[sp.Symbol, str]:
         arrays = {s: f"x[{i}]" for i, s in enumerate(self.structure.states)}
@@ -162,7 +160,7 @@ class _Writer:
         return _indent(assignments(targets, self.switches, self._array_names(), "c") or ["pass"], 1)
 
     def _outputs(self) -> str:
-        targets = [f"out[{i}]" for i in range(len(self.live_outputs))]
+        targets = [f"out[sample, {i}]" for i in range(len(self.live_outputs))]
         return _indent(assignments(targets, self.live_outputs, self._array_names(), "c"), 1)
 
     def _call(self, states: list[str], modes: list[str], stage: str) -> str:
@@ -190,8 +188,11 @@ class _Writer:
             ]
             arguments = []
             for i in range(n):
-                terms = " + ".join(f"{w!r} * k{j}_{i}" for j, w in enumerate(weights) if w)
-                lines.append(f"y{stage}_{i} = x{i} + h * ({terms})")
+                # The newest rate comes last and alone: all else is ready before it, so that stages wait for one product only.
+                *early, newest = [(w, f"k{j}_{i}") for j, w in enumerate(weights) if w]
+                terms = " + ".join(f"{w!r} * {rate}" for w, rate in early)
+                known = f"(x{i} + h * ({terms}))" if early else f"x{i}"
+                lines.append(f"y{stage}_{i} = {known} + (h * {newest[0]!r}) * {newest[1]}")
                 arguments.append(f"y{stage}_{i}")
             call = self._call(arguments, self.modes, str(stage))
             lines.append(f"{', '.join(targets)}{',' if n == 1 else ''} = {call}")
@@ -203,7 +204,9 @@ class _Writer:
             lines += [
                 f"x_new[{i}] = y6_{i}",
                 f"k_last[{i}] = k6_{i}",
-                f"error = max(error, abs(h * ({terms})) / (max(size[{i}], abs(y6_{i})) + 1e-300))",
+                f"excursion = abs(y6_{i} - origin[{i}])",
+                f"relative = per_size[{i}] if excursion <= size[{i}] else 1.0 / excursion",
+                f"error = max(error, abs(h * ({terms})) * relative)",
             ]
         lines.append("return error")
         return _indent(lines, 1)
@@ -241,9 +244,7 @@ class _Writer:
         lines: list[str] = []
         previous = ""
         for stage, (factor, point) in enumerate((("0.0", "a"), ("0.5", "b"), ("0.5", "b"), ("1.0", "c"))):
-            arguments = [
-                f"x{i}" if stage == 0 else f"x{i} + {factor} * h * {previous}_{i}" for i in range(n)
-            ]
+            arguments = [f"x{i}" if stage == 0 else f"x{i} + {factor} * h * {previous}_{i}" for i in range(n)]
             targets = [f"k{stage}_{i}" for i in range(n)]
             call = ", ".join([f"u{point}", f"d{point}", f"t{point}", *arguments, *friction, *self.constants])
             lines.append(f"{', '.join(targets)}{',' if n == 1 else ''} = live_rates({call})")
@@ -251,9 +252,7 @@ class _Writer:
                 lines.append(f"k{stage}_{self.structure.velocity_index} *= moving")
             previous = f"k{stage}"
         for i in range(n):
-            lines.append(
-                f"{target}{i} = x{i} + h / 6.0 * (k0_{i} + 2.0 * (k1_{i} + k2_{i}) + k3_{i})"
-            )
+            lines.append(f"{target}{i} = x{i} + h / 6.0 * (k0_{i} + 2.0 * (k1_{i} + k2_{i}) + k3_{i})")
         return lines
 
     def _input_at(self, point: str, tau: str, start: str = "start") -> list[str]:
@@ -298,7 +297,7 @@ class _Writer:
     def _lanes_outputs(self) -> list[str]:
         arrays = {s: f"x[{i}, l]" for i, s in enumerate(self.structure.states)}
         constants = {s: f"q[{i}, l]" for i, s in enumerate(self.hoisted)}
-        targets = [f"out[sample, {i}, l]" for i in range(len(self.live_outputs))]
+        targets = [f"out[sample, {i}, first_lane + l]" for i in range(len(self.live_outputs))]
         names = {**self.names, **arrays, **constants}
         return assignments(targets, self.live_outputs, names, "c")
 

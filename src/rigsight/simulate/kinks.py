@@ -1,4 +1,4 @@
-"""Where the equations of a structure are not smooth: every Abs and sign, as a mode that is frozen between events."""
+"""Where a structure's equations are not smooth: every Abs, sign and positive part, as a mode frozen between events."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from rigsight.effects.symbols import positive_part
 from rigsight.simulate.structure import Structure
 
-absolute = sp.Function("absolute", real=True)
-"""Absolute value that stays one: the base of a power with a real exponent, smooth enough not to be an event."""
+_KINKS = (sp.Abs, sp.sign, positive_part)
+
+
+class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """Absolute value that stays one: the base of a power with a real exponent, smooth enough not to be an event."""
+
+    is_real = True
+    is_nonnegative = True
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,7 @@ class FrozenStructure:
 
 
 def freeze(structure: Structure) -> FrozenStructure:
-    """Replace every Abs and sign in a structure's equations by a mode symbol."""
+    """Replace every Abs, sign and positive part in a structure's equations by a mode symbol."""
     constant = set(structure.parameter_symbols)
     expressions = [*structure.rates, *structure.outputs]
     modes: dict[sp.Expr, sp.Symbol] = {}
@@ -55,7 +62,12 @@ def freeze(structure: Structure) -> FrozenStructure:
             if power.base == sp.Abs(argument) and not power.exp.is_Integer
         }
         signed = -mode if flipped else mode
-        replacement = {**powers, sp.Abs(argument): mode * switch, sp.sign(argument): signed}
+        replacement = {
+            **powers,
+            sp.Abs(argument): mode * switch,
+            sp.sign(argument): signed,
+            positive_part(argument): sp.Mul(argument, 1 + signed, sp.Rational(1, 2)),
+        }
         expressions = [expression.xreplace(replacement) for expression in expressions]
     n_states = len(structure.states)
     return FrozenStructure(
@@ -71,8 +83,8 @@ def _innermost_kink(expressions: list[sp.Expr], constant: set[sp.Symbol]) -> sp.
     candidates = {
         atom
         for expression in expressions
-        for atom in expression.atoms(sp.Abs, sp.sign)
-        if not atom.args[0].atoms(sp.Abs, sp.sign) and not atom.free_symbols <= constant
+        for atom in expression.atoms(*_KINKS)
+        if not atom.args[0].atoms(*_KINKS) and not atom.free_symbols <= constant
     }
     return min(candidates, key=sp.default_sort_key) if candidates else None
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.simulate.input_hold import HeldInput, hold_input
-from rigsight.simulate.kernel_cache import kernels
+from rigsight.simulate.kernel_cache import run_kernel
 from rigsight.simulate.structure import Structure
 
 _RAMP_PERIODS = 20.0
 """Length of the slow rise of the input in periods of the linear rig."""
-_SETTLED = 1e-10
+_INTERVALS = 100
+_SETTLED = 1e-9
 """Relative change of the states over one wait below which they rest."""
-_WAITS = 10
+_WAITS = 7
+"""Each wait is twice as long as the one before."""
 _TOLERANCE = 1e-9
 
 
@@ -51,10 +52,9 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
         return state
     period = 2.0 * math.pi * math.sqrt(inertia / stiffness)
     quiet = _quiet_parameters(structure, p, critical_damping=2.0 * math.sqrt(stiffness * inertia))
-    module = kernels(structure)
     first = float(held.coefficients[0, 0])
     for start, stop in ((0.0, 0.0), (0.0, first)) if first != 0.0 else ((0.0, 0.0),):
-        reached = _settled(structure, module, quiet, state, (start, stop), _RAMP_PERIODS * period)
+        reached = _settled(structure, quiet, state, (start, stop), _RAMP_PERIODS * period)
         if reached is None:
             return state
         state = reached
@@ -87,7 +87,6 @@ def _quiet_parameters(
 
 def _settled(
     structure: Structure,
-    module: Any,
     p: NDArray[np.float64],
     state: NDArray[np.float64],
     ramp: tuple[float, float],
@@ -95,24 +94,22 @@ def _settled(
 ) -> NDArray[np.float64] | None:
     """Return the state after a ramp of the input and waits until nothing moves; None if the motion has no end."""
     velocity = structure.velocity_index or 0
-    n_intervals = 100
-    samples = np.linspace(*ramp, n_intervals + 1)
+    interval = duration / _INTERVALS
+    samples = np.linspace(*ramp, _INTERVALS + 1)
     state = state.copy()
-    for _ in range(1 + _WAITS):
+    for wait in range(_WAITS):
         before = state.copy()
-        held = hold_input(samples, duration / n_intervals, "foh")
-        out = np.zeros((n_intervals + 1, len(structure.outputs)))
-        status = module.simulate_one(
-            held.coefficients, held.interval, 1, True, 0.0, p, state, _TOLERANCE, out
+        held = hold_input(samples, interval, "foh")
+        out = np.zeros((samples.size, len(structure.outputs)))
+        status = run_kernel(
+            structure, "simulate_one", held.coefficients, interval, 1, True, 0.0, p, state, _TOLERANCE, out
         )
-        if status != module.OK:
+        if status != 0:
             return None
         moved = np.abs(state - before)
         moved[velocity] = 0.0
         if np.all(moved <= _SETTLED * np.abs(state)):
             break
-        if samples[0] == samples[-1]:
-            duration *= 2.0
-        samples = np.full(n_intervals + 1, ramp[1])
+        samples = np.full(_INTERVALS * 2**wait + 1, ramp[1])
     state[velocity] = 0.0
     return state

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, SimulationError
 from rigsight.records.record import Record
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
-from rigsight.simulate.kernel_cache import kernels
+from rigsight.simulate.kernel_cache import run_kernel
 from rigsight.simulate.kernel_source import LANES
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
@@ -73,7 +73,9 @@ def simulate(
     if initial_state is None:
         initial_state = rest_state(structure, p, held)
     elif structure is not complete:
-        initial_state = np.asarray(initial_state)[[complete.states.index(state) for state in structure.states]]
+        initial_state = np.asarray(initial_state)[
+            [complete.states.index(state) for state in structure.states]
+        ]
     outputs = simulate_outputs(structure, held, p, initial_state, record.n_samples, accuracy)
     names = [signal.name for signal in structure.rig.outputs]
     return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
@@ -92,7 +94,9 @@ def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArr
     known = {p.name: values.get(p.name, p.default) for p in structure.parameters}
     missing = [name for name, value in known.items() if value is None]
     if missing:
-        raise InputError(f"Missing parameters: {', '.join(missing)}. The model has: {', '.join(structure.names)}.")
+        raise InputError(
+            f"Missing parameters: {', '.join(missing)}. The model has: {', '.join(structure.names)}."
+        )
     return np.array(list(known.values()), dtype=np.float64)
 
 
@@ -111,9 +115,10 @@ def simulate_outputs(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    module = kernels(structure)
     out = np.zeros((n_samples, len(structure.outputs)))
-    status = module.simulate_one(
+    status = run_kernel(
+        structure,
+        "simulate_one",
         held.coefficients,
         held.interval,
         held.per_sample,
@@ -124,7 +129,7 @@ def simulate_outputs(
         _LOCAL_PER_GLOBAL * accuracy,
         out,
     )
-    if status != module.OK:
+    if status != 0:
         effects = ", ".join(structure.effect_names) or "no effect"
         raise SimulationError(f"Simulation of {structure.rig.name} with {effects}: {_REASONS[status]}.")
     return out
@@ -159,17 +164,18 @@ def simulate_sets(
     -------
     Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
     """
-    module = kernels(structure)
     n_sets = p.shape[1]
-    n_states = module.N_STATES
-    out = np.empty((n_samples, len(structure.outputs), n_sets))
-    block_out = np.empty((n_samples, len(structure.outputs), LANES))
-    for start in range(0, n_sets, LANES):
-        stop = min(start + LANES, n_sets)
+    n_states = max(1, len(structure.states))
+    # The last block is filled up with copies of the last set; what they give is cut off.
+    n_padded = -(-n_sets // LANES) * LANES
+    out = np.empty((n_samples, len(structure.outputs), n_padded))
+    for start in range(0, n_padded, LANES):
         lanes = np.minimum(np.arange(start, start + LANES), n_sets - 1)
         state = np.zeros((n_states, LANES))
         state[: initial_states.shape[0]] = initial_states[:, lanes]
-        module.simulate_lanes(
+        run_kernel(
+            structure,
+            "simulate_lanes",
             held.coefficients,
             held.interval,
             held.per_sample,
@@ -177,10 +183,10 @@ def simulate_sets(
             0.0,
             np.ascontiguousarray(p[:, lanes]),
             state,
-            block_out,
+            out,
+            start,
         )
-        out[:, :, start:stop] = block_out[:, :, : stop - start]
-    return out
+    return out[:, :, :n_sets]
 
 
 def choose_substeps(

@@ -80,9 +80,7 @@ class Structure:
         return _unique_names(self.rig, self.effects)[effect.name, own_name]
 
 
-def compose(
-    rig: Rig, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None
-) -> Structure:
+def compose(rig: Rig, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
     """Put effects into a rig's equations.
 
     Parameters
@@ -124,7 +122,8 @@ class _Key:
 @lru_cache(maxsize=1024)
 def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], ...]) -> Structure:
     rig, effects = rig_key.value, effects_key.value
-    assert isinstance(rig, Rig) and isinstance(effects, tuple)
+    assert isinstance(rig, Rig)
+    assert isinstance(effects, tuple)
     _check_effects(rig, effects)
     unique = _unique_names(rig, effects)
     parameters = _parameters(rig, effects, unique, dict(fixed))
@@ -133,9 +132,7 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
 
     delay, lags = _actuator(binder, effects)
     spring, memories = _spring(binder, effects)
-    torque = sum(
-        (binder.effect(e, e.torque) for e in effects if e.torque is not None), start=sp.Integer(0)
-    )
+    torque = sum((binder.effect(e, e.torque) for e in effects if e.torque is not None), start=sp.Integer(0))
     for effect in effects:
         if effect.torque is not None and effect.spring is None and effect.drive is None:
             memories += binder.states(effect)
@@ -266,9 +263,7 @@ def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:
     return sp.Symbol(f"{effect.name}.{symbol.name}", real=True)
 
 
-def _actuator(
-    binder: _Binder, effects: tuple[Effect, ...]
-) -> tuple[sp.Expr | None, list[_StateEquation]]:
+def _actuator(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr | None, list[_StateEquation]]:
     """Chain the actuator effects; leaves the drive in the binder and returns delay and lag states."""
     delay: sp.Expr | None = None
     lags: list[_StateEquation] = []
@@ -282,9 +277,7 @@ def _actuator(
     return delay, lags
 
 
-def _spring(
-    binder: _Binder, effects: tuple[Effect, ...]
-) -> tuple[sp.Expr, list[_StateEquation]]:
+def _spring(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr, list[_StateEquation]]:
     """Chain what stands between displacement and spring, then what changes the spring's torque."""
     deflection = binder.x
     for effect in effects:
@@ -337,7 +330,9 @@ def without_vanished_effects(
         for p in effect.parameters
     }
     fixed = {renamed[name]: value for name, value in structure.fixed if name in renamed}
-    return compose(structure.rig, kept, fixed), {renamed.get(name, name): value for name, value in values.items()}
+    return compose(structure.rig, kept, fixed), {
+        renamed.get(name, name): value for name, value in values.items()
+    }
 
 
 def structure_named(

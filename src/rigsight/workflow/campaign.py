@@ -127,7 +127,8 @@ def _parameters(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, f
     for alternative, determined in DETERMINES.items():
         if alternative in checked and determined in checked:
             raise InputError(
-                f"{path.name}: rig.parameters.{alternative}: stands beside {determined}, which it determines; give one of the two."
+                f"{path.name}: rig.parameters.{alternative}: stands beside {determined}, which it determines; "
+                "give one of the two."
             )
     return checked
 

@@ -104,8 +104,7 @@ def read_campaign_table(path: Path) -> CampaignTable:
     try:
         return CampaignTable.model_validate(data)
     except ValidationError as error:
-        told = [_tell(path, data, dict(problem)) for problem in error.errors(include_url=False)]
-        told = list(dict.fromkeys(told))
+        told = _messages(path, data, [dict(problem) for problem in error.errors(include_url=False)])
         more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
         raise InputError("\n".join(told[:5]) + more) from None
 
@@ -119,6 +118,17 @@ def key_text(location: tuple[str | int, ...], data: dict[str, Any]) -> str:
         rest = ".".join(map(str, location[2:]))
         return f"{record}: {rest}" if rest else record
     return ".".join(map(str, location))
+
+
+def _messages(path: Path, data: dict[str, Any], problems: list[dict[str, Any]]) -> list[str]:
+    """Return one line per mistake; an alternative that fails as a whole only repeats what another says in detail."""
+    keys = [_without_union_members(problem["loc"], data) for problem in problems]
+    told = [
+        _tell(path, data, problem)
+        for problem, key in zip(problems, keys, strict=True)
+        if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
+    ]
+    return list(dict.fromkeys(told))
 
 
 def _tell(path: Path, data: dict[str, Any], problem: dict[str, Any]) -> str:

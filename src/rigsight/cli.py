@@ -1,0 +1,311 @@
+"""How does a command line become one call of a public function, and an error an exit code?
+
+Exit codes: 0 success, 1 a defect of rigsight, 2 input that cannot be used, 130 interrupted. Everything heavy is imported
+inside the commands, so that ``rigsight --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import shlex
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+from rigsight.errors import InputError, RigsightError
+
+if TYPE_CHECKING:
+    from rigsight.diagnose import Diagnosis
+    from rigsight.effects import Effect
+    from rigsight.records import ColumnMapping
+    from rigsight.workflow.progress import Listener, Step
+
+BAD_INPUT, DEFECT, INTERRUPTED = 2, 1, 130
+
+app = typer.Typer(
+    name="rigsight",
+    help="Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks.",
+    epilog="'rigsight COMMAND --help' tells more. Start with 'rigsight demo'.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs", "-j", min=1, show_default="one per processor", help="Candidates fitted at the same time."
+    ),
+]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        _leave("interrupted; nothing was written.", INTERRUPTED)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"rigsight {version('rigsight')}")
+        raise typer.Exit
+
+
+@app.callback()
+def rigsight(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks."""
+
+
+@contextlib.contextmanager
+def _told(debug: bool) -> Iterator[None]:
+    """Map errors of a command to one message on stderr and an exit code."""
+    if debug:
+        yield
+        return
+    try:
+        with warnings.catch_warnings():
+            # Trial parameters far off the mark overflow; fits expect that and go elsewhere.
+            warnings.simplefilter("ignore")
+            yield
+    except RigsightError as error:
+        _leave(str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        _leave("interrupted; nothing was written.", INTERRUPTED)
+    except BrokenPipeError:
+        raise
+    except MemoryError:
+        _leave("this needs more memory than there is. Shorten the records, or lower --jobs.", BAD_INPUT)
+    except Exception as error:
+        text = " ".join(str(error).split())[:300]
+        _leave(
+            f"a defect of rigsight, not of your data: {type(error).__name__}: {text}. "
+            "Please report it with the output of the same command with --debug added.",
+            DEFECT,
+        )
+
+
+def _leave(message: str, code: int) -> NoReturn:
+    typer.echo(f"rigsight: {message}", err=True)
+    raise SystemExit(code)
+
+
+@app.command()
+def demo(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for campaign and results.")
+    ] = Path("demo"),
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Run the whole chain on a virtual rig whose simulation misses an effect.
+
+    Writes DIR/campaign (records and campaign.toml, as a measurement would leave them), diagnosis.json, model.json, report.html.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.workflow.demo import HIDDEN_EFFECT, run_demo
+
+        diagnosis = run_demo(out, seed=seed, n_jobs=jobs, listener=listener, command=_command_line())
+    if not quiet:
+        _show(diagnosis)
+        typer.echo(f"\nThe virtual rig hid {HIDDEN_EFFECT}; the diagnosis was not told.")
+        _show_files(out, f"rigsight diagnose {shlex.quote(str(out / 'campaign'))} repeats it.")
+
+
+@app.command()
+def diagnose(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "diagnosis"
+    ),
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", show_default="the whole catalogue", help="Try only this effect. May be repeated."),
+    ] = None,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Say which effect a simulation misses, where it acts, and how far the gap shrinks with it.
+
+    Writes diagnosis.json, model.json and report.html into DIR, all or none.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.workflow.diagnose import run_diagnose
+
+        diagnosis = run_diagnose(
+            campaign, out, effects=_effects(effect or []), seed=seed, n_jobs=jobs, listener=listener, command=_command_line()
+        )
+    if not quiet:
+        _show(diagnosis)
+        _show_files(out)
+
+
+@app.command()
+def simulate(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
+    ],
+    record: Annotated[
+        Path,
+        typer.Argument(metavar="RECORD", help="A CSV file with time and input; other columns are ignored."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            show_default="RECORD_simulated.csv in this folder",
+            help="CSV file to write.",
+        ),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column",
+            metavar="SIGNAL=COLUMN",
+            help="Where a signal stands: u=current or u=2. May be repeated.",
+        ),
+    ] = None,
+    initial_state: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STATE=VALUE,...",
+            show_default="rest at the first input",
+            help="States that start elsewhere: psi=0.01,w=0.",
+        ),
+    ] = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Predict the outputs of a model for the input of a record.
+
+    Writes a CSV with time, input and simulated outputs in SI units (t,u,psi,y; axis: t,u,x; element: t,x,force).
+    """
+    file = out or Path(f"{record.stem}_simulated.csv")
+    with _told(debug), _listening(quiet):
+        from rigsight.workflow.simulate import run_simulate
+
+        simulated = run_simulate(
+            model, record, file, columns=_columns(column or []), initial_state=_states(initial_state)
+        )
+    if not quiet:
+        typer.echo(f"{simulated.n_samples} samples simulated: {file}")
+
+
+def _effects(names: list[str]) -> tuple[Effect, ...]:
+    from rigsight.effects import CATALOGUE, effect_named
+
+    return tuple(effect_named(name) for name in dict.fromkeys(names)) or CATALOGUE
+
+
+def _columns(given: list[str]) -> dict[str, ColumnMapping]:
+    from rigsight.records import ColumnMapping
+
+    columns = {}
+    for text in given:
+        signal, sign, name = text.partition("=")
+        if not (signal and sign and name):
+            raise InputError(
+                f"--column '{text}' cannot be read; write SIGNAL=COLUMN, for instance u=current."
+            )
+        columns[signal.strip()] = ColumnMapping(int(name) if name.isascii() and name.isdigit() else name)
+    return columns
+
+
+def _states(given: str | None) -> dict[str, float]:
+    states = {}
+    for text in (given or "").split(",") if given else []:
+        name, _, value = text.partition("=")
+        try:
+            states[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(
+                f"--initial-state '{text}' cannot be read; write STATE=VALUE, for instance psi=0.01,w=0."
+            ) from None
+        if not math.isfinite(states[name.strip()]):
+            raise InputError(f"--initial-state '{text}' must be a finite number.")
+    return states
+
+
+def _command_line() -> str:
+    return shlex.join(["rigsight", *sys.argv[1:]])
+
+
+def _show(diagnosis: Diagnosis) -> None:
+    from rich.console import Console
+
+    from rigsight.report.terminal import summary
+
+    Console(highlight=False).print(summary(diagnosis))
+
+
+def _show_files(out: Path, *more: str) -> None:
+    for line in ("", f"Report: {out / 'report.html'}", f"Model:  {out / 'model.json'}", *more):
+        typer.echo(line)
+
+
+@contextlib.contextmanager
+def _listening(quiet: bool) -> Iterator[Listener]:
+    """Show progress on stderr: a bar on a terminal, a line per stage where the output is kept, nothing if quiet."""
+    if quiet:
+        yield lambda _: None
+    elif not sys.stderr.isatty():
+        yield _say_stage
+    else:
+        with _bar() as listener:
+            yield listener
+
+
+def _say_stage(step: Step) -> None:
+    if step.done == 0:
+        typer.echo(f"{step.stage} ...", err=True)
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Listener]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[detail]}"),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        tasks = {}
+        # The first seconds go into importing numba and sympy: say that something happens.
+        starting = progress.add_task("Starting", total=None, detail="")
+
+        def listener(step: Step) -> None:
+            progress.update(starting, visible=False)
+            if step.stage not in tasks:
+                tasks[step.stage] = progress.add_task(step.stage, total=step.total, detail="")
+            progress.update(tasks[step.stage], completed=step.done, total=step.total, detail=step.detail)
+
+        yield listener

@@ -1,0 +1,135 @@
+"""Is there a gap? The noise floor of each output, from the records themselves.
+
+Three ways, the first that the records allow wins: repeated periods of one input (noise and disturbance alike), stretches in
+which the input rests (sensor noise and the disturbance that passes through the rig), and the top of the spectrum, where no rig
+responds (white sensor noise only: a lower bound).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.result import NoiseFloor
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+_SAME_INPUT = 1e-3
+_QUIET_INPUT = 1e-3
+_MIN_QUIET = 100
+_TOP_OF_SPECTRUM = 0.85
+_SMALLEST = 1e-9
+
+
+def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
+    """Return the noise floor of every output that the records hold.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        All records of a campaign: they share their sensors.
+    """
+    floors = []
+    for signal in rig.outputs:
+        holding = [record for record in records if signal.name in record]
+        if holding:
+            std, method = _noise_floor(rig.inputs[0].name, signal.name, holding)
+            spread = max(float(np.std(record[signal.name])) for record in holding)
+            floors.append(NoiseFloor(signal.name, signal.unit, max(std, _SMALLEST * spread), method))
+    return tuple(floors)
+
+
+def _noise_floor(source: str, output: str, records: Sequence[Record]) -> tuple[float, str]:
+    repeated = _repeated(source, output, records)
+    if repeated is not None:
+        return repeated, "repeated periods of the input"
+    top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
+    quiet = [q for record in records for q in _quiet_stretches(record, source, output)]
+    if quiet:
+        return max(float(np.median(quiet)), top), "stretches in which the input rests"
+    return top, "top of the spectrum (white noise only)"
+
+
+def _repeated(source: str, output: str, records: Sequence[Record]) -> float | None:
+    """Return the scatter over repetitions of the same input, within records and from record to record."""
+    segments = []
+    for record in records:
+        period = _period(record[source])
+        if period is None:
+            segments.append((record[source], record[output]))
+            continue
+        count = record.n_samples // period
+        # The first period still holds the transient.
+        for i in range(1 if count > 1 else 0, count):
+            part = slice(i * period, (i + 1) * period)
+            segments.append((record[source][part], record[output][part]))
+    squares: list[float] = []
+    used: set[int] = set()
+    for i, (first_input, first_output) in enumerate(segments):
+        if i in used:
+            continue
+        size = float(np.std(first_input)) or 1.0
+        group = [first_output]
+        for j in range(i + 1, len(segments)):
+            other_input, other_output = segments[j]
+            if other_input.size != first_input.size or j in used:
+                continue
+            if np.max(np.abs(other_input - first_input)) <= _SAME_INPUT * size:
+                group.append(other_output)
+                used.add(j)
+        if len(group) > 1:
+            squares.append(float(np.mean(np.var(np.array(group), axis=0, ddof=1))))
+    return float(np.sqrt(np.mean(squares))) if squares else None
+
+
+def _period(samples: NDArray[np.float64]) -> int | None:
+    """Return the period of an exactly repeated input in samples, None if it does not repeat."""
+    centered = samples - np.mean(samples)
+    n = centered.size
+    size = float(np.std(centered))
+    if size == 0.0:
+        return None
+    padded = np.fft.rfft(centered, 2 * n)
+    correlation = np.fft.irfft(np.abs(padded) ** 2)[: n // 2 + 1]
+    overlap = n - np.arange(correlation.size)
+    normalized = correlation / overlap / size**2
+    peaks = np.flatnonzero(normalized > 0.99)
+    for lag in peaks[peaks > 30]:
+        if np.max(np.abs(samples[lag:] - samples[:-lag])) <= _SAME_INPUT * size:
+            return int(lag)
+    return None
+
+
+def _quiet_stretches(record: Record, source: str, output: str) -> list[float]:
+    """Return the standard deviations of the output in the settled part of long stretches of constant input."""
+    samples = record[source]
+    span = float(np.ptp(samples))
+    still = np.abs(np.diff(samples)) <= _QUIET_INPUT * span
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
+    found = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if np.ptp(samples[start : stop + 1]) > _QUIET_INPUT * span or stop - start < _MIN_QUIET:
+            continue
+        settled = record[output][start + (stop - start) // 2 if start > 0 else start : stop]
+        if settled.size < _MIN_QUIET // 2:
+            continue
+        first, second = np.array_split(settled, 2)
+        trend = abs(float(np.mean(second) - np.mean(first)))
+        scatter = float(np.std(np.diff(settled))) / np.sqrt(2.0)
+        deviation = float(np.std(settled))
+        # A drift or a decaying oscillation is not noise.
+        if trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300:
+            found.append(deviation)
+    return found
+
+
+def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
+    """Return the standard deviation of white noise with the median power of the highest lines."""
+    window = np.hanning(samples.size)
+    power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2
+    top = power[int(_TOP_OF_SPECTRUM * power.size) :]
+    return float(np.sqrt(np.median(top) / np.log(2.0) / np.sum(window**2)))

@@ -1,0 +1,354 @@
+"""The whole diagnosis: records and a given simulation -> verdict, ranking, gap budget, completed model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.characterize import (
+    Scored,
+    Workbench,
+    fit_candidate,
+    fit_candidates,
+    fit_linear,
+    liveliest,
+    refine,
+)
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.rank import Ranking, noise_vector, rank
+from rigsight.diagnose.result import (
+    Candidate,
+    Diagnosis,
+    Estimate,
+    NoiseFloor,
+    OutputGap,
+    Trace,
+)
+from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge
+from rigsight.diagnose.windows import cut, window_length
+from rigsight.effects import CATALOGUE, Effect
+from rigsight.errors import InputError
+from rigsight.identify import GreyBoxFit, characteristic_scales, linear_start
+from rigsight.metrics import nrmse
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+from rigsight.simulate.model import Model
+
+_SIGNIFICANT = 3.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be diagnosed.
+
+    Attributes
+    ----------
+    title
+        For people.
+    rig
+        The rig.
+    constants
+        Every constant of the rig.
+    given
+        Parameters of the simulation whose gap is in question; what is missing is identified.
+    records
+        Estimation and validation records.
+    """
+
+    title: str
+    rig: Rig
+    constants: Mapping[str, float]
+    given: Mapping[str, float]
+    records: tuple[Record, ...]
+
+
+def diagnose(
+    task: Task,
+    effects: Sequence[Effect] = CATALOGUE,
+    seed: int = 0,
+    n_jobs: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between a simulation and records of its rig.
+
+    Parameters
+    ----------
+    task
+        Records and the given simulation.
+    effects
+        Candidates.
+    seed
+        Seed of the resampling behind probabilities.
+    n_jobs
+        Candidates fitted at the same time.
+    progress
+        Called with a short text when a stage or candidate is done.
+
+    Raises
+    ------
+    InputError
+        If there is no estimation record or it does not move the rig.
+    SimulationError
+        If the given simulation cannot be run.
+    """
+    say = progress or (lambda _: None)
+    estimation = tuple(r for r in task.records if r.role == "estimation")
+    validation = tuple(r for r in task.records if r.role == "validation")
+    if not estimation:
+        raise InputError('A diagnosis needs at least one record with role = "estimation".')
+    notes = [note for record in task.records for note in record.notes]
+    scored_on = "validation" if validation else "estimation"
+    if not validation:
+        notes.append(
+            "There is no validation record: errors are those of the records that were fitted, and too good."
+        )
+    floors = noise_floors(task.rig, task.records)
+    noise = {floor.output: floor.std for floor in floors}
+    say("noise floor")
+
+    no_spring = _no_spring(task)
+    length = window_length(task.rig, estimation) if no_spring else None
+    start = _start(task, estimation, {})
+    fitted = cut(estimation, length)
+    bench = Workbench(
+        rig=task.rig,
+        estimation=fitted,
+        look=liveliest(fitted, task.rig.outputs[0].name),
+        scoring=cut(validation or estimation, length),
+        scales=characteristic_scales(task.rig, estimation, start),
+        noise=noise,
+        held=_held(task, estimation, no_spring),
+    )
+    linear = fit_linear(bench, start)
+    say("re-identified")
+    before = _before(task, bench, estimation, linear)
+    say("given simulation")
+    singles = refine(bench, fit_candidates(bench, linear, effects, n_jobs, progress), n_jobs)
+
+    rng = np.random.default_rng(seed)
+    vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
+    ranking = rank(singles, vector, rng)
+    if ranking.order and ranking.order[0].residuals:
+        ranking = _with_offset_rivals(bench, ranking, effects, vector, rng)
+        judgement = judge(before.excess, linear, ranking.order[0])
+    else:
+        judgement = Judgement("unknown", linear, "No candidate could be fitted.")
+    notes.append(judgement.reason)
+    return _assembled(task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on)
+
+
+def _no_spring(task: Task) -> bool:
+    return task.rig.name == "axis" and task.given.get("k") == 0.0
+
+
+def _start(task: Task, estimation: Sequence[Record], known: Mapping[str, float]) -> dict[str, float]:
+    held = {"k": 0.0} if _no_spring(task) else {}
+    return {**task.constants, **linear_start(task.rig, estimation, task.constants, {**held, **known})}
+
+
+def _held(task: Task, estimation: Sequence[Record], no_spring: bool) -> frozenset[str]:
+    """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
+    held = {"k"} if no_spring else set()
+    unmeasured = [
+        symbol for symbol in task.rig.downstream if not any(symbol.name in record for record in estimation)
+    ]
+    if unmeasured:
+        motion = task.rig.motion
+        own = set().union(
+            *(e.free_symbols for e in (motion.stiffness, motion.damping, motion.rest, motion.bias) if e),
+            motion.inertia.free_symbols if motion.inertia is not None else set(),
+        )
+        held |= {p.name for p in task.rig.parameters} - {symbol.name for symbol in own}
+    return frozenset(held)
+
+
+def _before(task: Task, bench: Workbench, estimation: Sequence[Record], linear: Scored) -> Scored:
+    """Score the given simulation; parameters that were not given are identified with the given ones held."""
+    if not task.given:
+        return linear
+    structure = compose(task.rig)
+    start = {**_start(task, estimation, {}), **linear.fit.values, **task.given}
+    missing = [name for name in bench.free_parameters(structure) if name not in task.given]
+    fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise).fit(start, missing)
+    if not fit.residuals:
+        raise InputError(f"The given simulation cannot be run: {fit.message}")
+    return bench.score((), fit)
+
+
+def _with_offset_rivals(
+    bench: Workbench,
+    ranking: Ranking,
+    effects: Sequence[Effect],
+    noise: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> Ranking:
+    """Let an even effect without a constant force compete where the best model needs a constant force.
+
+    A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
+    """
+    best = ranking.order[0]
+    bias = {symbol.name for symbol in bench.rig.motion.bias.free_symbols}
+    needed = [
+        name
+        for name in best.fit.free
+        if name in bias and abs(best.fit.values[name]) > _SIGNIFICANT * best.fit.standard_errors[name]
+    ]
+    if not (needed and bench.rig.is_driven) or best.effects[0].signature.even_harmonics:
+        return ranking
+    rivals = []
+    for effect in effects:
+        if effect.signature.even_harmonics and bench.rig.offers(effect):
+            without = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
+            base = replace(best, fit=without)
+            pair = (*best.effects, effect)
+            rivals.append(fit_candidate(bench, pair, base, {}, hold=frozenset(needed)))
+    return rank([*ranking.order, *refine(bench, rivals)], noise, rng)
+
+
+def _assembled(
+    task: Task,
+    bench: Workbench,
+    floors: Sequence[NoiseFloor],
+    before: Scored,
+    linear: Scored,
+    ranking: Ranking,
+    judgement: Judgement,
+    notes: Sequence[str],
+    length: float | None,
+    scored_on: str,
+) -> Diagnosis:
+    rig = task.rig
+    is_effect = judgement.verdict == "effect"
+    after = judgement.model if is_effect else (before if judgement.verdict == "none" else linear)
+    noise = {floor.output: floor for floor in floors}
+    measured = _measured(rig, bench.scoring)
+    gap = {
+        name: OutputGap(
+            before=nrmse(_column(rig, before, name), measured[name]),
+            reidentified=nrmse(_column(rig, linear, name), measured[name]),
+            after=nrmse(_column(rig, after, name), measured[name]),
+            noise_floor=noise[name].std / float(np.std(measured[name])),
+        )
+        for name in measured
+    }
+    share = _explained(judgement, ranking)
+    candidates = tuple(
+        _candidate(bench, model, probability * share)
+        for model, probability in zip(ranking.order, ranking.probabilities, strict=True)
+    )
+    chosen = judgement.model.effects if is_effect else ()
+    tied = tuple(model.names for model in ranking.tied) if is_effect else ()
+    places = judgement.model.effects if judgement.verdict in ("effect", "unknown") else ()
+    where = tuple(dict.fromkeys(rig.place_name(effect.place) for effect in places))
+    return Diagnosis(
+        title=task.title,
+        rig=rig.name,
+        verdict=judgement.verdict,
+        effects=tuple(effect.name for effect in chosen),
+        where=where,
+        ambiguous_with=tied,
+        candidates=candidates,
+        gap=gap,
+        noise_floors=tuple(floors),
+        traces=_traces(task, bench, before, linear, after),
+        units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
+        model=Model.of(after.fit.structure, after.fit.values, task.records[0].hold).to_json(),
+        notes=tuple(notes),
+        windows=length,
+        scored_on=scored_on,
+    )
+
+
+def _explained(judgement: Judgement, ranking: Ranking) -> float:
+    """Return the probability that the cause is among the candidates at all, from what the best leaves above the floor."""
+    if judgement.verdict in ("none", "parameters"):
+        return 0.0
+    if not ranking.order or not np.isfinite(ranking.order[0].excess):
+        return 0.0
+    left = max(ranking.order[0].excess - AT_FLOOR, 0.0)
+    if judgement.verdict == "unknown":
+        return 0.3 / (1.0 + left)
+    return 0.5 + 0.49 / (1.0 + left)
+
+
+def _column(rig: Rig, model: Scored, output: str) -> NDArray[np.float64]:
+    index = [signal.name for signal in rig.outputs].index(output)
+    column = np.concatenate([residual[:, index] for residual in model.residuals])
+    return np.asarray(column[np.isfinite(column)])
+
+
+def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, NDArray[np.float64]]:
+    measured = {}
+    for signal in rig.outputs:
+        parts = [record[signal.name] for record in records if signal.name in record]
+        if parts:
+            measured[signal.name] = np.concatenate(parts)
+    return measured
+
+
+def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate:
+    units = {p.name: p.unit for p in model.fit.structure.parameters}
+    measured = _measured(bench.rig, bench.scoring)
+    fitted = _measured(bench.rig, bench.estimation)
+    estimation = Scored(model.effects, model.fit, model.fit.residuals, (), 0.0)
+    return Candidate(
+        effects=model.names,
+        probability=probability,
+        validation_nrmse={
+            name: nrmse(_column(bench.rig, model, name), values) if model.residuals else float("inf")
+            for name, values in measured.items()
+        },
+        estimation_nrmse={
+            name: nrmse(_column(bench.rig, estimation, name), values) if model.fit.residuals else float("inf")
+            for name, values in fitted.items()
+        },
+        excess=model.excess,
+        parameters={
+            name: Estimate(model.fit.values[name], model.fit.standard_errors[name], units[name])
+            for name in model.fit.free
+        },
+        success=model.fit.success,
+        message=model.fit.message,
+    )
+
+
+def _traces(task: Task, bench: Workbench, before: Scored, linear: Scored, after: Scored) -> tuple[Trace, ...]:
+    """Return measured and simulated outputs of the scoring records, windows joined again."""
+    rig = task.rig
+    names = [signal.name for signal in rig.outputs]
+    joined: dict[str, list[int]] = {}
+    for index, record in enumerate(bench.scoring):
+        joined.setdefault(record.name.split(" window ")[0], []).append(index)
+    traces = []
+    for name, indices in joined.items():
+        parts = [bench.scoring[i] for i in indices]
+        first = parts[0]
+        measured = {n: np.concatenate([p[n] for p in parts]) for n in names if n in first}
+
+        def simulated(
+            model: Scored,
+            indices: Sequence[int] = indices,
+            measured: Mapping[str, NDArray[np.float64]] = measured,
+        ) -> dict[str, NDArray[np.float64]]:
+            residuals = np.concatenate([model.residuals[i] for i in indices])
+            return {n: measured[n] - residuals[:, names.index(n)] for n in measured}
+
+        traces.append(
+            Trace(
+                record=name,
+                role=first.role,
+                kind=first.kind,
+                amplitude=first.amplitude,
+                t=np.concatenate([p.t for p in parts]),
+                inputs={s.name: np.concatenate([p[s.name] for p in parts]) for s in rig.inputs},
+                measured=measured,
+                before=simulated(before),
+                reidentified=simulated(linear),
+                after=simulated(after),
+            )
+        )
+    return tuple(traces)

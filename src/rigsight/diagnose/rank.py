@@ -1,0 +1,106 @@
+"""How sure the ranking is: paired block bootstrap of the held-out errors, parsimony, ambiguity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.characterize import Scored
+
+_RESAMPLES = 1000
+_MIN_BLOCKS = 8
+_TIE = 0.01
+"""Relative difference of held-out errors that no engineer would build a decision on."""
+_MODEL_ERROR = 0.1
+"""Share of what the best model leaves above the noise floor that may be worth nothing for the comparison."""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Scored models in order with their probabilities.
+
+    Attributes
+    ----------
+    order
+        Models, the chosen one first, then by held-out error.
+    probabilities
+        Of each to be the cause among those tried.
+    tied
+        Models whose held-out error cannot be told from the chosen one's.
+    """
+
+    order: tuple[Scored, ...]
+    probabilities: tuple[float, ...]
+    tied: tuple[Scored, ...]
+
+
+def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Generator) -> Ranking:
+    """Rank models by held-out error; the simplest of those that tie with the best is chosen.
+
+    Parameters
+    ----------
+    models
+        Scored models.
+    noise
+        Noise floor of each output, shape (n_outputs,).
+    rng
+        Source of the resampling.
+
+    References
+    ----------
+    H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap.
+    """
+    usable = [m for m in models if m.residuals and np.isfinite(m.excess)]
+    failed = [m for m in models if m not in usable]
+    if not usable:
+        return Ranking(tuple(models), tuple(0.0 for _ in models), ())
+    squares = np.column_stack([_blocks(m, noise) for m in usable])
+    draws = rng.integers(0, squares.shape[0], size=(_RESAMPLES, squares.shape[0]))
+    means = np.mean(squares[draws], axis=1)
+    errors = np.sqrt(np.mean(squares, axis=0))
+    best = float(np.min(errors))
+    tolerance = np.hypot(_TIE, _MODEL_ERROR * max(best - 1.0, 0.0) / best)
+    resampled = np.sqrt(means)
+    floor = np.min(resampled, axis=1, keepdims=True)
+    # Of two models with as many numbers, the one with fewer effects is the simpler.
+    n_free = np.array([m.n_free + 0.1 * len(m.effects) for m in usable])
+    # In each resample the simplest model within the tolerance of the best wins.
+    within = resampled <= floor * (1.0 + tolerance)
+    complexity = np.where(within, n_free[None, :] + 0.01 * resampled / floor, np.inf)
+    wins = np.bincount(np.argmin(complexity, axis=1), minlength=len(usable)) / _RESAMPLES
+    likelihood = wins + 1e-3 * np.exp(-20.0 * (errors / best - 1.0))
+    probabilities = likelihood / np.sum(likelihood)
+    chosen = int(np.argmax(probabilities))
+    ratio = resampled / resampled[:, chosen : chosen + 1]
+    tied = [
+        i
+        for i in range(len(usable))
+        if i != chosen and float(np.quantile(ratio[:, i], 0.05)) <= 1.0 + tolerance
+    ]
+    rest = sorted((i for i in range(len(usable)) if i != chosen), key=lambda i: errors[i])
+    order = [chosen, *rest]
+    return Ranking(
+        order=(*(usable[i] for i in order), *failed),
+        probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
+        tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
+    )
+
+
+def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean squared weighted residual of blocks long enough to be independent, shape (n_blocks,)."""
+    series = [np.nanmean((residual / noise) ** 2, axis=1) for residual in model.residuals]
+    total = sum(s.size for s in series)
+    length = max(1, total // max(_MIN_BLOCKS, min(100, total // 200)))
+    blocks = []
+    for s in series:
+        count = max(1, s.size // length)
+        blocks += [float(np.mean(part)) for part in np.array_split(s, count)]
+    return np.array(blocks)
+
+
+def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> NDArray[np.float64]:
+    """Return the noise floor of each output in order; infinite for one that was never measured, shape (n_outputs,)."""
+    return np.array([noise.get(name, np.inf) for name in outputs])

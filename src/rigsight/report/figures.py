@@ -1,0 +1,91 @@
+"""How does a matplotlib figure get into the page? As SVG inside it, or as PNG where that is smaller."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup, escape
+
+from rigsight.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LARGEST_SVG = 300_000
+_PNG_DPI = 220
+_ID = re.compile(r'\bid="([^"]+)"')
+_REFERENCE = re.compile(r'(url\(#|xlink:href="#)([^")]+)')
+_NOISE = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->", re.DOTALL)
+_NAMESPACES = re.compile(r' xmlns(:xlink)?="[^"]*"')
+_SIZE = re.compile(r'(<svg\b[^>]*?) width="[^"]*"([^>]*?)')
+_HEIGHT = re.compile(r'(<svg\b[^>]*?) height="[^"]*"')
+
+
+@dataclass(frozen=True)
+class PageFigure:
+    """A figure as it stands in the page.
+
+    Attributes
+    ----------
+    key
+        Its id, unique in the page.
+    image
+        ``<svg>`` or ``<img>``.
+    caption
+        What it shows, for everyone.
+    """
+
+    key: str
+    image: Markup
+    caption: str
+
+
+def page_figure(figure: Figure, key: str, alt: str, caption: str) -> PageFigure:
+    """Return a figure for the page.
+
+    Parameters
+    ----------
+    figure
+        Drawn figure.
+    key
+        Id, unique in the page; letters, digits and hyphens.
+    alt
+        What it shows, for who cannot see it: the message with its numbers.
+    caption
+        What it shows, for everyone.
+    """
+    svg = _svg(figure, key, alt)
+    image = svg if len(svg) <= _LARGEST_SVG else _png(figure, alt)
+    return PageFigure(key, image, caption)
+
+
+def _svg(figure: Figure, key: str, alt: str) -> Markup:
+    import matplotlib as mpl
+
+    stream = io.StringIO()
+    with style():
+        mpl.rcParams["svg.hashsalt"] = key
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    text = stream.getvalue()
+    text = _NOISE.sub("", text[text.index("<svg") :])
+    text = _NAMESPACES.sub("", text)
+    # Ids of matplotlib repeat from figure to figure; in one page they must not.
+    text = _ID.sub(rf'id="{key}-\1"', text)
+    text = _REFERENCE.sub(rf"\g<1>{key}-\2", text).replace("xlink:href", "href")
+    text = _HEIGHT.sub(r"\1", _SIZE.sub(r"\1\2", text, count=1), count=1)
+    # The page's own sans serif face, where DejaVu is missing.
+    text = text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")
+    label = escape(alt)
+    return Markup(text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1).strip())
+
+
+def _png(figure: Figure, alt: str) -> Markup:
+    stream = io.BytesIO()
+    with style():
+        figure.savefig(stream, format="png", dpi=_PNG_DPI)
+    data = base64.b64encode(stream.getvalue()).decode("ascii")
+    return Markup('<img alt="{}" src="data:image/png;base64,{}">').format(alt, data)

@@ -1,0 +1,64 @@
+"""How is a number with its uncertainty written? Only the digits that the records support."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rigsight.diagnose.result import Estimate
+
+UNDETERMINED = "not determined by these records"
+
+
+@dataclass(frozen=True)
+class Written:
+    """A number as text: ``(value +/- std) * 10^exponent``.
+
+    Attributes
+    ----------
+    value, std
+        Digits; std is empty where there is none.
+    exponent
+        Power of ten outside the brackets, 0 for none.
+    """
+
+    value: str
+    std: str
+    exponent: int
+
+
+def written(value: float, std: float | None = None) -> Written:
+    """Return value and standard error with two significant digits of the error; four digits of a value without one."""
+    if not math.isfinite(value):
+        return Written("not finite", "", 0)
+    known = std is not None and math.isfinite(std) and std > 0.0
+    size = max(abs(value), std if known and std is not None else 0.0)
+    power = math.floor(math.log10(size)) if size > 0.0 else 0
+    exponent = power if power >= 5 or power <= -4 else 0
+    scale = 10.0**-exponent
+    if not known or std is None:
+        return Written(f"{value * scale:.4g}", "", exponent)
+    # At most ten digits: beyond, the standard error says more about the optimizer than about the rig.
+    decimals = min(max(0, 1 - math.floor(math.log10(std * scale))), 9)
+    return Written(f"{value * scale:.{decimals}f}", f"{std * scale:.{decimals}f}", exponent)
+
+
+def estimate_text(estimate: Estimate) -> str:
+    """Return an estimate in ASCII, e.g. ``"81.2 +/- 1.3 N m/rad"``."""
+    number = written(estimate.value, estimate.std)
+    unit = "" if estimate.unit in ("", "1") else f" {estimate.unit}"
+    power = f"e{number.exponent:+d}" if number.exponent else ""
+    if not math.isfinite(estimate.std):
+        return UNDETERMINED
+    if not number.std:
+        return f"{number.value}{power}{unit}"
+    inside = f"{number.value} +/- {number.std}"
+    return f"({inside}){power}{unit}" if power else f"{inside}{unit}"
+
+
+def gap_percent(value: float) -> str:
+    """Return an NRMSE as percent with three digits."""
+    if not math.isfinite(value):
+        return "not finite"
+    # Above 1000 % the model has left the record, and digits mean nothing.
+    return f"{100.0 * value:.3g} %" if value < 10.0 else f"{100.0 * value:.1e} %"

@@ -1,0 +1,103 @@
+"""A diagnosis as one self-contained HTML page: no script, no network, nothing beside the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from rigsight.diagnose.result import Diagnosis
+from rigsight.report import sections
+from rigsight.report.quantities import Written
+from rigsight.report.wording import (
+    after_label,
+    ambiguity_sentence,
+    basis_sentence,
+    effects_label,
+    excess,
+    percent,
+    sentence_case,
+    times_floor,
+    verdict_name,
+    verdict_sentence,
+)
+
+
+def render_report(
+    diagnosis: Diagnosis, command: str, versions: Mapping[str, str], seed: int | None = None
+) -> str:
+    """Return the report as one HTML page.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    command
+        The command line that made it.
+    versions
+        Package -> version, as in ``{"rigsight": "0.1.0", "numpy": "2.0.0"}``.
+    seed
+        Seed of everything random; None where nothing was.
+    """
+    environment = Environment(
+        loader=PackageLoader("rigsight.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters |= {"unit": _unit, "number": _number}
+    return environment.get_template("report.html.jinja").render(
+        diagnosis=diagnosis,
+        verdict_name=verdict_name(diagnosis),
+        verdict_sentence=verdict_sentence(diagnosis),
+        ambiguity_sentence=ambiguity_sentence(diagnosis),
+        basis_sentence=basis_sentence(diagnosis),
+        after_label=sentence_case(after_label(diagnosis)),
+        rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
+        effects=sections.effect_summaries(diagnosis),
+        left=[times_floor(excess(diagnosis, stage)) for stage in ("before", "reidentified", "after")],
+        probability=next(
+            (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
+        )
+        if diagnosis.effects
+        else "",
+        budget=sections.budget_figure(diagnosis),
+        budget_rows=sections.budget_rows(diagnosis),
+        ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
+        ranking_rows=sections.ranking_rows(diagnosis),
+        outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
+        parameters=sections.parameter_rows(diagnosis),
+        records=list(sections.record_views(diagnosis)),
+        floors=sections.floor_rows(diagnosis),
+        command=command,
+        versions=versions,
+        seed=seed,
+        made=datetime.now(UTC),
+    )
+
+
+def _unit(unit: str) -> Markup:
+    """Return a unit with its exponents raised; nothing for a dimensionless one."""
+    if unit in ("", "1"):
+        return Markup("")
+    parts = str(escape(unit)).split("^")
+    raised = [parts[0]]
+    for part in parts[1:]:
+        digits = len(part) - len(part.lstrip("-0123456789"))
+        raised.append(f"<sup>{part[:digits].replace('-', '&minus;')}</sup>{part[digits:]}")
+    return Markup("".join(raised))
+
+
+def _number(number: Written) -> Markup:
+    """Return a number as ``(3.100 ± 0.020) · 10<sup>5</sup>``."""
+    text = escape(number.value.replace("-", "\u2212"))
+    if number.std:
+        text = Markup("{} ± {}").format(text, number.std)
+    if not number.exponent:
+        return text
+    brackets = Markup("({})") if number.std else Markup("{}")
+    power = str(number.exponent).replace("-", "\u2212")
+    return brackets.format(text) + Markup(" · 10<sup>{}</sup>").format(power)

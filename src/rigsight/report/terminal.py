@@ -1,0 +1,87 @@
+"""The verdict in about ten lines for a terminal: plain ASCII of our own, color only as an extra."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from rigsight.diagnose.result import Candidate, Diagnosis
+from rigsight.report.quantities import estimate_text, gap_percent
+from rigsight.report.wording import (
+    TIMES,
+    after_label,
+    ambiguity_sentence,
+    basis_sentence,
+    effects_label,
+    named_candidate,
+    percent,
+    verdict_name,
+    verdict_sentence,
+)
+
+_RANKED = 3
+_COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A rich renderable that says the verdict, the gap, the ranking and the parameters of a diagnosis."""
+
+    diagnosis: Diagnosis
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the lines, in characters that the terminal's encoding has."""
+
+        def text(words: str, style: str = "") -> Text:
+            plain = words.replace(TIMES, "x")
+            return Text(plain.encode(options.encoding, "replace").decode(options.encoding), style)
+
+        diagnosis = self.diagnosis
+        yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
+        yield text(verdict_sentence(diagnosis))
+        if diagnosis.ambiguous_with:
+            yield text(ambiguity_sentence(diagnosis))
+        table = Table.grid(padding=(0, 2))
+        for subject, words in _rows(diagnosis):
+            table.add_row(text(subject, "bold"), text(words))
+        yield Padding(table, (0, 0, 0, 2), expand=False)
+        yield text(basis_sentence(diagnosis), "dim")
+
+
+def summary(diagnosis: Diagnosis) -> Summary:
+    """Return the diagnosis as a rich renderable of about ten lines.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    """
+    return Summary(diagnosis)
+
+
+def _rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    for output, gap in diagnosis.gap.items():
+        stages = f"{gap_percent(gap.before)} given, {gap_percent(gap.reidentified)} re-identified"
+        after = f", {gap_percent(gap.after)} {after_label(diagnosis)}" if diagnosis.effects else ""
+        floor = f" (noise floor {gap_percent(gap.noise_floor)})"
+        yield f"gap in {output}", f"{stages}{after}{floor}"
+    for rank, candidate in enumerate(diagnosis.candidates[:_RANKED], start=1):
+        yield f"candidate {rank}", _candidate(candidate)
+    named = named_candidate(diagnosis)
+    if named is not None and named.parameters:
+        yield (
+            "parameters",
+            "; ".join(f"{name} = {estimate_text(estimate)}" for name, estimate in named.parameters.items()),
+        )
+
+
+def _candidate(candidate: Candidate) -> str:
+    left = f"{candidate.excess:.3g} x floor" if math.isfinite(candidate.excess) else "could not be scored"
+    unfinished = "" if candidate.success else ", fit not converged"
+    return f"{effects_label(candidate.effects)}: probability {percent(candidate.probability)}, {left}{unfinished}"

@@ -1,0 +1,182 @@
+"""How does one say it in plain words? Sentences that the page and the terminal share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from rigsight.diagnose.result import Candidate, Diagnosis
+from rigsight.diagnose.verdict import AT_FLOOR
+
+TIMES = "\u00d7"
+_WITHOUT_EFFECT = "no effect, better numbers"
+_PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck"}
+_PLACES = {
+    "actuator": "at the actuator",
+    "sensor": "at the sensor",
+    "disturbance": "as a disturbance from outside",
+    "lateral_dynamics": "in the lateral dynamics",
+    "yaw_dynamics": "in the yaw dynamics",
+    "dynamics": "in the dynamics",
+}
+_VERDICT_NAMES = {
+    "effect": "Missing effect",
+    "parameters": "Wrong parameters",
+    "none": "No gap",
+    "unknown": "Unknown cause",
+}
+
+
+def listed(items: Iterable[str], last: str = "and") -> str:
+    """Return ``"a, b and c"``."""
+    texts = list(items)
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} {last} {texts[-1]}" if texts else ""
+
+
+def effect_label(name: str) -> str:
+    """Return an effect's name for people: ``"Bouc-Wen hysteresis"``."""
+    label = name.replace("_", " ")
+    for written, proper in _PROPER_NAMES.items():
+        label = label.replace(written, proper)
+    return label
+
+
+def effects_label(effects: Sequence[str]) -> str:
+    """Return the names of a set of effects for people."""
+    return listed(map(effect_label, effects)) or _WITHOUT_EFFECT
+
+
+def sentence_case(text: str) -> str:
+    """Return the text with a capital first letter, the rest untouched."""
+    return text[:1].upper() + text[1:]
+
+
+def place_label(where: str) -> str:
+    """Return a place with its preposition: ``"in the yaw dynamics"``."""
+    return _PLACES.get(where, f"in {where.replace('_', ' ')}")
+
+
+def verdict_name(diagnosis: Diagnosis) -> str:
+    """Return the verdict in two words."""
+    return _VERDICT_NAMES[diagnosis.verdict]
+
+
+def after_label(diagnosis: Diagnosis) -> str:
+    """Return what the simulation after the diagnosis is called in tables and legends."""
+    return {"effect": "with effect", "parameters": "better numbers", "none": "as given"}.get(
+        diagnosis.verdict, "re-identified"
+    )
+
+
+def percent(share: float) -> str:
+    """Return a share as percent; what is nearly but not quite all is not rounded up to all."""
+    if not math.isfinite(share):
+        return "an unknown share"
+    if share >= 1.0:
+        return "100 %"
+    if share > 0.999:
+        return "over 99.9 %"
+    return f"{100.0 * share:.1f} %" if share > 0.99 else f"{100.0 * share:.0f} %"
+
+
+def times_floor(excess: float) -> str:
+    """Return ``"1.04 × the noise floor"``."""
+    return (
+        f"{excess:.3g} {TIMES} the noise floor"
+        if math.isfinite(excess)
+        else "an unknown multiple of the noise floor"
+    )
+
+
+def named_candidate(diagnosis: Diagnosis) -> Candidate | None:
+    """Return the candidate that the verdict names; without an effect the one that stands for the re-identified equations."""
+    return next((c for c in diagnosis.candidates if c.effects == diagnosis.effects), None)
+
+
+def excess(diagnosis: Diagnosis, stage: str) -> float:
+    """Return the RMS left over all outputs in units of the noise floor.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    stage
+        ``"before"``, ``"reidentified"`` or ``"after"``.
+    """
+    ratios = [
+        getattr(gap, stage) / gap.noise_floor for gap in diagnosis.gap.values() if gap.noise_floor > 0.0
+    ]
+    return math.sqrt(sum(r * r for r in ratios) / len(ratios)) if ratios else math.nan
+
+
+def verdict_sentence(diagnosis: Diagnosis) -> str:
+    """Return the verdict in one plain sentence."""
+    before, after = excess(diagnosis, "before"), excess(diagnosis, "after")
+    if diagnosis.verdict == "effect":
+        return _effect_sentence(diagnosis)
+    if diagnosis.verdict == "parameters":
+        return (
+            f"The gap is caused by wrong parameters: the same equations with better numbers {_shrinks(diagnosis, 'close')}, "
+            f"down to {times_floor(after)}."
+        )
+    if diagnosis.verdict == "none":
+        if not before > AT_FLOOR:
+            return f"There is no gap to explain: the given simulation leaves {times_floor(before)}."
+        return (
+            f"The gap is too small against the noise to have a cause: the given simulation leaves {times_floor(before)}, "
+            f"and better numbers do not change that much."
+        )
+    return _unknown_sentence(diagnosis)
+
+
+def _effect_sentence(diagnosis: Diagnosis) -> str:
+    places = listed(dict.fromkeys(map(place_label, diagnosis.where)))
+    sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
+    it = "them" if len(diagnosis.effects) > 1 else "it"
+    left = times_floor(excess(diagnosis, "after"))
+    return (
+        f"The gap is {sure} by {effects_label(diagnosis.effects)}{' ' if places else ''}{places}; "
+        f"adding {it} {_shrinks(diagnosis, 'closes')}, down to {left}."
+    )
+
+
+def _unknown_sentence(diagnosis: Diagnosis) -> str:
+    scored = [c for c in diagnosis.candidates if c.effects and math.isfinite(c.excess)]
+    best = min(scored, key=lambda c: c.excess, default=None)
+    places = listed(dict.fromkeys(map(place_label, diagnosis.where)))
+    points = f"; the evidence points to something {places}" if places else ""
+    if best is None:
+        return f"The cause of the gap is unknown{points}."
+    return (
+        f"The cause of the gap is unknown: the best of {len(scored)} candidates, {effects_label(best.effects)}, "
+        f"still leaves {times_floor(best.excess)}{points}."
+    )
+
+
+def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
+    before, after = excess(diagnosis, "before"), excess(diagnosis, "after")
+    if not before > 1.0:
+        return f"{closes} none of it, as there is hardly any"
+    share = (before - after) / (before - 1.0)
+    # A set that stays below half a percent would read "closes 0 %".
+    return f"{closes} {percent(share)} of the gap" if share >= 0.005 else f"{closes} none of the gap"
+
+
+def ambiguity_sentence(diagnosis: Diagnosis) -> str:
+    """Return which other sets of effects explain the records as well; empty where there are none."""
+    if not diagnosis.ambiguous_with:
+        return ""
+    rivals = listed((effects_label(effects) for effects in diagnosis.ambiguous_with), "or")
+    return f"These records cannot tell {effects_label(diagnosis.effects)} from {rivals}."
+
+
+def basis_sentence(diagnosis: Diagnosis) -> str:
+    """Return on which records the errors were measured."""
+    windows = (
+        f" in windows of {diagnosis.windows:.3g} s, each with its own initial state"
+        if diagnosis.windows is not None
+        else ""
+    )
+    if diagnosis.scored_on == "validation":
+        return f"Errors are those of validation records, which were not fitted{windows}."
+    return f"There is no validation record: errors are those of the fitted records{windows}, and too good."

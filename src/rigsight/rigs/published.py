@@ -1,0 +1,139 @@
+"""Parameter sets that were published for a rig, each with its source."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import Any
+
+from rigsight.effects import effect_named
+from rigsight.errors import InputError, check_option
+from rigsight.parameters import Parameter, ParameterSet
+from rigsight.rigs import RIGS
+from rigsight.rigs.running_gear import creep_factor
+
+_KEYS = ("title", "source", "rig", "amplitude", "notes", "constants", "parameters", "effects")
+
+
+@dataclass(frozen=True)
+class PublishedSet:
+    """A published parameter set.
+
+    Attributes
+    ----------
+    name
+        Name of its file without the ending.
+    title
+        What it is, one line.
+    source
+        Publication and table.
+    rig
+        Name of the rig.
+    constants
+        Value of each constant of the rig.
+    parameters
+        Value of each parameter of the rig.
+    effects
+        Effect -> its parameter values.
+    given
+        Values as the source prints them, where it gives an alternative parameter (conicity instead of creep factor).
+    amplitude
+        Amplitude of the input the set was fitted at, None if it claims to hold at every one.
+    notes
+        What to know before using it.
+    """
+
+    name: str
+    title: str
+    source: str
+    rig: str
+    constants: Mapping[str, float]
+    parameters: Mapping[str, float]
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    given: Mapping[str, float] = field(default_factory=dict)
+    amplitude: float | None = None
+    notes: str = ""
+
+    def values(self) -> dict[str, float]:
+        """Return all values by name, as a simulation of the rig with these effects takes them."""
+        merged = {**self.constants, **self.parameters}
+        for own in self.effects.values():
+            merged.update(own)
+        return merged
+
+
+@cache
+def published_sets() -> Mapping[str, PublishedSet]:
+    """Return the published sets by name, in alphabetical order."""
+    folder = files("rigsight.rigs").joinpath("parameter_sets")
+    found = sorted(
+        (file for file in folder.iterdir() if file.name.endswith(".toml")), key=lambda file: file.name
+    )
+    return {_name(file): parse_published_set(_name(file), file.read_text("utf-8")) for file in found}
+
+
+def _name(file: Traversable) -> str:
+    return file.name.removesuffix(".toml")
+
+
+def parse_published_set(name: str, text: str) -> PublishedSet:
+    """Read a published set from TOML.
+
+    Parameters
+    ----------
+    name
+        How the set is called.
+    text
+        TOML with title, source, rig, and the tables constants, parameters and effects.
+
+    Raises
+    ------
+    InputError
+        If the text is no TOML, a key is missing or unknown, or a value is outside what rig and effects declare.
+    """
+    try:
+        content = tomllib.loads(text)
+        for key in content:
+            check_option("Key", key, _KEYS)
+        missing = [key for key in ("title", "source", "rig", "constants", "parameters") if key not in content]
+        if missing:
+            raise InputError(f"Missing: {', '.join(missing)}.")
+        return _checked(name, content)
+    except (tomllib.TOMLDecodeError, InputError) as error:
+        raise InputError(f"Parameter set '{name}': {error}") from error
+
+
+def _checked(name: str, content: dict[str, Any]) -> PublishedSet:
+    rig = RIGS[check_option("rig", content["rig"], RIGS)]
+    constants = _values(rig.constants, content["constants"])
+    alternatives = {p.name: p for p in rig.alternative_parameters}
+    given = {
+        key: alternatives[key].check(v) for key, v in content["parameters"].items() if key in alternatives
+    }
+    own = {key: value for key, value in content["parameters"].items() if key not in given}
+    if "delta_0" in given:
+        own["c_y"] = creep_factor(given["delta_0"], constants["r_0"], constants["b"])
+    return PublishedSet(
+        name=name,
+        title=str(content["title"]),
+        source=str(content["source"]),
+        rig=rig.name,
+        constants=constants,
+        parameters=_values(rig.parameters, own),
+        effects={
+            effect: _values(effect_named(effect).parameters, values)
+            for effect, values in content.get("effects", {}).items()
+        },
+        given=given,
+        amplitude=content.get("amplitude"),
+        notes=str(content.get("notes", "")),
+    )
+
+
+def _values(parameters: tuple[Parameter, ...], values: Mapping[str, float]) -> dict[str, float]:
+    defaults = {p.name: p.default for p in parameters if p.default is not None}
+    return ParameterSet.from_mapping(parameters, {**defaults, **values}).to_mapping()

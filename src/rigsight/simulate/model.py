@@ -1,0 +1,63 @@
+"""A complete simulation as data: rig, effects, every number, the hold of the input."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rigsight.effects import Effect
+from rigsight.simulate.input_hold import Hold
+from rigsight.simulate.structure import Structure, compose
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Model:
+    """A simulation that needs nothing else.
+
+    Attributes
+    ----------
+    structure
+        Rig and effects; no parameter is written into the equations as a number.
+    values
+        Value of every parameter.
+    hold
+        How the input behaves between samples.
+    """
+
+    structure: Structure
+    values: dict[str, float]
+    hold: Hold
+
+    @classmethod
+    def of(cls, structure: Structure, values: Mapping[str, float], hold: Hold) -> Model:
+        """Make a model of a fitted structure, with numbers that were written into its equations as parameters again."""
+        complete = {**values, **dict(structure.fixed)}
+        whole = compose(structure.rig, structure.effects)
+        return cls(whole, {name: complete[name] for name in whole.names}, hold)
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of the model."""
+        return self.structure.effects
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``model.json``."""
+        rig = self.structure.rig
+        constants = {p.name for p in rig.constants}
+        own = {p.name for p in rig.parameters}
+        units = {p.name: p.unit for p in self.structure.parameters}
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "rig": rig.name,
+            "hold": self.hold,
+            "constants": {n: v for n, v in self.values.items() if n in constants},
+            "parameters": {n: v for n, v in self.values.items() if n in own},
+            "effects": [effect.name for effect in self.effects],
+            "effect_parameters": {
+                n: v for n, v in self.values.items() if n not in constants and n not in own
+            },
+            "units": units,
+        }

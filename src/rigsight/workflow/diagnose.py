@@ -1,0 +1,114 @@
+"""What `rigsight diagnose` does: a campaign -> `diagnosis.json`, `model.json` and `report.html`, together."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.effects import CATALOGUE, Effect
+from rigsight.report import render_report
+from rigsight.rigs.running_gear import creep_factor
+from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
+from rigsight.workflow.model_file import MODEL_FILE
+from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.results import check_writable, json_text, write_together
+
+DIAGNOSIS_FILE = "diagnosis.json"
+REPORT_FILE = "report.html"
+DIAGNOSING = "Diagnosing"
+_VERSIONS_OF = ("rigsight", "numpy", "scipy", "numba")
+# Noise floor, re-identified equations and the given simulation, before the candidates.
+_STEPS_BEFORE_CANDIDATES = 3
+
+
+def run_diagnose(
+    campaign: str | Path,
+    out: str | Path | None = None,
+    *,
+    effects: Sequence[Effect] = CATALOGUE,
+    seed: int = 0,
+    n_jobs: int | None = None,
+    listener: Listener = silent,
+    command: str | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between the simulation that a campaign gives and its records.
+
+    Parameters
+    ----------
+    campaign
+        The toml file or its folder.
+    out
+        Folder for ``diagnosis.json``, ``model.json`` and ``report.html``; None writes nothing.
+    effects
+        Candidates.
+    seed
+        Seed of the resampling behind probabilities.
+    n_jobs
+        Candidates fitted at the same time; None for one per processor.
+    listener
+        Told of every finished step.
+    command
+        The command line that a report quotes.
+
+    Raises
+    ------
+    InputError
+        If the campaign cannot be used or the results cannot be written; nothing is written then.
+    SimulationError
+        If the given simulation cannot be run.
+    """
+    jobs = checked_jobs(n_jobs)
+    if out is not None:
+        check_writable(Path(out))
+    read = read_campaign(campaign)
+    candidates = [effect for effect in effects if read.rig.offers(effect)]
+    prepare_kernels(structures_to_try(read.rig, candidates), jobs, listener)
+    stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
+    diagnosis = diagnose(task_of(read), candidates, seed=seed, n_jobs=jobs, progress=stage.finished)
+    if out is not None:
+        write_diagnosis(
+            diagnosis, Path(out), command or f"rigsight diagnose {shlex.quote(str(campaign))}", seed
+        )
+    return diagnosis
+
+
+def task_of(campaign: Campaign) -> Task:
+    """Return what a campaign asks to be diagnosed, with alternative parameters turned into the rig's own."""
+    given = dict(campaign.parameters)
+    if "delta_0" in given:
+        given["c_y"] = creep_factor(given.pop("delta_0"), campaign.constants["r_0"], campaign.constants["b"])
+    return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records)
+
+
+def write_diagnosis(diagnosis: Diagnosis, out: Path, command: str, seed: int) -> tuple[Path, ...]:
+    """Write the three results of a diagnosis into a folder, all or none.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    return write_together(
+        out,
+        {
+            DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
+            MODEL_FILE: json_text(diagnosis.model),
+            REPORT_FILE: render_report(diagnosis, command=command, versions=versions(), seed=seed),
+        },
+    )
+
+
+def versions() -> dict[str, str]:
+    """Return the versions on which figures depend, by package."""
+    found = {"python": platform.python_version()}
+    for package in _VERSIONS_OF:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found

@@ -1,0 +1,92 @@
+"""Which kernels a diagnosis needs, and how are they compiled before it starts?"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterable, Sequence
+
+from joblib import Parallel, delayed
+
+from rigsight.effects import Effect
+from rigsight.errors import check_in_range
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, compose
+from rigsight.simulate.precompile import compile_kernels, compiled
+from rigsight.workflow.progress import Listener, Stage, silent
+
+COMPILING = "Compiling kernels (first run on this machine only)"
+_MOST_JOBS = 1024
+
+
+def checked_jobs(n_jobs: int | None) -> int:
+    """Return the number of jobs to run side by side: one per processor that this process may use, unless it is given.
+
+    Raises
+    ------
+    InputError
+        If it is not between 1 and 1024.
+    """
+    if n_jobs is not None:
+        return int(check_in_range("The number of jobs", n_jobs, 1, _MOST_JOBS))
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def structures_to_try(rig: Rig, effects: Iterable[Effect]) -> list[Structure]:
+    """Return the structures that a diagnosis simulates first: the rig alone, and with each effect that makes sense on it."""
+    offered = [effect for effect in effects if rig.offers(effect)]
+    return [compose(rig), *(compose(rig, (effect,), effect.special_cases) for effect in offered)]
+
+
+def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:
+    """Compile what this machine does not hold yet, several at a time.
+
+    Parameters
+    ----------
+    structures
+        What is going to be simulated.
+    n_jobs
+        Processes.
+    listener
+        Told of every compiled kernel; not at all where there is nothing to compile.
+
+    Raises
+    ------
+    InputError
+        If the cache folder cannot be written.
+    """
+    missing = [structure for structure in structures if not compiled(structure)]
+    if not missing:
+        return
+    stage = Stage(COMPILING, len(missing), listener)
+    n_jobs = min(n_jobs, len(missing))
+    if n_jobs < 2:
+        for structure in missing:
+            compile_kernels(structure)
+            stage.finished(_described(structure))
+        return
+    # Processes that ignore Ctrl-C do not each print a traceback; joblib ends them when this process is interrupted.
+    parallel = Parallel(
+        n_jobs=n_jobs,
+        backend="loky",
+        return_as="generator_unordered",
+        batch_size=1,
+        initializer=_ignore_interrupts,
+    )
+    for name in parallel(delayed(_compile)(structure) for structure in missing):
+        stage.finished(name)
+
+
+def _compile(structure: Structure) -> str:
+    compile_kernels(structure)
+    return _described(structure)
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _described(structure: Structure) -> str:
+    return ", ".join(structure.effect_names) or structure.rig.name

@@ -1,0 +1,211 @@
+"""How does a `model.json` become a simulation, and what is a user told who wrote or edited one?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigsight.effects import CATALOGUE, effect_named
+from rigsight.errors import InputError, nearest
+from rigsight.records import Hold
+from rigsight.rigs import RIGS
+from rigsight.simulate import Structure, compose
+from rigsight.simulate.model import SCHEMA_VERSION, Model
+
+MODEL_FILE = "model.json"
+LARGEST_FILE = 10_000_000
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+_GROUPS = ("constants", "parameters", "effect_parameters")
+
+
+class ModelTable(BaseModel):
+    """The whole file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    schema_version: Literal[1]
+    rig: str
+    hold: Hold = "foh"
+    constants: dict[str, Number] = {}
+    parameters: dict[str, Number] = {}
+    effects: Annotated[list[str], Field(max_length=50)] = []
+    effect_parameters: dict[str, Number] = {}
+    units: dict[str, str] = {}
+
+
+def read_model(model: str | Path) -> Model:
+    """Read a model.
+
+    Parameters
+    ----------
+    model
+        A ``model.json`` or the folder that holds one.
+
+    Raises
+    ------
+    InputError
+        Naming file and key, or line and column, of what cannot be used, and the mend.
+    """
+    path = _locate(Path(model))
+    table = _checked_table(path, _data(path))
+    structure = _structure(path, table)
+    return Model(structure, _values(path, structure, table), table.hold)
+
+
+def _locate(model: Path) -> Path:
+    if not model.exists():
+        raise InputError(f"{model} does not exist; name a {MODEL_FILE} or the folder that holds one.")
+    if not model.is_dir():
+        return model
+    path = model / MODEL_FILE
+    if not path.is_file():
+        raise InputError(
+            f"Folder {model} holds no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
+        )
+    return path
+
+
+def _data(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no model.")
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); it is no model.") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    try:
+        data = json.loads(text, object_pairs_hook=_without_repeated_keys, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. "
+            f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
+        ) from None
+    except (_NoModelError, ValueError, RecursionError) as error:
+        raise InputError(f"{path.name}: {error}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path.name}: must hold one object in braces, got a {type(data).__name__}.")
+    return data
+
+
+class _NoModelError(Exception):
+    """JSON that Python would read but that means nothing."""
+
+
+def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in content:
+            raise _NoModelError(f"the key '{key}' stands twice in one table; remove one.")
+        content[key] = value
+    return content
+
+
+def _refuse_constant(name: str) -> float:
+    raise _NoModelError(f"{name} is no number that a simulation can use; give finite numbers.")
+
+
+def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:
+    try:
+        return ModelTable.model_validate(data)
+    except ValidationError as error:
+        told = [_tell(path, problem) for problem in map(dict, error.errors(include_url=False))]
+        more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
+        raise InputError("\n".join(told[:5]) + more) from None
+
+
+def _tell(path: Path, problem: dict[str, Any]) -> str:
+    key = ".".join(map(str, problem["loc"]))
+    start, kind, got = f"{path.name}: {key}: ", problem["type"], problem["input"]
+    if kind == "extra_forbidden":
+        known = list(ModelTable.model_fields)
+        return f"{start}unknown key.{nearest(key, known)} Allowed: {', '.join(known)}."
+    if kind == "missing":
+        return f"{start}is missing."
+    if key == "schema_version":
+        return (
+            f"{start}is {got!r}, this version reads {SCHEMA_VERSION}. Use the rigsight that wrote the model."
+        )
+    if kind == "literal_error":
+        options = str(problem["ctx"]["expected"]).replace(" or ", ", ")
+        return f"{start}is {got!r}. Allowed: {options}."
+    if kind == "float_type":
+        return f"{start}must be a number, got {got!r}."
+    if kind == "finite_number":
+        return f"{start}must be a finite number, got {got}."
+    message = str(problem["msg"])
+    return f"{start}{message[0].lower()}{message[1:]}, got {got!r}."
+
+
+def _structure(path: Path, table: ModelTable) -> Structure:
+    if table.rig not in RIGS:
+        raise InputError(
+            f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, RIGS)} Allowed: {', '.join(RIGS)}."
+        )
+    known = [effect.name for effect in CATALOGUE]
+    for name in table.effects:
+        if name not in known:
+            raise InputError(
+                f"{path.name}: effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
+            )
+    try:
+        return compose(RIGS[table.rig], [effect_named(name) for name in table.effects])
+    except InputError as error:
+        raise InputError(f"{path.name}: effects: {error}") from None
+
+
+def _values(path: Path, structure: Structure, table: ModelTable) -> dict[str, float]:
+    """Return the value of every parameter; one with a default may be left out of a model written by hand."""
+    rig = structure.rig
+    known = {p.name: p for p in structure.parameters}
+    constants = [p.name for p in rig.constants]
+    parameters = [p.name for p in rig.parameters]
+    of_effects = [name for name in known if name not in (*constants, *parameters)]
+    values: dict[str, float] = {}
+    missing: list[str] = []
+    for group, names in zip(_GROUPS, (constants, parameters, of_effects), strict=True):
+        given: dict[str, float] = getattr(table, group)
+        for name in given:
+            if name not in names:
+                listed = ", ".join(names) or "none"
+                raise InputError(
+                    f"{path.name}: {group}.{name}: unknown to {_described(structure)}.{nearest(name, names)} Known: {listed}."
+                )
+        for name in names:
+            value = given.get(name, known[name].default)
+            if value is None:
+                missing.append(f"{group}.{name}")
+                continue
+            try:
+                values[name] = known[name].check(value)
+            except InputError as error:
+                raise InputError(f"{path.name}: {group}.{name}: {error}") from None
+    if missing:
+        raise InputError(
+            f"{path.name}: {_described(structure)} needs {', '.join(missing)}; give a number for each."
+        )
+    _check_units(path, structure, table)
+    return {name: values[name] for name in structure.names}
+
+
+def _described(structure: Structure) -> str:
+    effects = " and ".join(structure.effect_names)
+    return f"{structure.rig.name} with {effects}" if effects else structure.rig.name
+
+
+def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
+    """Refuse another unit than the one the number is taken in: nothing is converted by it."""
+    units = {p.name: p.unit for p in structure.parameters}
+    for name, unit in table.units.items():
+        if name not in units:
+            raise InputError(
+                f"{path.name}: units.{name}: unknown to {_described(structure)}.{nearest(name, units)}"
+            )
+        if unit != units[name]:
+            raise InputError(
+                f"{path.name}: units.{name}: is '{unit}', but numbers are taken in '{units[name]}'. Convert the value instead."
+            )

@@ -1,0 +1,50 @@
+"""What a command says while it works: finished steps of a known number, for whoever wants to listen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Step:
+    """One finished step.
+
+    Attributes
+    ----------
+    stage
+        What is being done.
+    detail
+        What has just been finished; empty at the start of a stage.
+    done, total
+        Steps of the stage that are finished, and all of them.
+    """
+
+    stage: str
+    detail: str
+    done: int
+    total: int
+
+
+Listener = Callable[[Step], None]
+
+
+def silent(step: Step) -> None:
+    """Ignore a step."""
+
+
+class Stage:
+    """Counts the steps of one stage and tells a listener; more steps than announced raise the total."""
+
+    def __init__(self, name: str, total: int, listener: Listener) -> None:
+        self._name = name
+        self._total = total
+        self._listener = listener
+        self._done = 0
+        listener(Step(name, "", 0, total))
+
+    def finished(self, detail: str) -> None:
+        """Tell that one more step is finished."""
+        self._done += 1
+        self._total = max(self._total, self._done)
+        self._listener(Step(self._name, detail, self._done, self._total))

@@ -1,0 +1,101 @@
+"""What `rigsight simulate` does: a model and the input of a record -> the outputs that the model predicts."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, nearest
+from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records.read_record import TIME
+from rigsight.simulate import parameter_vector, record_input, rest_state, simulate
+from rigsight.simulate.model import Model
+from rigsight.workflow.model_file import read_model
+from rigsight.workflow.results import check_target, write_together
+
+_DIGITS = "%.12g"
+
+
+def run_simulate(
+    model: str | Path,
+    record: str | Path,
+    out: str | Path | None = None,
+    *,
+    columns: Mapping[str, ColumnMapping] | None = None,
+    initial_state: Mapping[str, float] | None = None,
+) -> Record:
+    """Simulate a model for the input of a record.
+
+    Parameters
+    ----------
+    model
+        A ``model.json`` or the folder that holds one.
+    record
+        Delimited text file with time and input; other columns are not read.
+    out
+        CSV file for time, input and simulated outputs; None writes nothing.
+    columns
+        Where time ``t`` and the input stand; by default in columns of their own names.
+    initial_state
+        States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
+        input sample.
+
+    Raises
+    ------
+    InputError
+        If model or record cannot be used or the result cannot be written.
+    SimulationError
+        If the motion leaves the range of numbers or the model is too stiff.
+    """
+    read = read_model(model)
+    rig = read.structure.rig
+    columns = columns or {}
+    known = [TIME, *(signal.name for signal in rig.inputs)]
+    for name in columns:
+        if name not in known:
+            raise InputError(
+                f"Column mapping '{name}': a simulation of {rig.name} does not read it.{nearest(name, known)} "
+                f"It reads: {', '.join(known)}."
+            )
+    if out is not None:
+        check_target(Path(out))
+    driven = read_record(Path(record), rig.inputs, (), columns=columns, require_outputs=False, hold=read.hold)
+    state = _initial_state(read, driven, initial_state) if initial_state else None
+    simulated = simulate(read.structure, read.values, driven, state)
+    if out is not None:
+        names = [signal.name for signal in (*rig.inputs, *rig.outputs)]
+        file = Path(out)
+        write_together(file.parent, {file.name: _csv_text(simulated, names)})
+    return simulated
+
+
+def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> NDArray[np.float64]:
+    structure = model.structure
+    names = list(structure.state_names)
+    # The displacement is state and output; the output's name is the one that a user has seen.
+    aliases = {structure.rig.outputs[0].name: names[0]} if structure.rig.is_driven else {}
+    vector = parameter_vector(structure, model.values)
+    state = rest_state(structure, vector, record_input(structure, record))
+    for name, value in given.items():
+        own = aliases.get(name, name)
+        if own not in names:
+            known = list(dict.fromkeys([*aliases, *(n for n in names if n not in aliases.values())]))
+            raise InputError(
+                f"Initial state '{name}' is unknown.{nearest(name, known)} The model's states: {', '.join(known) or 'none'}."
+            )
+        if not math.isfinite(value):
+            raise InputError(f"Initial state '{name}' must be a finite number, got {value}.")
+        state[names.index(own)] = value
+    return state
+
+
+def _csv_text(record: Record, names: list[str]) -> str:
+    file = io.StringIO()
+    table = np.column_stack([record.t, *(record[name] for name in names)])
+    np.savetxt(file, table, fmt=_DIGITS, delimiter=",", header=",".join([TIME, *names]), comments="")
+    return file.getvalue()

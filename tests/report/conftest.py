@@ -1,0 +1,158 @@
+"""A synthetic diagnosis, made without simulating: signals of the right shape, numbers of the right size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, NoiseFloor, OutputGap, Trace
+
+NOISE = {"psi": 4e-4, "y": 3e-5, "force": 12.0}
+SIZE = {"psi": 0.06, "y": 0.004, "force": 900.0}
+UNITS = {"u": "A", "psi": "rad", "y": "m", "x": "m", "force": "N"}
+
+
+def trace(
+    record: str, role: str, outputs: tuple[str, ...], n_samples: int = 2000, amplitude: float | None = 0.5
+) -> Trace:
+    rng = np.random.default_rng(len(record))
+    t = 0.005 * np.arange(n_samples)
+    phase = 2 * np.pi * (0.2 * t + 0.5 * 2.8 / t[-1] * t**2)
+    bump = 1.0 + 1.5 * np.exp(-(((t - 0.6 * t[-1]) / (0.1 * t[-1])) ** 2))
+    measured, before, reidentified, after = {}, {}, {}, {}
+    for output in outputs:
+        truth = SIZE[output] * bump * np.sin(phase)
+        measured[output] = truth + NOISE[output] * rng.standard_normal(n_samples)
+        before[output] = 0.8 * SIZE[output] * bump * np.sin(phase - 0.35)
+        reidentified[output] = 0.9 * SIZE[output] * bump * np.sin(phase - 0.15)
+        after[output] = truth + 0.2 * NOISE[output] * np.sin(3 * t)
+    source = "x" if "force" in outputs else "u"
+    return Trace(
+        record, role, "sweep", amplitude, t, {source: np.sin(phase)}, measured, before, reidentified, after
+    )
+
+
+def candidate(effects: tuple[str, ...], probability: float, excess: float, **fields: Any) -> Candidate:
+    floor = {"psi": 0.009, "y": 0.011}
+    values: dict[str, Any] = {
+        "effects": effects,
+        "probability": probability,
+        "validation_nrmse": {name: excess * f for name, f in floor.items()},
+        "estimation_nrmse": {name: 0.9 * excess * f for name, f in floor.items()},
+        "excess": excess,
+        "parameters": {
+            "J_z": Estimate(0.5612, 0.0021, "kg m^2"),
+            "k_c": Estimate(700.4, 1.7, "N m/rad"),
+            "k_d": Estimate(2.04, 0.4, "N m s/rad"),
+            "a": Estimate(0.0903, 0.0011, "1"),
+            "beta": Estimate(1203.0, 31.0, "1/rad"),
+            "gamma": Estimate(497.0, float("inf"), "1/rad"),
+            "k_3": Estimate(-3.1e5, 2.0e3, "N m/rad^3"),
+        },
+        "success": True,
+        "message": "converged",
+    }
+    return Candidate(**{**values, **fields})
+
+
+@pytest.fixture(scope="session")
+def diagnosis() -> Diagnosis:
+    """An effect named with a look-alike, two outputs, a record without y, a fit that failed."""
+    return Diagnosis(
+        title="rear axle, March",
+        rig="running_gear",
+        verdict="effect",
+        effects=("bouc_wen_hysteresis",),
+        where=("yaw_dynamics",),
+        ambiguous_with=(("coulomb_friction", "cubic_stiffness"),),
+        candidates=(
+            candidate(("bouc_wen_hysteresis",), 0.91, 1.04),
+            candidate(("coulomb_friction", "cubic_stiffness"), 0.06, 1.06),
+            candidate(("stribeck_friction",), 0.01, 3.2),
+            candidate(("cubic_stiffness",), 0.0, 8.4, success=False, message="step limit reached"),
+            candidate((), 0.0, 14.4),
+            candidate(("end_stop",), 0.0, float("inf"), success=False, message="left the range of numbers"),
+        ),
+        gap={"psi": OutputGap(0.42, 0.13, 0.0094, 0.009), "y": OutputGap(0.38, 0.15, 0.0113, 0.011)},
+        noise_floors=(
+            NoiseFloor("psi", "rad", NOISE["psi"], "stretches in which the input rests"),
+            NoiseFloor("y", "m", NOISE["y"], "top of the spectrum (white noise only)"),
+        ),
+        traces=(
+            trace("sweep_A0.75.csv", "validation", ("psi", "y"), amplitude=0.75),
+            trace("step_A0.6.csv", "validation", ("psi",), 700, amplitude=0.6),
+            trace("sweep_A0.25.csv", "estimation", ("psi", "y"), amplitude=0.25),
+        ),
+        units=UNITS,
+        model={"parameters": {"J_z": 0.56}, "effect_parameters": {}, "units": {"J_z": "kg m^2"}},
+        notes=("Record step_A0.6.csv holds no y.", "With the effect the simulation reaches the noise floor."),
+    )
+
+
+@pytest.fixture(scope="session")
+def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
+    """Diagnoses of other kinds, by name."""
+    nothing = {"effects": (), "where": (), "ambiguous_with": ()}
+    hostile = "<script>alert(\"1\")</script> & $x_1$ 'q'"
+    changes: dict[str, dict[str, Any]] = {
+        "effect": {},
+        "two effects": {
+            "effects": ("coulomb_friction", "cubic_stiffness"),
+            "ambiguous_with": (),
+        },
+        "own effect": {
+            "effects": ("my_gear",),
+            "ambiguous_with": (),
+            "candidates": (candidate(("my_gear",), 0.9, 1.0),),
+        },
+        "parameters": {
+            **nothing,
+            "verdict": "parameters",
+            "candidates": (candidate(("cubic_stiffness",), 0.0, 1.01), candidate((), 0.0, 1.02)),
+            "gap": {"psi": OutputGap(0.42, 0.0092, 0.0092, 0.009)},
+        },
+        "none": {**nothing, "verdict": "none", "gap": {"psi": OutputGap(0.0092, 0.0091, 0.0092, 0.009)}},
+        "no candidates": {
+            **nothing,
+            "verdict": "unknown",
+            "candidates": (),
+            "noise_floors": (),
+            "traces": (),
+            "notes": (),
+        },
+        "unknown": {**nothing, "verdict": "unknown", "where": ("yaw_dynamics",)},
+        "not finite": {"gap": {"psi": OutputGap(float("nan"), float("inf"), 0.01, 0.009)}},
+        "no validation": {
+            "scored_on": "estimation",
+            "windows": 12.5,
+            "traces": (trace("all.csv", "estimation", ("psi", "y")),),
+        },
+        "element": {
+            "rig": "element",
+            "where": ("dynamics",),
+            "gap": {"force": OutputGap(0.3, 0.25, 0.012, 0.011)},
+            "noise_floors": (NoiseFloor("force", "N", 12.0, "repeated periods of the input"),),
+            "traces": (trace("bench.csv", "validation", ("force",), amplitude=None),),
+        },
+        "hostile": {
+            "title": hostile,
+            "rig": "a<b",
+            "effects": ("x<y>",),
+            "ambiguous_with": (("$a_1$",),),
+            "where": ("p<q",),
+            "notes": (hostile,),
+            "candidates": (candidate(("x<y>",), 0.9, 1.0, message=hostile, success=False),),
+            "traces": (trace(hostile, "validation", ("psi",)),),
+        },
+        "long": {
+            "traces": tuple(
+                trace(f"sweep {i}", "validation" if i < 2 else "estimation", ("psi", "y"), 20_000)
+                for i in range(5)
+            )
+        },
+    }
+    return lambda name: replace(diagnosis, **changes[name])

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from rigsight.diagnose.result import Diagnosis
+from rigsight.report import summary
+
+
+def printed(diagnosis: Diagnosis, encoding: str = "ascii", width: int = 200) -> list[str]:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    Console(file=stream, width=width, color_system=None).print(summary(diagnosis))
+    stream.seek(0)
+    return stream.read().splitlines()
+
+
+def test_ten_lines_say_verdict_gap_ranking_and_parameters(diagnosis: Diagnosis) -> None:
+    lines = printed(diagnosis)
+    assert 7 <= len(lines) <= 12
+    text = "\n".join(lines)
+    assert "Missing effect: rear axle, March" in text
+    assert "down to 1.04 x the noise floor" in text
+    assert "42 % given, 13 % re-identified, 0.94 % with effect (noise floor 0.9 %)" in text
+    assert "Bouc-Wen hysteresis: probability 91 %, 1.04 x floor" in text
+    assert "k_c = 700.4 +/- 1.7 N m/rad" in text
+    assert "gamma = not determined by these records" in text
+
+
+@pytest.mark.parametrize(
+    "name", ["parameters", "none", "unknown", "no candidates", "not finite", "element", "hostile"]
+)
+def test_every_kind_of_result_has_a_summary(variant: Callable[[str], Diagnosis], name: str) -> None:
+    assert len(printed(variant(name))) >= 3
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_title_that_the_terminal_cannot_write_does_no_harm(diagnosis: Diagnosis, encoding: str) -> None:
+    titled = replace(diagnosis, title="Hinterachse, März — 測定 [bold]\x1b[31m")
+    first = printed(titled, encoding)[0]
+    assert "Hinterachse, M" in first
+    assert "[bold]" in first
+    assert "\x1b" not in first
+
+
+def test_a_narrow_terminal_wraps(diagnosis: Diagnosis) -> None:
+    assert max(map(len, printed(diagnosis, width=60))) <= 60

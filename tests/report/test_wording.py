@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.report.quantities import Written, estimate_text, written
+from rigsight.report.wording import percent, verdict_sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("two effects", "caused by Coulomb friction and cubic stiffness in the yaw dynamics; adding them closes"),
+        ("own effect", "caused by my gear"),
+        ("parameters", "caused by wrong parameters: the same equations with better numbers closes"),
+        ("none", "no gap to explain: the given simulation leaves 1.02 × the noise floor"),
+        ("unknown", "unknown: the best of 4 candidates, Bouc-Wen hysteresis, still leaves 1.04 × the noise floor; "
+                    "the evidence points to something in the yaw dynamics."),
+        ("no candidates", "The cause of the gap is unknown."),
+        ("element", "in the dynamics"),
+    ],
+)  # fmt: skip
+def test_the_verdict_is_one_plain_sentence(
+    variant: Callable[[str], Diagnosis], name: str, words: str
+) -> None:
+    sentence = verdict_sentence(variant(name))
+    assert words.replace("numbers closes", "numbers close") in sentence.replace(
+        "numbers closes", "numbers close"
+    )
+    assert sentence.endswith(".")
+    assert "nan" not in sentence
+
+
+def test_nearly_all_is_not_rounded_to_all() -> None:
+    assert [percent(x) for x in (0.5, 0.9961, 0.99996, 1.0, float("nan"))] == [
+        "50 %", "99.6 %", "over 99.9 %", "100 %", "an unknown share",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "expected"),
+    [
+        (81.234, 1.34, Written("81.2", "1.3", 0)),
+        (0.0, 0.02, Written("0.000", "0.020", 0)),
+        (3.1e5, 2e3, Written("3.100", "0.020", 5)),
+        (-4.5e-7, 1e-8, Written("-4.50", "0.10", -7)),
+        (1234.5, 250.0, Written("1234", "250", 0)),
+        (2.5, float("inf"), Written("2.5", "", 0)),
+        (2.5, 0.0, Written("2.5", "", 0)),
+        (float("nan"), 1.0, Written("not finite", "", 0)),
+    ],
+)
+def test_only_digits_that_the_records_support(value: float, std: float, expected: Written) -> None:
+    assert written(value, std) == expected
+
+
+def test_an_estimate_in_ascii() -> None:
+    assert estimate_text(Estimate(3.1e5, 2e3, "N m/rad^3")) == "(3.100 +/- 0.020)e+5 N m/rad^3"
+    assert estimate_text(Estimate(0.5, 0.01, "1")) == "0.500 +/- 0.010"
+    assert estimate_text(Estimate(0.5, float("inf"), "1")) == "not determined by these records"

@@ -1,0 +1,123 @@
+"""Compiled kernels are kept between processes, and never stale."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigsight
+from rigsight.effects import effect_named
+from rigsight.errors import InputError
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, kernel_cache, simulate
+from rigsight.simulate.kernel_source import kernel_source
+
+PROGRAM = """
+import sys, time
+import numpy as np
+from rigsight.records.record import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+from rigsight.simulate.kernel_cache import kernels
+record = Record(name="r", dt=0.01, signals={"u": np.ones(50)}, units={})
+values = dict(gain=1.0, m=1.0, d=1.0, k=float(sys.argv[1]), x_off=0.0, force_off=0.0)
+structure = compose(AXIS)
+x = simulate(structure, values, record)["x"]
+statistics = kernels(structure).simulate_one.stats
+print(sum(statistics.cache_hits.values()), sum(statistics.cache_misses.values()), repr(float(x[-1])))
+"""
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    source = str(Path(rigsight.__file__).parents[1])
+    environment = {**os.environ, "RIGSIGHT_CACHE_DIR": str(folder), "PYTHONPATH": source}
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_second_process_does_not_compile(tmp_path):
+    first = run(tmp_path, "4.0")
+    assert first.returncode == 0, first.stderr
+    second = run(tmp_path, "4.0")
+    hits, misses, result = second.stdout.split()
+    assert first.stdout.split() == ["0", "1", result]
+    assert (hits, misses) == ("1", "0")
+
+
+@pytest.fixture
+def fresh_cache(tmp_path, monkeypatch):
+    """Point at an empty folder and forget what is loaded in this process."""
+    monkeypatch.setenv(kernel_cache.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "_modules", {})
+    return tmp_path
+
+
+def test_other_equations_are_another_file(fresh_cache):
+    delay = effect_named("input_delay")
+    halved = replace(delay, delay=delay.delay / 2)
+    texts = {kernel_source(compose(AXIS, effects)) for effects in ((), (delay,), (halved,))}
+    assert len(texts) == 3
+    files = {kernel_cache.kernels(compose(AXIS, effects)).__file__ for effects in ((), (delay,), (halved,))}
+    assert len(files) == 3
+
+
+def test_source_does_not_depend_on_the_order_of_hashes():
+    program = (
+        "from rigsight.effects import CATALOGUE; from rigsight.rigs import RUNNING_GEAR\n"
+        "from rigsight.simulate import compose; from rigsight.simulate.kernel_source import kernel_source\n"
+        "import hashlib; print(hashlib.sha256(kernel_source(compose(RUNNING_GEAR, CATALOGUE)).encode()).hexdigest())"
+    )
+    source = str(Path(rigsight.__file__).parents[1])
+    hashes = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": source},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert len(hashes) == 1
+
+
+def test_damaged_file_is_written_anew(fresh_cache):
+    structure = compose(AXIS)
+    path = Path(kernel_cache.kernels(structure).__file__)
+    path.write_text("raise RuntimeError('stale')", "utf-8")
+    kernel_cache._modules.clear()
+    assert kernel_cache.kernels(structure).N_STATES == 2
+    assert path.read_text("utf-8") == kernel_source(structure)
+
+
+def test_cache_that_cannot_be_written_is_explained(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder", "utf-8")
+    monkeypatch.setenv(kernel_cache.CACHE_VARIABLE, str(blocked / "kernels"))
+    monkeypatch.setattr(kernel_cache, "_modules", {})
+    with pytest.raises(InputError, match=kernel_cache.CACHE_VARIABLE):
+        kernel_cache.kernels(compose(AXIS))
+
+
+def test_damaged_machine_code_is_replaced(tmp_path):
+    assert run(tmp_path, "4.0").returncode == 0
+    for file in (tmp_path / "__pycache__").glob("*.nb?"):
+        file.write_bytes(b"\x00damaged")
+    damaged = run(tmp_path, "4.0")
+    assert damaged.returncode == 0, damaged.stderr
+
+
+def test_simulation_is_the_same_from_any_cache(fresh_cache, axis_values, make_record):
+    record = make_record(np.sin(0.1 * np.arange(100)))
+    first = simulate(compose(AXIS), axis_values, record)["x"]
+    kernel_cache._modules.clear()
+    np.testing.assert_array_equal(simulate(compose(AXIS), axis_values, record)["x"], first)

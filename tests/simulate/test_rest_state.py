@@ -1,0 +1,55 @@
+"""The start of a record when nothing else is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.simulate import parameter_vector, record_input, rest_state, simulate
+
+
+@pytest.mark.parametrize("name", ["R", "B", "P", "stiff"])
+def test_hysteretic_gear_stays_where_it_rests(name, hysteretic, hysteresis_sets, make_record):
+    values = {**hysteresis_sets[name], "psi_off": 2e-3, "y_off": -4e-4}
+    simulated = simulate(hysteretic, values, make_record(np.full(1000, 0.3)))
+    for signal in ("psi", "y"):
+        assert np.ptp(simulated[signal]) <= 1e-8 * abs(simulated[signal][0])
+
+
+def test_rest_is_on_the_virgin_curve(hysteretic, hysteresis_sets, make_record):
+    """Raised slowly from zero, z follows z' = 1 - (beta + gamma) z, without the memory of an overshoot."""
+    values = hysteresis_sets["R"]
+    held = record_input(hysteretic, make_record(np.full(10, 0.3)))
+    state = rest_state(hysteretic, parameter_vector(hysteretic, values), held)
+    total = values["beta"] + values["gamma"]
+    z = -np.expm1(-total * state[0]) / total
+    np.testing.assert_allclose(state[3], z, rtol=1e-6)
+    torque = values["k_c"] * (values["a"] * state[0] + (1.0 - values["a"]) * z)
+    np.testing.assert_allclose(torque, 0.3 * 0.3 * 0.27 / 0.1, rtol=1e-6)
+
+
+def test_zero_input_rests_at_the_offsets(hysteretic, hysteresis_sets, make_record):
+    values = {**hysteresis_sets["R"], "psi_off": 1e-3, "y_off": 2e-4}
+    simulated = simulate(hysteretic, values, make_record(np.zeros(500)))
+    np.testing.assert_allclose(simulated["psi"], 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(simulated["y"], 2e-4 + 2 * 0.25 * 1e-3, rtol=1e-9)
+
+
+def test_friction_holds_a_force_within_its_limit(axis_with_friction, axis_values, make_record):
+    values = {**axis_values, "T_c": 1.0}
+    record = make_record(np.full(300, 0.9))
+    assert np.all(simulate(axis_with_friction, values, record)["x"] == 0.0)
+    pulled = simulate(axis_with_friction, values, make_record(np.full(300, 3.0)))["x"]
+    np.testing.assert_allclose(pulled, 0.02, rtol=1e-4)
+    assert np.ptp(pulled) == 0.0
+
+
+def test_spring_without_end_starts_at_its_offset(axis, axis_values, make_record):
+    values = {**axis_values, "k": 0.0, "x_off": 0.4}
+    state = rest_state(axis, parameter_vector(axis, values), record_input(axis, make_record(np.ones(5))))
+    np.testing.assert_array_equal(state, [0.4, 0.0])
+
+
+def test_delayed_input_rests_too(axis_with_delay, axis_values, make_record):
+    simulated = simulate(axis_with_delay, {**axis_values, "T_d": 50.0}, make_record(np.full(200, 2.0)))["x"]
+    np.testing.assert_allclose(simulated, 0.02, rtol=1e-8)
