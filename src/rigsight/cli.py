@@ -141,7 +141,9 @@ def diagnose(
     ),
     effect: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", show_default="the whole catalogue", help="Try only this effect. May be repeated."),
+        typer.Option(
+            metavar="NAME", show_default="the whole catalogue", help="Try only this effect. May be repeated."
+        ),
     ] = None,
     seed: Seed = 0,
     jobs: Jobs = None,
@@ -156,7 +158,13 @@ def diagnose(
         from rigsight.workflow.diagnose import run_diagnose
 
         diagnosis = run_diagnose(
-            campaign, out, effects=_effects(effect or []), seed=seed, n_jobs=jobs, listener=listener, command=_command_line()
+            campaign,
+            out,
+            effects=_effects(effect or []),
+            seed=seed,
+            n_jobs=jobs,
+            listener=listener,
+            command=_command_line(),
         )
     if not quiet:
         _show(diagnosis)

@@ -1,141 +1,55 @@
-"""Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records."""
+"""Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
+
+Each candidate gets a first look at the liveliest stretches of the records, from all its starts. Those whose look comes near
+the best are fitted to all records; the best of those to full precision.
+"""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import sympy as sp
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
+from rigsight.diagnose.starts import start_values
+from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult, GreyBoxFit
-from rigsight.records.record import Record
-from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
-from rigsight.units import characteristic_value
 
 _LOOK_EVALUATIONS = 25
 _LOOK_TOLERANCE = 1e-3
 _LOOK_ACCURACY = 1e-3
 _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-4
+_HOPELESS_EVALUATIONS = 8
+_HOPELESS_TOLERANCE = 1e-2
+_PROMISING = 9.0
+"""A candidate whose first look costs less than this factor of the best (three times its RMS) is followed to the end."""
 _CONTENDER = 1.5
 """A model whose held-out error is within this factor of the best is fitted to full precision."""
 _ALIKE = 1.05
 """Starts whose first looks end within this factor of the best cost are all followed."""
 _WORTH_RELEASING = 1.05
 """Excess over the floor above which a fixed exponent is released."""
+_RELEASE_GAIN = 1.02
+"""Factor by which a released exponent must lower the held-out error to be kept."""
 
 
 @dataclass(frozen=True)
-class Scored:
-    """A fitted model with its residuals on the records that score it.
-
-    Attributes
-    ----------
-    effects
-        The effects added.
-    fit
-        The fit to the estimation records.
-    residuals
-        Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured.
-    initial_states
-        Per scoring record.
-    excess
-        RMS of the residuals in units of the noise floor.
-    """
+class Look:
+    """First fits of a candidate to a part of the records, best first, those that ended at the same place once."""
 
     effects: tuple[Effect, ...]
-    fit: FitResult
-    residuals: tuple[NDArray[np.float64], ...]
-    initial_states: tuple[NDArray[np.float64], ...]
-    excess: float
+    structure: Structure
+    free: tuple[str, ...]
+    fits: tuple[FitResult, ...]
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the effects."""
-        return tuple(effect.name for effect in self.effects)
-
-    @property
-    def n_free(self) -> int:
-        """Number of fitted parameters."""
-        return len(self.fit.free)
-
-
-@dataclass(frozen=True)
-class Workbench:
-    """What every candidate is fitted and scored with.
-
-    Attributes
-    ----------
-    rig
-        The rig.
-    estimation, scoring
-        Records to fit and records to score, already cut into windows where that is needed.
-    look
-        The liveliest stretch of each estimation record, for a first look at each start.
-    scales
-        Size of each base quantity.
-    noise
-        Noise floor of each output.
-    held
-        Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
-    """
-
-    rig: Rig
-    estimation: tuple[Record, ...]
-    scoring: tuple[Record, ...]
-    look: tuple[Record, ...]
-    scales: Mapping[str, float]
-    noise: Mapping[str, float]
-    held: frozenset[str]
-
-    def free_parameters(self, structure: Structure) -> list[str]:
-        """Return what a fit of this structure moves."""
-        names = [p.name for p in self.rig.parameters if p.name not in self.held]
-        bias = {symbol.name for symbol in self.rig.motion.bias.free_symbols}
-        rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
-        no_spring = {s.name for s in self.rig.motion.stiffness.free_symbols} <= self.held
-        bends = any(_bends_the_spring(effect) for effect in structure.effects)
-        if self.rig.is_driven and no_spring and not bends:
-            names = [name for name in names if name not in rest]
-        elif self.rig.is_driven and rest and not bends:
-            # A linear spring cannot tell a constant force from a shifted rest position.
-            names = [name for name in names if name not in bias]
-        fixed = dict(structure.fixed)
-        for effect in structure.effects:
-            names += [p.name for p in effect.parameters if p.fitted and p.name not in fixed]
-        return [name for name in structure.names if name in names]
-
-    def score(self, effects: tuple[Effect, ...], fit: FitResult) -> Scored:
-        """Simulate the scoring records with a fitted model; only their initial states are estimated."""
-        result = GreyBoxFit(fit.structure, self.scoring, self.scales, self.noise).fit(fit.values, [])
-        excess = result.weighted_rms if result.residuals else float("inf")
-        return Scored(effects, fit, result.residuals, result.initial_states, excess)
-
-
-def _bends_the_spring(effect: Effect) -> bool:
-    expressions = [e for e in (effect.torque, effect.deflection) if e is not None]
-    return any(canonical.x in expression.free_symbols for expression in expressions)
-
-
-def liveliest(records: Sequence[Record], output: str, n_samples: int = 8000) -> tuple[Record, ...]:
-    """Return the stretch of each record in which an output moves most, together about `n_samples` long."""
-    share = max(500, n_samples // max(1, len(records)))
-    stretches = []
-    for record in records:
-        if record.n_samples <= share:
-            stretches.append(record)
-            continue
-        energy = np.cumsum((record[output] - np.mean(record[output])) ** 2)
-        start = int(np.argmax(energy[share:] - energy[:-share]))
-        stretches.append(record.slice(start, start + share))
-    return tuple(stretches)
+    def cost(self) -> float:
+        """Lowest cost that was reached."""
+        return self.fits[0].cost
 
 
 def fit_linear(bench: Workbench, start: Mapping[str, float]) -> Scored:
@@ -152,59 +66,72 @@ def fit_candidates(
     n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> list[Scored]:
-    """Fit and score every effect alone; effects that start from a parent's fit come after it."""
-    waiting = [effect for effect in effects if bench.rig.offers(effect)]
-    if {s.name for s in bench.rig.motion.stiffness.free_symbols} <= bench.held:
-        waiting = [effect for effect in waiting if effect.spring is None and effect.deflection is None]
-    done: dict[str, Scored] = {}
-    names = {effect.name for effect in waiting}
+    """Fit and score every effect alone.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    linear
+        The re-identified equations.
+    effects
+        Candidates; those that the rig does not offer are left out.
+    n_jobs
+        Candidates fitted at the same time.
+    progress
+        Called with the name of each candidate that is done.
+    """
+    looks = _looks(bench, linear, bench.offered(effects), n_jobs)
+    lowest = min((look.cost for look in looks), default=float("inf"))
+
+    def one(look: Look) -> Scored:
+        scored = _followed(bench, look, promising=look.cost <= _PROMISING * lowest)
+        if progress is not None:
+            progress(look.effects[-1].name)
+        return scored
+
+    models = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in looks))
+    return refine(bench, models, n_jobs)
+
+
+def _looks(bench: Workbench, linear: Scored, effects: Sequence[Effect], n_jobs: int) -> list[Look]:
+    """Look at every effect; those that start from a simpler one come after it."""
+    names = {effect.name for effect in effects}
+    done: dict[str, Look] = {}
+    waiting = list(effects)
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]
         ready = ready or waiting
         waiting = [effect for effect in waiting if effect not in ready]
-
-        def one(effect: Effect) -> Scored:
-            scored = fit_candidate(bench, (effect,), linear, done)
-            if progress is not None:
-                progress(effect.name)
-            return scored
-
-        results = Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(effect) for effect in ready)
-        done.update({effect.name: scored for effect, scored in zip(ready, results, strict=True)})
-    return list(done.values())
+        parents = {name: look.fits[0].values for name, look in done.items() if np.isfinite(look.cost)}
+        looks = Parallel(n_jobs=n_jobs, prefer="threads")(
+            delayed(_look)(bench, (effect,), linear.fit.values, parents) for effect in ready
+        )
+        done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
+    return [done[effect.name] for effect in effects]
 
 
 def fit_candidate(
     bench: Workbench,
     effects: tuple[Effect, ...],
-    base: Scored,
-    parents: Mapping[str, Scored],
+    base: Mapping[str, float],
     hold: frozenset[str] = frozenset(),
 ) -> Scored:
-    """Fit the last of `effects` on top of `base`, from several starts, and score it.
+    """Fit and score one set of effects to full precision.
 
     Parameters
     ----------
     bench
         Records, scales and noise.
     effects
-        All effects of the model.
+        All effects of the model; the last is new.
     base
-        Scored model with all effects but the last.
-    parents
-        Scored models of single effects by name, as further start points.
+        Values fitted without the last.
     hold
-        Rig parameters to keep at their start.
+        Rig parameters to keep at their base value.
     """
-    added = effects[-1]
-    fixed = {name: value for effect in effects for name, value in effect.special_cases.items()}
-    scored = _best_of_starts(bench, effects, fixed, list(_starts(bench, added, base, parents)), hold)
-    if added.special_cases and scored.excess > _WORTH_RELEASING:
-        kept = {name: value for name, value in fixed.items() if name not in added.special_cases}
-        released = _best_of_starts(bench, effects, kept, [{**scored.fit.values, **fixed}], hold)
-        if released.fit.success and released.excess < scored.excess / 1.02:
-            return released
-    return scored
+    look = _look(bench, effects, base, {}, hold)
+    return refine(bench, [_followed(bench, look, promising=True)])[0]
 
 
 def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[Scored]:
@@ -212,7 +139,7 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
     best = min((m.excess for m in models), default=float("inf"))
 
     def one(model: Scored) -> Scored:
-        if not model.excess <= _CONTENDER * best:
+        if not (np.isfinite(model.excess) and model.excess <= _CONTENDER * best):
             return model
         fit = GreyBoxFit(model.fit.structure, bench.estimation, bench.scales, bench.noise)
         result = fit.fit(model.fit.values, model.fit.free, initial_states=model.fit.initial_states)
@@ -223,85 +150,75 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
     return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(model) for model in models))
 
 
-def _best_of_starts(
+def _look(
     bench: Workbench,
     effects: tuple[Effect, ...],
-    fixed: Mapping[str, float],
-    starts: Sequence[Mapping[str, float]],
-    hold: frozenset[str],
-) -> Scored:
-    structure = compose(bench.rig, effects, fixed)
-    free = [name for name in bench.free_parameters(structure) if name not in hold]
-    look = GreyBoxFit(structure, bench.look, bench.scales, bench.noise, _LOOK_ACCURACY)
-    looks = [
-        look.fit(
+    base: Mapping[str, float],
+    parents: Mapping[str, Mapping[str, float]],
+    hold: frozenset[str] = frozenset(),
+) -> Look:
+    special = {name: value for effect in effects for name, value in effect.special_cases.items()}
+    structure = compose(bench.rig, effects, special)
+    free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
+    fit = GreyBoxFit(structure, bench.look, bench.scales, bench.noise, _LOOK_ACCURACY)
+    fits = [
+        fit.fit(
             start,
             free,
             max_evaluations=_LOOK_EVALUATIONS,
             tolerance=_LOOK_TOLERANCE,
             finish=False,
         )
-        for start in starts
+        for start in start_values(bench, effects[-1], base, parents)
     ]
-    lowest = min(result.cost for result in looks)
-    followed = [result for result in looks if result.cost <= _ALIKE * lowest]
+    return Look(effects, structure, free, _distinct(fits))
+
+
+def _followed(bench: Workbench, look: Look, promising: bool) -> Scored:
+    """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking."""
+    scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising)
+    special = look.effects[-1].special_cases
+    if not (promising and special and np.isfinite(scored.excess) and scored.excess > _WORTH_RELEASING):
+        return scored
+    kept = {n: v for n, v in look.structure.fixed if n not in special}
+    released = compose(bench.rig, look.effects, kept)
+    free = tuple(n for n in released.names if n in look.free or n in special)
+    start = replace(scored.fit, values={**scored.fit.values, **dict(look.structure.fixed)})
+    freer = _fitted(bench, look.effects, released, free, (start,), promising)
+    return freer if freer.excess < scored.excess / _RELEASE_GAIN else scored
+
+
+def _fitted(
+    bench: Workbench,
+    effects: tuple[Effect, ...],
+    structure: Structure,
+    free: Sequence[str],
+    starts: Sequence[FitResult],
+    promising: bool,
+) -> Scored:
     fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise)
-    finals = [
+    results = [
         fit.fit(
-            result.values,
+            start.values,
             free,
-            max_evaluations=_ROUGH_EVALUATIONS,
-            tolerance=_ROUGH_TOLERANCE,
+            max_evaluations=_ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS,
+            tolerance=_ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE,
         )
-        for result in _distinct(followed)
+        for start in (starts if promising else starts[:1])
     ]
-    finals = [result for result in finals if result.residuals]
-    if not finals:
-        return Scored(effects, looks[0], (), (), float("inf"))
-    return bench.score(effects, min(finals, key=lambda result: result.cost))
+    usable = [result for result in results if result.residuals]
+    if not usable:
+        return Scored(effects, results[0], (), (), float("inf"))
+    return bench.score(effects, min(usable, key=lambda result: result.cost))
 
 
-def _distinct(looks: Sequence[FitResult]) -> list[FitResult]:
-    """Return looks that did not end at the same place, best first."""
-    kept: list[FitResult] = []
-    for look in sorted(looks, key=lambda result: result.cost):
-        values = np.array([look.values[name] for name in look.free])
-        others = [np.array([other.values[name] for name in look.free]) for other in kept]
-        if not any(np.allclose(values, other, rtol=0.05, atol=1e-12) for other in others):
-            kept.append(look)
-    return kept[:2]
-
-
-def _starts(
-    bench: Workbench, effect: Effect, base: Scored, parents: Mapping[str, Scored]
-) -> Iterable[dict[str, float]]:
-    fitted = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
-    rest = {p.name: p.default for p in effect.parameters if p not in fitted and p.default is not None}
-    if effect.starts:
-        for start in effect.starts:
-            origin = base if start.parent is None else parents.get(start.parent)
-            if origin is not None and origin.fit.residuals:
-                yield {**origin.fit.values, **rest, **_evaluated(bench, start.values, origin.fit.values)}
-        return
-    sizes = [characteristic_value(p.dimension, bench.scales) for p in fitted]
-    for combination in itertools.product(*(p.starts for p in fitted)):
-        own = {p.name: c * size for p, c, size in zip(fitted, combination, sizes, strict=True)}
-        yield {**base.fit.values, **rest, **own}
-
-
-def _evaluated(
-    bench: Workbench, formulas: Mapping[str, sp.Expr], values: Mapping[str, float]
-) -> dict[str, float]:
-    stiffness = bench.rig.motion.stiffness
-    numbers = {
-        canonical.k: values[stiffness.name],
-        canonical.drive_size: bench.scales["drive"],
-        canonical.x_size: bench.scales["x"],
-        canonical.v_size: bench.scales["x"] / bench.scales["time"],
-    }
-    result = {}
-    for name, formula in formulas.items():
-        own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}
-        value = float(formula.subs({**numbers, **own}))
-        result[stiffness.name if name == "k" else name] = value
-    return result
+def _distinct(fits: Sequence[FitResult]) -> tuple[FitResult, ...]:
+    """Return the best fit, and a second one if it is as good but ended elsewhere."""
+    ordered = sorted(fits, key=lambda result: result.cost)
+    best = ordered[0]
+    values = np.array([best.values[name] for name in best.free])
+    for other in ordered[1:]:
+        theirs = np.array([other.values[name] for name in other.free])
+        if other.cost <= _ALIKE * best.cost and not np.allclose(values, theirs, rtol=0.05, atol=1e-12):
+            return best, other
+    return (best,)

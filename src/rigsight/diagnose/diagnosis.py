@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.characterize import (
-    Scored,
-    Workbench,
-    fit_candidate,
-    fit_candidates,
-    fit_linear,
-    liveliest,
-    refine,
-)
+from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import (
@@ -28,7 +20,8 @@ from rigsight.diagnose.result import (
     Trace,
 )
 from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge
-from rigsight.diagnose.windows import cut, window_length
+from rigsight.diagnose.windows import WINDOW, cut, window_length
+from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, linear_start
@@ -39,6 +32,9 @@ from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 
 _SIGNIFICANT = 3.0
+"""Standard errors from zero at which a constant force counts as needed."""
+_WITHOUT_EFFECT = 0.95
+"""Probability given to the equations without an effect where they reach the noise floor."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +123,7 @@ def diagnose(
     say("re-identified")
     before = _before(task, bench, estimation, linear)
     say("given simulation")
-    singles = refine(bench, fit_candidates(bench, linear, effects, n_jobs, progress), n_jobs)
+    singles = fit_candidates(bench, linear, effects, n_jobs, progress)
 
     rng = np.random.default_rng(seed)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
@@ -202,11 +198,9 @@ def _with_offset_rivals(
     rivals = []
     for effect in effects:
         if effect.signature.even_harmonics and bench.rig.offers(effect):
-            without = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
-            base = replace(best, fit=without)
-            pair = (*best.effects, effect)
-            rivals.append(fit_candidate(bench, pair, base, {}, hold=frozenset(needed)))
-    return rank([*ranking.order, *refine(bench, rivals)], noise, rng)
+            base = {**best.fit.values, **dict.fromkeys(needed, 0.0)}
+            rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
+    return rank([*ranking.order, *rivals], noise, rng)
 
 
 def _assembled(
@@ -236,10 +230,13 @@ def _assembled(
         for name in measured
     }
     share = _explained(judgement, ranking)
-    candidates = tuple(
+    explained = judgement.verdict in ("none", "parameters")
+    without_effect = _candidate(bench, linear, _WITHOUT_EFFECT if explained else 0.0)
+    with_effect = [
         _candidate(bench, model, probability * share)
         for model, probability in zip(ranking.order, ranking.probabilities, strict=True)
-    )
+    ]
+    candidates = tuple(sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.excess)))
     chosen = judgement.model.effects if is_effect else ()
     tied = tuple(model.names for model in ranking.tied) if is_effect else ()
     places = judgement.model.effects if judgement.verdict in ("effect", "unknown") else ()
@@ -266,7 +263,7 @@ def _assembled(
 def _explained(judgement: Judgement, ranking: Ranking) -> float:
     """Return the probability that the cause is among the candidates at all, from what the best leaves above the floor."""
     if judgement.verdict in ("none", "parameters"):
-        return 0.0
+        return 0.0  # the equations without an effect explain the records
     if not ranking.order or not np.isfinite(ranking.order[0].excess):
         return 0.0
     left = max(ranking.order[0].excess - AT_FLOOR, 0.0)
@@ -317,25 +314,40 @@ def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate
 
 
 def _traces(task: Task, bench: Workbench, before: Scored, linear: Scored, after: Scored) -> tuple[Trace, ...]:
-    """Return measured and simulated outputs of the scoring records, windows joined again."""
-    rig = task.rig
+    """Return measured and simulated outputs of all records, those that score first, windows joined again."""
+    scored = _joined(task.rig, bench.scoring, before.residuals, linear.residuals, after.residuals)
+    if bench.scoring == bench.estimation:
+        return scored
+    fitted = _joined(
+        task.rig, bench.estimation, before.fit.residuals, linear.fit.residuals, after.fit.residuals
+    )
+    return (*scored, *fitted)
+
+
+def _joined(
+    rig: Rig,
+    records: Sequence[Record],
+    before: Sequence[NDArray[np.float64]],
+    reidentified: Sequence[NDArray[np.float64]],
+    after: Sequence[NDArray[np.float64]],
+) -> tuple[Trace, ...]:
     names = [signal.name for signal in rig.outputs]
-    joined: dict[str, list[int]] = {}
-    for index, record in enumerate(bench.scoring):
-        joined.setdefault(record.name.split(" window ")[0], []).append(index)
+    groups: dict[str, list[int]] = {}
+    for index, record in enumerate(records):
+        groups.setdefault(record.name.split(WINDOW)[0], []).append(index)
     traces = []
-    for name, indices in joined.items():
-        parts = [bench.scoring[i] for i in indices]
+    for name, indices in groups.items():
+        parts = [records[i] for i in indices]
         first = parts[0]
         measured = {n: np.concatenate([p[n] for p in parts]) for n in names if n in first}
 
         def simulated(
-            model: Scored,
+            residuals: Sequence[NDArray[np.float64]],
             indices: Sequence[int] = indices,
             measured: Mapping[str, NDArray[np.float64]] = measured,
         ) -> dict[str, NDArray[np.float64]]:
-            residuals = np.concatenate([model.residuals[i] for i in indices])
-            return {n: measured[n] - residuals[:, names.index(n)] for n in measured}
+            joined = np.concatenate([residuals[i] for i in indices])
+            return {n: measured[n] - joined[:, names.index(n)] for n in measured}
 
         traces.append(
             Trace(
@@ -347,7 +359,7 @@ def _traces(task: Task, bench: Workbench, before: Scored, linear: Scored, after:
                 inputs={s.name: np.concatenate([p[s.name] for p in parts]) for s in rig.inputs},
                 measured=measured,
                 before=simulated(before),
-                reidentified=simulated(linear),
+                reidentified=simulated(reidentified),
                 after=simulated(after),
             )
         )

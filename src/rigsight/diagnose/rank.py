@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.characterize import Scored
+from rigsight.diagnose.workbench import Scored
 
 _RESAMPLES = 1000
 _MIN_BLOCKS = 8

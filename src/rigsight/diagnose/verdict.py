@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rigsight.diagnose.characterize import Scored
 from rigsight.diagnose.result import Verdict
+from rigsight.diagnose.workbench import Scored
 
 AT_FLOOR = 1.1
 """RMS in units of the noise floor that counts as the floor itself: floors are known to a few percent."""

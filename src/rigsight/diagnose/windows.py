@@ -11,6 +11,8 @@ import numpy as np
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
+WINDOW = " window "
+"""Stands between a record's name and the number of its window."""
 _PERIODS = 10.0
 _MIN_SAMPLES = 100
 _MAX_WINDOWS = 40
@@ -45,5 +47,5 @@ def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:
         edges = np.linspace(0, record.n_samples, count + 1).astype(int)
         for i, (start, stop) in enumerate(itertools.pairwise(edges)):
             part = record.slice(int(start), int(stop))
-            windows.append(replace(part, name=f"{record.name} window {i + 1}"))
+            windows.append(replace(part, name=f"{record.name}{WINDOW}{i + 1}"))
     return tuple(windows)

@@ -7,6 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+_DEPENDENT = 1e-14
+"""Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
+_TAKES_PART = 1e-9
+
 
 def colored_covariance(
     sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]], n_common: int
@@ -46,12 +50,44 @@ def colored_covariance(
     if n_total == 0:
         return np.zeros((0, 0))
     size = np.sqrt(np.diag(bread))
-    undetermined = size == 0.0
-    size[undetermined] = 1.0
-    inverse = np.linalg.pinv(bread / np.outer(size, size), rcond=1e-14, hermitian=True)
+    size[size == 0.0] = 1.0
+    eigenvalues, vectors = np.linalg.eigh(bread / np.outer(size, size))
+    seen = eigenvalues > _DEPENDENT * max(float(eigenvalues[-1]), 1e-300)
+    known = vectors[:, seen]
+    inverse = (known / eigenvalues[seen]) @ known.T
     covariance = inverse @ (filling / np.outer(size, size)) @ inverse / np.outer(size, size)
+    # A coordinate that takes part in an unseen direction may be anything, however well its share in the seen ones is known.
+    undetermined = np.sum(vectors[:, ~seen] ** 2, axis=1) > _TAKES_PART
+    covariance[undetermined, :] = 0.0
+    covariance[:, undetermined] = 0.0
     covariance[undetermined, undetermined] = np.inf
-    return covariance[:n_common, :n_common]
+    return np.asarray(covariance[:n_common, :n_common])
+
+
+def propagated_covariance(
+    covariance: NDArray[np.float64], chain: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return ``chain covariance chain^T`` where variances may be infinite.
+
+    Parameters
+    ----------
+    covariance
+        Of coordinates, shape (n, n), see `colored_covariance`.
+    chain
+        d parameters / d coordinates, shape (m, n).
+
+    Returns
+    -------
+    Shape (m, m); a parameter that depends on an undetermined coordinate has an infinite variance, no other is touched.
+    """
+    infinite = np.isinf(np.diag(covariance))
+    finite = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
+    result = chain @ finite @ chain.T
+    touched = np.any(chain[:, infinite] != 0.0, axis=1)
+    result[touched, :] = 0.0
+    result[:, touched] = 0.0
+    result[touched, touched] = np.inf
+    return np.asarray(result)
 
 
 def _spectral_product(residual: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDArray[np.float64]:

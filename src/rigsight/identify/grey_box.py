@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP, Coordinates
-from rigsight.identify.covariance import colored_covariance
+from rigsight.identify.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.fit_result import FitResult
 from rigsight.records.record import Record
 from rigsight.simulate import (
@@ -36,7 +36,8 @@ from rigsight.units import characteristic_value
 
 DEFAULT_ACCURACY = 1e-4
 """Relative accuracy of simulations inside a fit: below the noise of any bench."""
-_FALLBACK_SUBSTEPS = 8
+_MOST_SUBSTEPS = 16
+"""A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
 _STATE_RANGE = 20.0
 _WORSE = 1e3
 
@@ -192,8 +193,7 @@ class GreyBoxFit:
                 sum(np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self._data, strict=True))
             )
             covariance = colored_covariance(problem.sensitivities(theta), n_free)
-            chain = coordinates.jacobian(theta[:n_free])
-            covariance = chain @ covariance @ chain.T
+            covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
         return FitResult(
             structure=self.structure,
@@ -245,7 +245,7 @@ class _Problem:
         self.upper = upper
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
-        self.substeps = [_FALLBACK_SUBSTEPS] * len(fit.data)
+        self.substeps = [_MOST_SUBSTEPS] * len(fit.data)
         self._last: _Evaluation | None = None
         self._best = float("inf")
 
@@ -260,10 +260,10 @@ class _Problem:
         for i, (data, state) in enumerate(zip(self.fit.data, self.states(theta), strict=True)):
             try:
                 self.substeps[i] = choose_substeps(
-                    self.fit.structure, data.held, p, state, data.record.n_samples, self.fit.accuracy
+                    self.fit.structure, data.held, p, state, data.record.n_samples, self.fit.accuracy, _MOST_SUBSTEPS
                 )
             except SimulationError:
-                self.substeps[i] = _FALLBACK_SUBSTEPS
+                self.substeps[i] = _MOST_SUBSTEPS
 
     def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a vector with the same cost and the same projection on the derivatives as the residuals."""

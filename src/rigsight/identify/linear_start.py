@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import RIGS, Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _ITERATIONS = 20
 _TRANSIENT_ORDER = 2
+_OUTPUTS = frozenset(signal.name for rig in RIGS.values() if rig.is_driven for signal in rig.outputs)
+_STILL = 1e-12
+"""Range of a signal relative to its size that is rounding."""
 
 
 def linear_start(
@@ -94,6 +97,8 @@ def _axis(records: Sequence[Record], constants: Mapping[str, float], no_spring: 
 
 
 def _element(records: Sequence[Record]) -> dict[str, float]:
+    for name in ("x", "force"):
+        _check_moves(records, name)
     rows, forces = [], []
     for record in records:
         x, v = smooth_motion(record["x"], record.dt)
@@ -101,6 +106,14 @@ def _element(records: Sequence[Record]) -> dict[str, float]:
         forces.append(record["force"])
     solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(forces), rcond=None)[0]
     return dict(zip(("d", "k", "force_off"), map(float, solution), strict=True))
+
+
+def _check_moves(records: Sequence[Record], name: str) -> None:
+    # The mean of a constant differs from it by rounding, so the comparison needs a scale.
+    if all(np.ptp(r[name]) <= _STILL * np.max(np.abs(r[name])) for r in records):
+        raise InputError(
+            f"Signal '{name}' does not move in any estimation record; nothing can be identified."
+        )
 
 
 def second_order(
@@ -111,7 +124,7 @@ def second_order(
     Raises
     ------
     InputError
-        If the response does not move.
+        If input or response do not move.
     """
     orders = (2, 1) if no_spring else (2, 1, 0)
     solution = _equation_error(records, source, response, orders, gain)
@@ -134,11 +147,9 @@ def _equation_error(
     records: Sequence[Record], source: str, response: str, orders: tuple[int, ...], gain: float
 ) -> NDArray[np.float64]:
     """Solve ``sum_i a_i (j omega)^order_i X = gain U + transient`` for the a_i."""
+    for name in (source, response):
+        _check_moves(records, name)
     blocks = [_spectra(record, source, response) for record in records]
-    if not any(np.any(block[2] != 0.0) for block in blocks):
-        raise InputError(
-            f"Signal '{response}' does not move in any estimation record; nothing can be identified."
-        )
     top = max(float(np.max(omega)) for omega, _, _ in blocks)
     n_transient = _TRANSIENT_ORDER + 1
     n_columns = len(orders) + n_transient * len(blocks)
@@ -182,9 +193,11 @@ def _spectra(
     drive, spectrum = np.fft.rfft(u)[1:] / u.size, np.fft.rfft(x)[1:] / u.size
     phase = omega * record.dt / 2.0
     sinc = np.sin(phase) / phase
-    if record.hold == "zoh":
+    # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
+    hold = "band_limited" if source in _OUTPUTS else record.hold
+    if hold == "zoh":
         drive = drive * sinc * np.exp(-1j * phase)
-    elif record.hold == "foh":
+    elif hold == "foh":
         drive = drive * sinc**2
     power = np.abs(spectrum) ** 2
     floor = np.median(power[int(0.9 * power.size) :])

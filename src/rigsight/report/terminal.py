@@ -39,7 +39,8 @@ class Summary:
         """Yield the lines, in characters that the terminal's encoding has."""
 
         def text(words: str, style: str = "") -> Text:
-            plain = words.replace(TIMES, "x")
+            # An escape sequence in somebody's title must not reach the terminal.
+            plain = "".join(c if c.isprintable() else "?" for c in words.replace(TIMES, "x"))
             return Text(plain.encode(options.encoding, "replace").decode(options.encoding), style)
 
         diagnosis = self.diagnosis

@@ -7,6 +7,7 @@ import signal
 from collections.abc import Iterable, Sequence
 
 from joblib import Parallel, delayed
+from joblib.externals.loky import get_reusable_executor
 
 from rigsight.effects import Effect
 from rigsight.errors import check_in_range
@@ -75,8 +76,12 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
         batch_size=1,
         initializer=_ignore_interrupts,
     )
-    for name in parallel(delayed(_compile)(structure) for structure in missing):
-        stage.finished(name)
+    try:
+        for name in parallel(delayed(_compile)(structure) for structure in missing):
+            stage.finished(name)
+    finally:
+        # Idle workers would keep half a gigabyte each for minutes.
+        get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
 def _compile(structure: Structure) -> str:

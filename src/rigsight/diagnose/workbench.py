@@ -1,0 +1,132 @@
+"""What every candidate is fitted and scored with: records, scales, noise, and which parameters a fit moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect
+from rigsight.effects import symbols as canonical
+from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A fitted model with its residuals on the records that score it.
+
+    Attributes
+    ----------
+    effects
+        The effects added.
+    fit
+        The fit to the estimation records.
+    residuals
+        Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured.
+    initial_states
+        Per scoring record.
+    excess
+        RMS of the residuals in units of the noise floor.
+    """
+
+    effects: tuple[Effect, ...]
+    fit: FitResult
+    residuals: tuple[NDArray[np.float64], ...]
+    initial_states: tuple[NDArray[np.float64], ...]
+    excess: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(effect.name for effect in self.effects)
+
+    @property
+    def n_free(self) -> int:
+        """Number of fitted parameters."""
+        return len(self.fit.free)
+
+
+@dataclass(frozen=True)
+class Workbench:
+    """What every candidate is fitted and scored with.
+
+    Attributes
+    ----------
+    rig
+        The rig.
+    estimation, scoring
+        Records to fit and records to score, already cut into windows where that is needed.
+    look
+        The liveliest stretch of each estimation record, for a first look at each start.
+    scales
+        Size of each base quantity.
+    noise
+        Noise floor of each output.
+    held
+        Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
+    """
+
+    rig: Rig
+    estimation: tuple[Record, ...]
+    scoring: tuple[Record, ...]
+    look: tuple[Record, ...]
+    scales: Mapping[str, float]
+    noise: Mapping[str, float]
+    held: frozenset[str]
+
+    def free_parameters(self, structure: Structure) -> list[str]:
+        """Return what a fit of this structure moves."""
+        names = [p.name for p in self.rig.parameters if p.name not in self.held]
+        bias = {symbol.name for symbol in self.rig.motion.bias.free_symbols}
+        rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
+        no_spring = {s.name for s in self.rig.motion.stiffness.free_symbols} <= self.held
+        bends = any(_bends_the_spring(effect) for effect in structure.effects)
+        if self.rig.is_driven and no_spring and not bends:
+            names = [name for name in names if name not in rest]
+        elif self.rig.is_driven and rest and not bends:
+            # A linear spring cannot tell a constant force from a shifted rest position.
+            names = [name for name in names if name not in bias]
+        fixed = dict(structure.fixed)
+        for effect in structure.effects:
+            names += [p.name for p in effect.parameters if p.fitted and p.name not in fixed]
+        return [name for name in structure.names if name in names]
+
+    def offered(self, effects: Iterable[Effect]) -> list[Effect]:
+        """Return the effects that make sense on this rig; without a spring none that changes it."""
+        no_spring = {s.name for s in self.rig.motion.stiffness.free_symbols} <= self.held
+        return [
+            effect
+            for effect in effects
+            if self.rig.offers(effect)
+            and not (no_spring and (effect.spring is not None or effect.deflection is not None))
+        ]
+
+    def score(self, effects: tuple[Effect, ...], fit: FitResult) -> Scored:
+        """Simulate the scoring records with a fitted model; only their initial states are estimated."""
+        result = GreyBoxFit(fit.structure, self.scoring, self.scales, self.noise).fit(fit.values, [])
+        excess = result.weighted_rms if result.residuals else float("inf")
+        return Scored(effects, fit, result.residuals, result.initial_states, excess)
+
+
+def _bends_the_spring(effect: Effect) -> bool:
+    expressions = [e for e in (effect.torque, effect.deflection) if e is not None]
+    return any(canonical.x in expression.free_symbols for expression in expressions)
+
+
+def liveliest(records: Sequence[Record], output: str, n_samples: int = 8000) -> tuple[Record, ...]:
+    """Return the stretch of each record in which an output moves most, together about `n_samples` long."""
+    share = max(500, n_samples // max(1, len(records)))
+    stretches = []
+    for record in records:
+        if record.n_samples <= share:
+            stretches.append(record)
+            continue
+        energy = np.cumsum((record[output] - np.mean(record[output])) ** 2)
+        start = int(np.argmax(energy[share:] - energy[:-share]))
+        stretches.append(record.slice(start, start + share))
+    return tuple(stretches)

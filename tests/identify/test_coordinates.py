@@ -1,0 +1,122 @@
+"""Search coordinates are another way to write the same parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.effects import effect_named
+from rigsight.identify.coordinates import Coordinates
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, parameter_vector
+
+STRUCTURE = compose(AXIS, [effect_named("bouc_wen_hysteresis")], {"n": 1.0})
+SCALES = {"x": 0.02, "force": 3.0, "drive": 2.0, "input": 2.0, "time": 0.1, "length": 1.0}
+VALUES = {
+    "gain": 1.0, "m": 1.5, "d": 0.6, "k": 150.0, "x_off": 1e-3, "force_off": -0.1,
+    "A": 1.0, "a": 0.4, "beta": 300.0, "gamma": -180.0,
+}  # fmt: skip
+FREE = ("m", "d", "k", "x_off", "a", "beta", "gamma")
+
+
+@pytest.fixture
+def coordinates() -> Coordinates:
+    return Coordinates.of(STRUCTURE, FREE, VALUES, SCALES)
+
+
+def test_parameters_come_back_unchanged(coordinates: Coordinates) -> None:
+    back = coordinates.to_parameters(coordinates.from_values(VALUES))
+    np.testing.assert_allclose(back, parameter_vector(STRUCTURE, VALUES), rtol=1e-12)
+
+
+def test_coordinates_come_back_unchanged(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES) + 0.01 * np.arange(len(FREE))
+    values = dict(zip(STRUCTURE.names, coordinates.to_parameters(theta), strict=True))
+    np.testing.assert_allclose(coordinates.from_values(values), theta, rtol=1e-12)
+
+
+def test_what_is_not_free_keeps_its_value(coordinates: Coordinates) -> None:
+    p = coordinates.to_parameters(coordinates.from_values(VALUES) + 0.3)
+    for name in set(STRUCTURE.names) - set(FREE):
+        assert p[STRUCTURE.names.index(name)] == VALUES[name]
+
+
+def test_a_linear_coordinate_is_the_value_in_characteristic_units(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES)
+    stiffness = SCALES["force"] / SCALES["x"]
+    assert theta[FREE.index("k")] == pytest.approx(VALUES["k"] / stiffness, rel=1e-12)
+    assert theta[FREE.index("x_off")] == pytest.approx(VALUES["x_off"] / SCALES["x"], rel=1e-12)
+
+
+def test_a_logarithmic_coordinate_steps_by_factors(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES)
+    moved = theta.copy()
+    moved[FREE.index("m")] += np.log(2.0)
+    index = STRUCTURE.names.index("m")
+    ratio = coordinates.to_parameters(moved)[index] / coordinates.to_parameters(theta)[index]
+    assert ratio == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_pair_moves_as_sum_and_difference(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES)
+    first, second = FREE.index("beta"), FREE.index("gamma")
+    beta, gamma = VALUES["beta"] * SCALES["x"], VALUES["gamma"] * SCALES["x"]
+    assert theta[first] == pytest.approx(beta + gamma, rel=1e-12)
+    assert theta[second] == pytest.approx(beta - gamma, rel=1e-12)
+
+
+def test_half_a_pair_is_searched_as_itself() -> None:
+    alone = Coordinates.of(STRUCTURE, ("m", "beta"), VALUES, SCALES)
+    assert alone.pairs == ()
+    assert alone.from_values(VALUES)[1] == pytest.approx(VALUES["beta"] * SCALES["x"], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "below", "above"),
+    [("a", -0.5, 1.5), ("d", -3.0, None), ("k", -10.0, None)],
+)
+def test_values_beyond_the_bounds_are_moved_inside(
+    coordinates: Coordinates, name: str, below: float | None, above: float | None
+) -> None:
+    parameter = STRUCTURE.parameters[STRUCTURE.names.index(name)]
+    for value in (below, above):
+        if value is None:
+            continue
+        theta = coordinates.from_values({**VALUES, name: value})
+        assert np.all(theta > coordinates.lower)
+        assert np.all(theta < coordinates.upper)
+        moved = coordinates.to_parameters(theta)[STRUCTURE.names.index(name)]
+        assert parameter.lower <= moved <= parameter.upper
+
+
+def test_the_corners_of_the_box_are_admissible_parameters(coordinates: Coordinates) -> None:
+    parameters = [STRUCTURE.parameters[i] for i in coordinates.index]
+    for corner in (coordinates.lower, coordinates.upper):
+        own = coordinates.to_parameters(corner)[coordinates.index]
+        for parameter, value in zip(parameters, own, strict=True):
+            slack = 1e-9 * abs(value)
+            assert parameter.lower - slack <= value <= parameter.upper + slack, parameter.name
+
+
+def test_a_positive_quantity_at_zero_gets_a_finite_coordinate(coordinates: Coordinates) -> None:
+    assert np.all(np.isfinite(coordinates.from_values({**VALUES, "m": 0.0})))
+
+
+def test_jacobian_agrees_with_central_differences(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES)
+    jacobian = coordinates.jacobian(theta)
+    assert jacobian.shape == (len(FREE), len(FREE))
+    step = 1e-3
+    for i in range(len(FREE)):
+        change = step * np.eye(len(FREE))[i]
+        difference = coordinates.to_parameters(theta + change) - coordinates.to_parameters(theta - change)
+        column = difference[coordinates.index] / (2.0 * step)
+        # The exponential's third derivative leaves step^2/6, rounding of the one-sided difference about 1e-6.
+        np.testing.assert_allclose(jacobian[:, i], column, rtol=2e-6, atol=1e-6 * np.max(np.abs(column)))
+
+
+def test_no_free_parameter() -> None:
+    none = Coordinates.of(STRUCTURE, (), VALUES, SCALES)
+    assert none.from_values(VALUES).shape == (0,)
+    np.testing.assert_array_equal(none.to_parameters(np.zeros(0)), parameter_vector(STRUCTURE, VALUES))
+    assert none.jacobian(np.zeros(0)).shape == (0, 0)

@@ -1,0 +1,127 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.effects import effect_named
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs.running_gear import creep_factor
+from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.diagnose import run_diagnose, task_of
+from rigsight.workflow.kernels import structures_to_try
+from rigsight.workflow.progress import Step
+from rigsight.workflow.simulate import run_simulate
+
+FEW = tuple(effect_named(name) for name in ("cubic_stiffness", "quadratic_damping"))
+CONTRACT_KEYS = {
+    "schema_version", "verdict", "effects", "where", "ambiguous_with", "candidates", "gap",
+    "gap_by_record", "gap_by_band", "gap_by_amplitude", "gap_by_state",
+}  # fmt: skip
+
+
+def test_a_missing_cubic_spring_is_found_and_written_as_the_contract_says(
+    axis_campaign: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    steps: list[Step] = []
+    diagnosis = run_diagnose(axis_campaign, out, effects=FEW, n_jobs=1, listener=steps.append)
+    written = json.loads((out / "diagnosis.json").read_text())
+    assert written == diagnosis.to_json()
+    assert written.keys() >= CONTRACT_KEYS
+    assert written["schema_version"] == 1
+    assert (written["verdict"], written["effects"]) == ("effect", ["cubic_stiffness"])
+    assert written["where"] == ["dynamics"]
+    for later in ("gap_by_record", "gap_by_band", "gap_by_amplitude", "gap_by_state"):
+        assert isinstance(written[later], list)
+    assert set(written["gap"]) == {"x"}
+    gap = written["gap"]["x"]
+    assert set(gap) == {"before", "reidentified", "after", "noise_floor", "closed"}
+    assert gap["after"] < 1.1 * gap["noise_floor"] < gap["reidentified"] < gap["before"]
+    assert gap["closed"] == pytest.approx(
+        (gap["before"] - gap["after"]) / (gap["before"] - gap["noise_floor"])
+    )
+    assert sum(candidate["probability"] for candidate in written["candidates"]) <= 1.0 + 1e-12
+    for candidate in written["candidates"]:
+        assert {"effects", "probability", "validation_nrmse", "parameters"} <= candidate.keys()
+        for parameter in candidate["parameters"].values():
+            assert set(parameter) == {"value", "std", "unit"}
+    found = written["candidates"][0]["parameters"]["k_3"]
+    assert found["unit"] == "N/m^3"
+    assert found["value"] == pytest.approx(5e6, abs=4 * found["std"])
+    assert "<html" in (out / "report.html").read_text("utf-8").lower()
+    assert steps[-1].done == steps[-1].total
+
+
+def test_the_written_model_alone_predicts_what_the_diagnosis_did(axis_campaign: Path, tmp_path: Path) -> None:
+    diagnosis = run_diagnose(axis_campaign, tmp_path, effects=FEW[:1], n_jobs=1)
+    predicted = run_simulate(tmp_path / "model.json", axis_campaign / "score.csv")
+    (trace,) = [trace for trace in diagnosis.traces if trace.record == "score"]
+    # The diagnosis estimates initial states and integrates as accurately as the noise asks for, not as it can.
+    assert np.std(predicted["x"] - trace.after["x"]) < 1e-2 * np.std(trace.measured["x"])
+    gap = diagnosis.gap["x"]
+    left = np.std(predicted["x"] - trace.measured["x"]) / np.std(trace.measured["x"])
+    assert left == pytest.approx(gap.after, rel=0.1)
+
+
+def test_without_a_folder_nothing_is_written(
+    axis_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    run_diagnose(axis_campaign, effects=FEW[:1], n_jobs=1)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_conicity_becomes_the_creep_factor(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
+    write_csv()
+    (tmp_path / "campaign.toml").write_text(
+        '[rig]\nmodel = "running_gear"\n[rig.constants]\nv = 1.0\nr_0 = 0.1\nb = 0.3\nk_tau = 0.27\n'
+        '[rig.parameters]\ndelta_0 = 0.024\n[[records]]\nfile = "sweep.csv"\n'
+    )
+    task = task_of(read_campaign(tmp_path))
+    assert task.given == {"c_y": pytest.approx(creep_factor(0.024, 0.1, 0.3))}
+
+
+def test_every_effect_that_the_rig_offers_is_compiled_beforehand() -> None:
+    prepared = structures_to_try(RUNNING_GEAR, FEW)
+    assert [structure.effect_names for structure in prepared] == [(), *((e.name,) for e in FEW)]
+
+
+NAMED = {
+    "silverbox/campaign.toml": {"cubic_stiffness"},
+    "mr_damper/campaign_on.toml": {"bouc_wen_hysteresis", "coulomb_friction", "stribeck_friction"},
+    "mr_damper/campaign_off.toml": {"bouc_wen_hysteresis", "coulomb_friction", "stribeck_friction"},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("campaign", NAMED)
+def test_measured_gaps_are_named(campaign: str, shared_data: Path) -> None:
+    diagnosis = run_diagnose(shared_data / campaign)
+    assert diagnosis.verdict == "effect"
+    assert NAMED[campaign].intersection(diagnosis.effects)
+    (gap,) = diagnosis.gap.values()
+    assert gap.after <= 0.5 * gap.reidentified
+
+
+@pytest.mark.slow
+def test_the_silverbox_is_predicted_in_free_run(shared_data: Path, tmp_path: Path) -> None:
+    run_diagnose(shared_data / "silverbox", tmp_path)
+    file = shared_data / "silverbox" / "multisine_validation.csv"
+    predicted = run_simulate(tmp_path, file)
+    measured = np.genfromtxt(file, delimiter=",", names=True)["x"]
+    # The model starts from rest, the record does not: its first transient is the experiment's.
+    error = (predicted["x"] - measured)[500:]
+    assert np.sqrt(np.mean(error**2)) <= 0.40e-3
+
+
+@pytest.mark.slow
+def test_the_hysteresis_benchmark_reaches_its_noise(shared_data: Path) -> None:
+    diagnosis = run_diagnose(shared_data / "boucwen")
+    assert diagnosis.effects == ("bouc_wen_hysteresis",)
+    (trace,) = diagnosis.traces
+    assert np.std(trace.measured["x"] - trace.after["x"]) <= 1.05 * 7.4e-6
