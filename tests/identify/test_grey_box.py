@@ -68,17 +68,18 @@ def test_a_cubic_axis_returns_its_parameters_from_noisy_records_in_motion() -> N
     first_states = (np.array([4e-3, 0.1]), np.array([-2e-3, -0.15]))
     records = [made(CUBIC, truth, rng, 1500, initial_state=state) for state in first_states]
     free = ("m", "d", "k", "x_off", "k_3")
-    start = {**STAGE, "m": 1.6, "d": 10.0, "k": 1000.0, "x_off": 0.0, "k_3": 0.0}
-    result = fitted(CUBIC, records, truth, free, start)
+    linear = fitted(LINEAR, records, truth, free[:4], {**STAGE, **linear_start(AXIS, records, {"gain": 1.0}, {})})
+    assert linear.weighted_rms > 5.0
+    result = fitted(CUBIC, records, truth, free, {**linear.values, "k_3": 0.0})
     assert result.success, result.message
     for name in free:
         assert abs(result.values[name] - truth[name]) < 4.0 * result.standard_errors[name], name
     # A spring that is not seen would pass any test of errors: the cubic term is known to a percent.
     assert result.standard_errors["k_3"] < 0.01 * truth["k_3"]
     assert result.weighted_rms == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * result.n_samples))
-    # Position is determined by some ten samples' worth of the transient, velocity by omega times that.
+    # No worse than a single sample tells the position, and omega = 20 rad/s times that the velocity.
     for found, state in zip(result.initial_states, first_states, strict=True):
-        np.testing.assert_allclose(found, state, atol=4.0 * NOISE * np.array([1.0, 20.0]))
+        assert np.all(np.abs(found - state) < 4.0 * NOISE * np.array([1.0, 20.0]))
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])
@@ -110,7 +111,7 @@ def test_the_compressed_problem_has_the_solution_of_plain_least_squares() -> Non
     start = np.array([2.0, 5.0, 800.0, 1e-3, 1e-2])
     plain = least_squares(residuals, np.array([1.0, 1.0, 1.0, 0.0, 0.0]), diff_step=1e-6, xtol=1e-12, ftol=1e-12)
     assert result.cost == pytest.approx(2.0 * plain.cost, rel=1e-6)
-    for name, value in zip(free, plain.x * start[:3], strict=False):
+    for name, value in zip(free, plain.x[:3] * start[:3], strict=True):
         assert abs(result.values[name] - value) < 0.02 * result.standard_errors[name], name
 
 
@@ -166,7 +167,7 @@ def test_without_free_parameters_only_the_initial_state_is_fitted() -> None:
     assert result.success
     assert result.values == STAGE
     assert (result.free, result.standard_errors, result.covariance.shape) == ((), {}, (0, 0))
-    np.testing.assert_allclose(result.initial_states[0], first_state, atol=4.0 * NOISE * np.array([1.0, 20.0]))
+    assert np.all(np.abs(result.initial_states[0] - first_state) < 4.0 * NOISE * np.array([1.0, 20.0]))
     assert result.weighted_rms == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * result.n_samples))
 
 

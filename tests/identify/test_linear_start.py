@@ -69,11 +69,11 @@ def test_axis(hold: Hold) -> None:
 
 
 def test_the_wrong_hold_is_noticed() -> None:
-    """A zero-order hold delays by half a sample; read as linear interpolation, damping absorbs k dt/2."""
+    """A zero-order hold is half a sample late; read as linear interpolation, the mass absorbs d dt/2."""
     record = made(AXIS, {**AXIS_CONSTANTS, **STAGE}, "zoh")
     misread = Record(name="misread", dt=DT, signals=record.signals, units={}, hold="foh")
     found = linear_start(AXIS, [misread], AXIS_CONSTANTS, {})
-    assert found["d"] > STAGE["d"] + 0.25 * STAGE["k"] * DT
+    assert found["m"] - STAGE["m"] == pytest.approx(STAGE["d"] * DT / 2.0, rel=0.5)
 
 
 def test_element_from_a_force_that_no_simulation_made() -> None:

@@ -178,14 +178,24 @@ def _followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking."""
     scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising)
     special = look.effects[-1].special_cases
-    if not (promising and special and np.isfinite(scored.excess) and scored.excess > _WORTH_RELEASING):
-        return scored
-    kept = {n: v for n, v in look.structure.fixed if n not in special}
-    released = compose(bench.rig, look.effects, kept)
-    free = tuple(n for n in released.names if n in look.free or n in special)
-    start = replace(scored.fit, values={**scored.fit.values, **dict(look.structure.fixed)})
-    freer = _fitted(bench, look.effects, released, free, (start,), promising)
-    return freer if freer.excess < scored.excess / _RELEASE_GAIN else scored
+    if promising and special:
+        structure = compose(
+            bench.rig, look.effects, {n: v for n, v in look.structure.fixed if n not in special}
+        )
+        scored = _released(bench, scored, structure, list(special))
+    if promising:
+        scored = _released(bench, scored, scored.fit.structure, bench.releasable_parameters(look.structure))
+    return scored
+
+
+def _released(bench: Workbench, settled: Scored, structure: Structure, released: Sequence[str]) -> Scored:
+    """Fit on with further parameters free; keep them only if the held-out error falls."""
+    if not released or not np.isfinite(settled.excess) or settled.excess <= _WORTH_RELEASING:
+        return settled
+    free = [name for name in structure.names if name in (*settled.fit.free, *released)]
+    start = {**settled.fit.values, **dict(settled.fit.structure.fixed)}
+    freer = _fitted(bench, settled.effects, structure, free, (replace(settled.fit, values=start),), True)
+    return freer if freer.excess < settled.excess / _RELEASE_GAIN else settled
 
 
 def _fitted(

@@ -20,6 +20,9 @@ _SAME_INPUT = 1e-3
 _QUIET_INPUT = 1e-3
 _MIN_QUIET = 100
 _TOP_OF_SPECTRUM = 0.85
+_MAX_FALL = 1.3
+"""Standard deviation of the first half over that of the second in a stretch that does not decay."""
+_MAX_FALL_OF_WHITE = 2.0
 _SMALLEST = 1e-9
 
 
@@ -37,17 +40,22 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
         if holding:
-            std, method = _noise_floor(rig.inputs[0].name, signal.name, holding)
+            std, method = _noise_floor(rig, signal.name, holding)
             spread = max(float(np.std(record[signal.name])) for record in holding)
-            floors.append(NoiseFloor(signal.name, signal.unit, max(std, _SMALLEST * spread), method))
+            size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
+            floors.append(NoiseFloor(signal.name, signal.unit, max(std, _SMALLEST * size), method))
     return tuple(floors)
 
 
-def _noise_floor(source: str, output: str, records: Sequence[Record]) -> tuple[float, str]:
+def _noise_floor(rig: Rig, output: str, records: Sequence[Record]) -> tuple[float, str]:
+    source = rig.inputs[0].name
     repeated = _repeated(source, output, records)
     if repeated is not None:
         return repeated, "repeated periods of the input"
     top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
+    if not rig.is_driven:
+        # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
+        top = min(top, float(np.median([_roughness(record[output]) for record in records])))
     quiet = [q for record in records for q in _quiet_stretches(record, source, output)]
     if quiet:
         return max(float(np.median(quiet)), top), "stretches in which the input rests"
@@ -121,8 +129,9 @@ def _quiet_stretches(record: Record, source: str, output: str) -> list[float]:
         trend = abs(float(np.mean(second) - np.mean(first)))
         scatter = float(np.std(np.diff(settled))) / np.sqrt(2.0)
         deviation = float(np.std(settled))
-        # A drift or a decaying oscillation is not noise.
-        if trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300:
+        # A drift or a decaying oscillation is not noise. What is as rough as white noise is no oscillation.
+        fall = _MAX_FALL if deviation > 3.0 * scatter else _MAX_FALL_OF_WHITE
+        if trend <= max(3.0 * scatter, deviation) and np.std(first) <= fall * np.std(second) + 1e-300:
             found.append(deviation)
     return found
 
@@ -133,3 +142,12 @@ def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
     power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2
     top = power[int(_TOP_OF_SPECTRUM * power.size) :]
     return float(np.sqrt(np.median(top) / np.log(2.0) / np.sum(window**2)))
+
+
+def _roughness(samples: NDArray[np.float64]) -> float:
+    """Return the standard deviation of white noise with the median size of third differences, which rare jumps leave alone."""
+    differences = np.diff(samples, 3)
+    if differences.size == 0:
+        return float("inf")
+    # The variance of a third difference is 1 + 9 + 9 + 1 = 20 times that of the noise; 1.4826 is for the median of a normal.
+    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(20.0))

@@ -14,6 +14,8 @@ _RESAMPLES = 1000
 _MIN_BLOCKS = 8
 _TIE = 0.01
 """Relative difference of held-out errors that no engineer would build a decision on."""
+_PRIOR_PER_EFFECT = 1.0 / 3.0
+"""Odds of one more effect between models with as many numbers and the same error."""
 _MODEL_ERROR = 0.1
 """Share of what the best model leaves above the noise floor that may be worth nothing for the comparison."""
 
@@ -65,12 +67,13 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
     tolerance = np.hypot(_TIE, _MODEL_ERROR * max(best - 1.0, 0.0) / best)
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
-    # Of two models with as many numbers, the one with fewer effects is the simpler.
-    n_free = np.array([m.n_free + 0.1 * len(m.effects) for m in usable])
-    # In each resample the simplest model within the tolerance of the best wins.
+    n_free = np.array([m.n_free for m in usable])
+    prior = _PRIOR_PER_EFFECT ** np.array([len(m.effects) for m in usable])
+    # In each resample the models with the fewest numbers within the tolerance of the best share the win.
     within = resampled <= floor * (1.0 + tolerance)
-    complexity = np.where(within, n_free[None, :] + 0.01 * resampled / floor, np.inf)
-    wins = np.bincount(np.argmin(complexity, axis=1), minlength=len(usable)) / _RESAMPLES
+    fewest = np.min(np.where(within, n_free, np.iinfo(np.int64).max), axis=1, keepdims=True)
+    shares = np.where(within & (n_free == fewest), prior, 0.0)
+    wins = np.mean(shares / np.sum(shares, axis=1, keepdims=True), axis=0)
     likelihood = wins + 1e-3 * np.exp(-20.0 * (errors / best - 1.0))
     probabilities = likelihood / np.sum(likelihood)
     chosen = int(np.argmax(probabilities))

@@ -80,30 +80,49 @@ class Workbench:
     held: frozenset[str]
 
     def free_parameters(self, structure: Structure) -> list[str]:
-        """Return what a fit of this structure moves."""
-        names = [p.name for p in self.rig.parameters if p.name not in self.held]
-        bias = {symbol.name for symbol in self.rig.motion.bias.free_symbols}
-        rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
-        no_spring = {s.name for s in self.rig.motion.stiffness.free_symbols} <= self.held
-        bends = any(_bends_the_spring(effect) for effect in structure.effects)
-        if self.rig.is_driven and no_spring and not bends:
-            names = [name for name in names if name not in rest]
-        elif self.rig.is_driven and rest and not bends:
-            # A linear spring cannot tell a constant force from a shifted rest position.
-            names = [name for name in names if name not in bias]
+        """Return what a fit of this structure moves from the start."""
+        names = {p.name for p in self.rig.parameters} - self.held
+        if self.rig.is_driven:
+            rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
+            if not self._has_spring and not any(_sees_position(e) for e in structure.effects):
+                names -= rest
+            elif rest:
+                # A linear spring cannot tell a constant force from a shifted rest position.
+                names -= self._bias
         fixed = dict(structure.fixed)
         for effect in structure.effects:
-            names += [p.name for p in effect.parameters if p.fitted and p.name not in fixed]
+            for parameter in effect.parameters:
+                name = structure.parameter_name(effect, parameter.name)
+                if parameter.fitted and name not in fixed:
+                    names.add(name)
         return [name for name in structure.names if name in names]
+
+    def releasable_parameters(self, structure: Structure) -> list[str]:
+        """Return what a fit may move once it has settled: a constant force that a bent spring tells from its rest position.
+
+        An even spring cannot: shifting it changes its slope, and that is free already.
+        """
+        bent = any(_sees_position(e) and not e.signature.even_harmonics for e in structure.effects)
+        even = any(_sees_position(e) and e.signature.even_harmonics for e in structure.effects)
+        if not (self.rig.is_driven and self._has_spring and bent and not even):
+            return []
+        return sorted(self._bias - self.held)
+
+    @property
+    def _bias(self) -> set[str]:
+        return {symbol.name for symbol in self.rig.motion.bias.free_symbols}
+
+    @property
+    def _has_spring(self) -> bool:
+        return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
 
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return the effects that make sense on this rig; without a spring none that changes it."""
-        no_spring = {s.name for s in self.rig.motion.stiffness.free_symbols} <= self.held
         return [
             effect
             for effect in effects
             if self.rig.offers(effect)
-            and not (no_spring and (effect.spring is not None or effect.deflection is not None))
+            and (self._has_spring or (effect.spring is None and effect.deflection is None))
         ]
 
     def score(self, effects: tuple[Effect, ...], fit: FitResult) -> Scored:
@@ -113,7 +132,7 @@ class Workbench:
         return Scored(effects, fit, result.residuals, result.initial_states, excess)
 
 
-def _bends_the_spring(effect: Effect) -> bool:
+def _sees_position(effect: Effect) -> bool:
     expressions = [e for e in (effect.torque, effect.deflection) if e is not None]
     return any(canonical.x in expression.free_symbols for expression in expressions)
 

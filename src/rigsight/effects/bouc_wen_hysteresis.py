@@ -79,7 +79,7 @@ BOUC_WEN_HYSTERESIS = Effect(
             "x",
         ),
     ),
-    searched_as=(SumAndDifference("beta", "gamma", sum_range=(-1.0, 1e3), difference_range=(0.0, 2e3)),),
+    searched_as=(SumAndDifference("beta", "gamma", sum_range=(-1.0, 1e3), difference_range=(0.0, 2e3), exponent="n"),),
     starts=(
         _from_secant(0.5, 2.0, 2.0),
         _from_secant(0.3, 0.5, 20.0),

@@ -81,12 +81,16 @@ class SumAndDifference:
         Names of the parameters.
     sum_range, difference_range
         Ranges that a search explores, in characteristic units.
+    exponent
+        Parameter whose reciprocal is the power in which sum and difference are searched; it keeps them apart from that
+        parameter (``(1/(beta + gamma))^(1/n)`` is a length for every n).
     """
 
     first: str
     second: str
     sum_range: tuple[float, float]
     difference_range: tuple[float, float]
+    exponent: str | None = None
 
 
 @dataclass(frozen=True)

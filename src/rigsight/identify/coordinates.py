@@ -18,6 +18,19 @@ _MARGIN = 1e-9
 
 
 @dataclass(frozen=True)
+class _Pair:
+    """Two coordinates that stand for sum and difference, in the power 1/n where an exponent is named."""
+
+    first: int
+    second: int
+    exponent: str | None
+
+    def forward(self, theta: float, power: float) -> float:
+        """Return the sum or difference, in characteristic units, of a coordinate."""
+        return float(np.copysign(np.abs(theta) ** power, theta))
+
+
+@dataclass(frozen=True)
 class Coordinates:
     """Maps a vector of search coordinates to the parameters of a structure and back.
 
@@ -37,7 +50,7 @@ class Coordinates:
     index: NDArray[np.intp]
     scale: NDArray[np.float64]
     logarithmic: NDArray[np.bool_]
-    pairs: tuple[tuple[int, int], ...]
+    pairs: tuple[_Pair, ...]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
 
@@ -63,7 +76,7 @@ class Coordinates:
                 first, second = free.index(pair.first), free.index(pair.second)
                 lower[first], upper[first] = pair.sum_range
                 lower[second], upper[second] = pair.difference_range
-                pairs.append((first, second))
+                pairs.append(_Pair(first, second, pair.exponent))
         return cls(
             structure=structure,
             free=tuple(free),
@@ -78,24 +91,42 @@ class Coordinates:
 
     def to_parameters(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the full parameter vector, shape (n_parameters,), of coordinates of shape (n_free,)."""
-        own = np.array(theta, dtype=np.float64)
-        for first, second in self.pairs:
-            total, difference = theta[first], theta[second]
-            own[first], own[second] = (total + difference) / 2.0, (total - difference) / 2.0
-        own = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, own, 0.0)), own) * self.scale
+        own = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, theta, 0.0)), theta) * self.scale
         p = self.base.copy()
         p[self.index] = own
+        for pair in self.pairs:
+            power = self._power(pair, p)
+            size = self.scale[pair.first] ** power
+            total = pair.forward(theta[pair.first], power) * size
+            difference = pair.forward(theta[pair.second], power) * size
+            p[self.index[pair.first]] = (total + difference) / 2.0
+            p[self.index[pair.second]] = (total - difference) / 2.0
         return p
 
     def from_values(self, values: Mapping[str, float]) -> NDArray[np.float64]:
         """Return the coordinates of parameter values, moved inside the bounds, shape (n_free,)."""
-        own = np.array([values[name] for name in self.free]) / self.scale
+        plain = np.array([values[name] for name in self.free])
+        own = plain / self.scale
         positive = np.where(self.logarithmic, np.maximum(own, 1e-300), 1.0)
         theta = np.where(self.logarithmic, np.log(positive), own)
-        for first, second in self.pairs:
-            theta[first], theta[second] = own[first] + own[second], own[first] - own[second]
+        p = self.base.copy()
+        p[self.index] = plain
+        for pair in self.pairs:
+            power = self._power(pair, p)
+            size = self.scale[pair.first] ** power
+            first, second = plain[pair.first], plain[pair.second]
+            theta[pair.first] = pair.forward((first + second) / size, 1.0 / power)
+            theta[pair.second] = pair.forward((first - second) / size, 1.0 / power)
         width = np.minimum(self.upper - self.lower, 1e6)
         return np.clip(theta, self.lower + _MARGIN * width, self.upper - _MARGIN * width)
+
+    def _power(self, pair: _Pair, p: NDArray[np.float64]) -> float:
+        if pair.exponent is None:
+            return 1.0
+        fixed = dict(self.structure.fixed)
+        if pair.exponent in fixed:
+            return fixed[pair.exponent]
+        return float(p[self.structure.names.index(pair.exponent)])
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return d parameters / d coordinates of the free parameters, shape (n_free, n_free)."""

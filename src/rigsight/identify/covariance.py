@@ -64,9 +64,7 @@ def colored_covariance(
     return np.asarray(covariance[:n_common, :n_common])
 
 
-def propagated_covariance(
-    covariance: NDArray[np.float64], chain: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ``chain covariance chain^T`` where variances may be infinite.
 
     Parameters

@@ -260,7 +260,13 @@ class _Problem:
         for i, (data, state) in enumerate(zip(self.fit.data, self.states(theta), strict=True)):
             try:
                 self.substeps[i] = choose_substeps(
-                    self.fit.structure, data.held, p, state, data.record.n_samples, self.fit.accuracy, _MOST_SUBSTEPS
+                    self.fit.structure,
+                    data.held,
+                    p,
+                    state,
+                    data.record.n_samples,
+                    self.fit.accuracy,
+                    _MOST_SUBSTEPS,
                 )
             except SimulationError:
                 self.substeps[i] = _MOST_SUBSTEPS

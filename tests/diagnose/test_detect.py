@@ -1,0 +1,158 @@
+"""The noise floor comes from the records: what is known to be noise is found, what moves is not taken for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.result import NoiseFloor
+from rigsight.excitation import linear_sweep
+from rigsight.records import Record
+from rigsight.rigs import AXIS, RUNNING_GEAR
+from rigsight.simulate import compose, simulate
+
+DT = 5e-3
+STAGE = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 1e-4, "force_off": 0.0}
+SIGMA = 1e-5
+
+
+def driven(u: NDArray[np.float64], force: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Noise-free displacement of the axis under input and disturbance."""
+    total = u if force is None else u + force
+    record = Record(name="r", dt=DT, signals={"u": total}, units={})
+    return np.asarray(simulate(compose(AXIS), STAGE, record)["x"])
+
+
+def axis_record(u: NDArray[np.float64], x: NDArray[np.float64]) -> Record:
+    return Record(name="r", dt=DT, signals={"u": u, "x": x}, units={})
+
+
+def floor_of(*records: Record) -> NoiseFloor:
+    (floor,) = noise_floors(AXIS, records)
+    return floor
+
+
+def multisine(n: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    phase = rng.uniform(0.0, 2.0 * np.pi, 40)
+    t = np.arange(n) / n
+    return np.sum([np.cos(2.0 * np.pi * (i + 1) * t + p) for i, p in enumerate(phase)], axis=0)
+
+
+def test_repeated_periods() -> None:
+    rng = np.random.default_rng(1)
+    u = np.tile(multisine(1000, rng), 5)
+    x = driven(u) + SIGMA * rng.standard_normal(u.size)
+    floor = floor_of(axis_record(u, x))
+    assert "repeated" in floor.method
+    # Four settled periods leave three degrees of freedom at each of 1000 samples.
+    assert floor.std == pytest.approx(SIGMA, rel=3.0 / np.sqrt(2.0 * 3000))
+
+
+def test_repeated_records() -> None:
+    rng = np.random.default_rng(2)
+    u = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)
+    records = [axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size)) for _ in range(3)]
+    floor = floor_of(*records)
+    assert "repeated" in floor.method
+    assert floor.std == pytest.approx(SIGMA, rel=3.0 / np.sqrt(2.0 * 3000))
+
+
+def test_repetitions_see_the_disturbance_too() -> None:
+    rng = np.random.default_rng(3)
+    u = np.tile(multisine(1000, rng), 9)
+    disturbance = 0.2 * rng.standard_normal(u.size)
+    shaken = driven(np.zeros(u.size), disturbance)[1000:]
+    floor = floor_of(axis_record(u, driven(u, disturbance) + SIGMA * rng.standard_normal(u.size)))
+    # The axis rings for m/d = 0.4 s, so 40 s hold about 100 independent stretches.
+    assert np.std(shaken) > 5.0 * SIGMA
+    assert floor.std == pytest.approx(np.hypot(np.std(shaken), SIGMA), rel=0.2)
+
+
+def test_quiet_stretch_before_a_sweep() -> None:
+    rng = np.random.default_rng(4)
+    u = np.concatenate([np.zeros(800), linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)])
+    floor = floor_of(axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size)))
+    assert "rests" in floor.method
+    assert floor.std == pytest.approx(SIGMA, rel=4.0 / np.sqrt(2.0 * 800))
+
+
+def test_quiet_stretches_see_the_disturbance_that_passes_the_rig() -> None:
+    rng = np.random.default_rng(5)
+    u = np.concatenate([np.zeros(4000), linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)])
+    disturbance = 0.2 * rng.standard_normal(u.size)
+    shaken = driven(np.zeros(u.size), disturbance)
+    floor = floor_of(axis_record(u, driven(u, disturbance) + SIGMA * rng.standard_normal(u.size)))
+    assert "rests" in floor.method
+    # 20 s of ringing with 0.4 s memory: some fifty independent values, 10 % each way.
+    assert floor.std == pytest.approx(np.hypot(np.std(shaken[400:]), SIGMA), rel=0.3)
+    assert floor.std > 5.0 * SIGMA
+
+
+def test_top_of_the_spectrum_is_the_white_noise_of_the_sensor() -> None:
+    rng = np.random.default_rng(6)
+    u = linear_sweep(DT * np.arange(4000), 4.0, 3.0, 50.0)
+    floor = floor_of(axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size)))
+    assert "top of the spectrum" in floor.method
+    # Median of 300 exponentially distributed powers: sigma of the median is 1/ (ln 2 sqrt(300)), halved for the root;
+    # the window makes neighbors depend on each other, which doubles it at most.
+    assert floor.std == pytest.approx(SIGMA, rel=3.0 * 2.0 * 0.5 / (np.log(2.0) * np.sqrt(300.0)))
+
+
+def test_the_decay_after_a_pulse_is_not_noise() -> None:
+    """The input rests for two seconds while the axis still rings at a hundred times the noise."""
+    rng = np.random.default_rng(7)
+    u = np.concatenate([linear_sweep(DT * np.arange(1500), 4.0, 3.0, 20.0), np.zeros(400)])
+    x = driven(u)
+    assert np.std(x[-200:]) > 10.0 * SIGMA
+    floor = floor_of(axis_record(u, x + SIGMA * rng.standard_normal(u.size)))
+    assert floor.std == pytest.approx(SIGMA, rel=0.3)
+
+
+def test_a_drift_is_not_noise() -> None:
+    rng = np.random.default_rng(8)
+    u = np.concatenate([np.zeros(800), linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)])
+    creeping = 100.0 * SIGMA * np.linspace(-1.0, 1.0, u.size)
+    floor = floor_of(axis_record(u, driven(u) + creeping + SIGMA * rng.standard_normal(u.size)))
+    assert floor.std == pytest.approx(SIGMA, rel=0.3)
+
+
+@pytest.mark.parametrize("kind", ["quiet", "repeated", "spectrum"])
+def test_noise_free_records_have_a_positive_floor(kind: str) -> None:
+    sweep = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)
+    u = {
+        "quiet": np.concatenate([np.zeros(800), sweep]),
+        "repeated": np.tile(sweep, 3),
+        "spectrum": sweep,
+    }[kind]
+    x = driven(u)
+    floor = floor_of(axis_record(u, x))
+    assert 0.0 < floor.std < 1e-3 * np.std(x)
+
+
+def test_a_still_output_has_a_floor_that_can_divide() -> None:
+    """An output that never moves and has no noise: residuals are still divided by the floor."""
+    u = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)
+    assert floor_of(axis_record(u, np.full(u.size, 0.1))).std > 0.0
+
+
+def test_each_output_has_its_own_floor_and_one_never_measured_has_none() -> None:
+    rng = np.random.default_rng(9)
+    u = np.concatenate([np.zeros(800), linear_sweep(DT * np.arange(1500), 1.0, 3.0, 30.0)])
+    values = {
+        "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27,
+        "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 1e-3, "l_0": 0.25, "c_y": 0.98, "y_off": -5e-4,
+    }  # fmt: skip
+    clean = simulate(compose(RUNNING_GEAR), values, Record(name="r", dt=DT, signals={"u": u}, units={}))
+    noisy = clean.with_signals(
+        psi=clean["psi"] + SIGMA * rng.standard_normal(u.size),
+        y=clean["y"] + 5.0 * SIGMA * rng.standard_normal(u.size),
+    )
+    psi, y = noise_floors(RUNNING_GEAR, [noisy])
+    assert (psi.output, psi.unit, y.output, y.unit) == ("psi", "rad", "y", "m")
+    assert psi.std == pytest.approx(SIGMA, rel=0.1)
+    assert y.std == pytest.approx(5.0 * SIGMA, rel=0.1)
+    yaw = Record(name="yaw", dt=DT, signals={n: noisy[n] for n in ("u", "psi")}, units={})
+    (only,) = noise_floors(RUNNING_GEAR, [yaw])
+    assert only.output == "psi"

@@ -1,0 +1,115 @@
+"""Models are ranked by held-out error; what cannot be told apart is said to be tied."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.characterize import Scored
+from rigsight.diagnose.rank import Ranking, noise_vector, rank
+
+N = 4000
+
+
+def ranked(*models: Scored, seed: int = 0) -> Ranking:
+    return rank(models, np.ones(1), np.random.default_rng(seed))
+
+
+@pytest.fixture
+def white() -> np.ndarray:
+    return np.random.default_rng(1).standard_normal(N)
+
+
+def test_of_two_that_tie_the_simpler_wins(scored, white) -> None:
+    complex_model = scored(("bouc_wen_hysteresis",), 0.999 * white, n_free=7)
+    simple = scored(("coulomb_friction",), white, n_free=5)
+    ranking = ranked(complex_model, simple)
+    assert ranking.order[0] is simple
+    assert ranking.tied == (complex_model,)
+
+
+def test_a_clearly_better_model_wins_however_complex(scored, white) -> None:
+    complex_model = scored(("bouc_wen_hysteresis",), white, n_free=7)
+    simple = scored(("coulomb_friction",), 1.5 * white, n_free=5)
+    ranking = ranked(simple, complex_model)
+    assert ranking.order[0] is complex_model
+    assert ranking.tied == ()
+    assert ranking.probabilities[0] > 0.99
+
+
+def test_a_difference_of_a_few_percent_in_every_part_of_the_record_is_no_tie(scored, white) -> None:
+    """Both models see the same noise: their errors are compared pairwise, which resolves far less than their scatter."""
+    better = scored(("cubic_stiffness",), white, n_free=5)
+    worse = scored(("end_stop",), 1.05 * white, n_free=5)
+    assert ranked(worse, better).tied == ()
+
+
+def test_an_advantage_in_a_single_stretch_is_not_trusted(scored, white) -> None:
+    burst = white.copy()
+    burst[1000:1040] *= 4.0
+    ranking = ranked(scored(("end_stop",), burst, n_free=5), scored(("cubic_stiffness",), white, n_free=5))
+    assert ranking.order[0].names == ("cubic_stiffness",)
+    assert [m.names for m in ranking.tied] == [("end_stop",)]
+
+
+def test_fewer_effects_win_at_equal_numbers_of_parameters(scored, white) -> None:
+    pair = scored(("cubic_stiffness", "asymmetric_stiffness"), white, n_free=6)
+    single = scored(("end_stop",), white, n_free=6)
+    assert ranked(pair, single).order[0] is single
+
+
+def test_probabilities_sum_to_one_and_follow_the_order_of_errors(scored, white) -> None:
+    names = ["cubic_stiffness", "end_stop", "free_play", "quadratic_damping"]
+    models = [scored((name,), (1.0 + 0.2 * i) * white, n_free=5) for i, name in enumerate(names)]
+    ranking = ranked(*models[::-1])
+    assert sum(ranking.probabilities) == pytest.approx(1.0, abs=1e-12)
+    assert [m.names[0] for m in ranking.order] == names
+    assert all(p >= 0.0 for p in ranking.probabilities)
+    assert list(ranking.probabilities) == sorted(ranking.probabilities, reverse=True)
+
+
+def test_failed_models_come_last_with_nothing(scored, white) -> None:
+    failed = scored(("free_play",))
+    good = scored(("cubic_stiffness",), white, n_free=5)
+    ranking = ranked(failed, good)
+    assert ranking.order == (good, failed)
+    assert ranking.probabilities == (pytest.approx(1.0), 0.0)
+    assert failed not in ranking.tied
+
+
+def test_only_failed_models(scored) -> None:
+    failed = scored(("free_play",))
+    ranking = ranked(failed)
+    assert ranking == Ranking((failed,), (0.0,), ())
+    assert ranked() == Ranking((), (), ())
+
+
+def test_a_model_that_left_the_range_of_numbers_has_failed(scored, white) -> None:
+    diverged = scored(("free_play",), np.full(N, np.inf), n_free=5)
+    assert ranked(diverged, scored(("end_stop",), white, n_free=5)).probabilities[1] == 0.0
+
+
+def test_the_same_seed_gives_the_same_ranking(scored, white) -> None:
+    other = np.random.default_rng(2).standard_normal(N)
+    models = [scored(("cubic_stiffness",), white, n_free=5), scored(("end_stop",), other, n_free=5)]
+    first, second = ranked(*models, seed=3), ranked(*models, seed=3)
+    assert first.probabilities == second.probabilities
+    assert first.order == second.order
+
+
+def test_the_order_of_the_candidates_does_not_matter(scored, white) -> None:
+    a = scored(("cubic_stiffness",), white, n_free=5)
+    b = scored(("end_stop",), 1.3 * white, n_free=5)
+    assert ranked(a, b).order == ranked(b, a).order
+
+
+def test_a_worse_model_far_above_the_floor_may_tie_within_what_the_best_leaves(scored, white) -> None:
+    """At ten times the floor no candidate is the truth: a few percent between them decide nothing. At the floor they do."""
+    for level, expected in ((10.0, 1), (1.0, 0)):
+        best = scored(("cubic_stiffness",), level * white, n_free=5)
+        second = scored(("end_stop",), 1.07 * level * white, n_free=5)
+        assert len(ranked(best, second).tied) == expected
+
+
+def test_an_output_that_was_not_measured_does_not_count() -> None:
+    np.testing.assert_array_equal(noise_vector(["psi", "y"], {"psi": 2.0}), [2.0, np.inf])

@@ -1,0 +1,75 @@
+"""Each verdict begins where the one before it ends."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge
+
+ABOVE, BELOW = 1.001, 0.999
+
+
+@pytest.fixture
+def verdict(scored):
+    def of(before: float, linear: float, best: float) -> Judgement:
+        return judge(before, scored((), excess=linear), scored(("cubic_stiffness",), excess=best))
+
+    return of
+
+
+def test_none_ends_at_the_floor(verdict) -> None:
+    assert verdict(AT_FLOOR, 1.0, 1.0).verdict == "none"
+    assert verdict(AT_FLOOR * ABOVE, 1.0, 1.0).verdict != "none" or AT_FLOOR * ABOVE < 1.1 * 1.0 * ABOVE
+
+
+def test_a_small_gap_that_new_numbers_close_is_parameters_from_a_tenth_on(verdict) -> None:
+    assert verdict(1.1 * 1.05 * ABOVE, 1.05, 1.0).verdict == "parameters"
+    assert verdict(1.1 * 1.05 * BELOW, 1.05, 1.0).verdict == "none"
+
+
+def test_parameters_when_the_same_equations_reach_the_floor(verdict) -> None:
+    found = verdict(5.0, AT_FLOOR, AT_FLOOR)
+    assert (found.verdict, found.model.effects) == ("parameters", ())
+
+
+def test_new_numbers_that_halve_a_gap_but_miss_the_floor_are_not_the_cause(verdict) -> None:
+    assert verdict(20.0, 10.0, 10.0).verdict == "unknown"
+
+
+def test_the_simple_explanation_wins_where_both_reach_the_floor(verdict) -> None:
+    assert verdict(5.0, 1.05, 1.0).verdict == "parameters"
+
+
+def test_an_effect_must_lower_the_error_by_a_tenth(verdict) -> None:
+    assert verdict(5.0, 1.15, 1.15 / 1.1 * BELOW).verdict == "effect"
+    assert verdict(5.0, 1.15, 1.15 / 1.1 * ABOVE).verdict == "unknown"
+
+
+def test_an_effect_must_close_half_of_the_gap_above_the_floor(verdict) -> None:
+    """From 11 to the floor at 1 are ten: closing five leaves six."""
+    assert verdict(11.0, 11.0, 6.0 * BELOW).verdict == "effect"
+    found = verdict(11.0, 11.0, 6.0 * ABOVE)
+    assert found.verdict == "unknown"
+    assert "cubic_stiffness" in found.reason
+
+
+def test_an_effect_that_reaches_the_floor_is_named_whatever_the_gap_was(verdict) -> None:
+    found = verdict(1.3, 1.25, 1.09)
+    assert found.verdict == "effect"
+    assert found.model.names == ("cubic_stiffness",)
+
+
+def test_an_effect_that_leaves_something_says_so(verdict) -> None:
+    found = verdict(20.0, 20.0, 3.0)
+    assert found.verdict == "effect"
+    assert "3 times the noise floor" in found.reason
+
+
+def test_a_failed_candidate_explains_nothing(verdict) -> None:
+    found = verdict(20.0, 20.0, float("inf"))
+    assert (found.verdict, found.model.effects) == ("unknown", ())
+
+
+def test_equations_that_cannot_be_identified_leave_the_effect(verdict) -> None:
+    """The re-identified equations may diverge on a held-out record; an effect at the floor is still found."""
+    assert verdict(20.0, float("inf"), 1.0).verdict == "effect"

@@ -1,0 +1,71 @@
+"""Windows cover a record completely and are long against the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.windows import cut, window_length
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+
+DT = 5e-3
+
+
+def moving(frequency: float, n_samples: int = 8000, name: str = "r", drift: float = 0.0) -> Record:
+    t = DT * np.arange(n_samples)
+    x = np.sin(2.0 * np.pi * frequency * t) / frequency + drift * t
+    return Record(name=name, dt=DT, signals={"u": x, "x": x}, units={}, role="validation", t0=3.0)
+
+
+def test_windows_join_to_the_record() -> None:
+    record = moving(2.0)
+    windows = cut([record], 3.3)
+    np.testing.assert_array_equal(np.concatenate([w["x"] for w in windows]), record["x"])
+    np.testing.assert_allclose(np.concatenate([w.t for w in windows]), record.t, atol=1e-9)
+
+
+def test_windows_are_as_long_as_wished_or_a_little_longer() -> None:
+    length = 3.3
+    windows = cut([moving(2.0)], length)
+    sizes = np.array([w.n_samples for w in windows])
+    assert len(windows) == 12
+    assert np.all(sizes * DT >= length - DT)
+    assert np.ptp(sizes) <= 1
+
+
+def test_windows_keep_role_and_tell_their_record() -> None:
+    windows = cut([moving(2.0, name="a"), moving(2.0, name="b")], 20.0)
+    assert all(w.role == "validation" for w in windows)
+    assert len({w.name for w in windows}) == len(windows) == 4
+    assert [w.name[0] for w in windows] == ["a", "a", "b", "b"]
+
+
+def test_no_length_leaves_records_whole() -> None:
+    records = [moving(2.0), moving(1.0)]
+    assert cut(records, None) == tuple(records)
+
+
+def test_a_record_shorter_than_the_window_stays_whole() -> None:
+    record = moving(2.0, 300)
+    (window,) = cut([record], 100.0)
+    assert window.n_samples == 300
+
+
+@pytest.mark.parametrize("drift", [0.0, 50.0])
+def test_a_window_holds_ten_periods_of_the_motion_whatever_its_drift(drift: float) -> None:
+    assert window_length(AXIS, [moving(2.0, drift=drift)]) == pytest.approx(5.0, rel=0.05)
+
+
+def test_a_window_is_no_longer_than_the_longest_record() -> None:
+    assert window_length(AXIS, [moving(0.1, 2000)]) == pytest.approx(2000 * DT)
+
+
+def test_a_fast_motion_in_a_long_record_keeps_the_number_of_windows_small() -> None:
+    record = moving(60.0, 40000)
+    windows = cut([record], window_length(AXIS, [record]))
+    assert len(windows) <= 40
+
+
+def test_a_window_keeps_enough_samples_for_its_initial_state() -> None:
+    assert window_length(AXIS, [moving(80.0, 1000)]) >= 100 * DT
