@@ -27,7 +27,9 @@ def test_nrmse_is_one_for_a_simulation_that_stays_at_the_mean() -> None:
 def test_nrmse_does_not_depend_on_unit_or_offset_of_the_signal() -> None:
     rng = np.random.default_rng(1)
     measured, residuals = rng.standard_normal(300), 0.1 * rng.standard_normal(300)
-    assert nrmse(1e3 * residuals, 1e3 * measured + 40.0) == pytest.approx(nrmse(residuals, measured), rel=1e-12)
+    assert nrmse(1e3 * residuals, 1e3 * measured + 40.0) == pytest.approx(
+        nrmse(residuals, measured), rel=1e-12
+    )
 
 
 def test_a_constant_signal_has_no_scale() -> None:

@@ -46,7 +46,7 @@ def test_mapping_and_set_are_inverse(values: ParameterSet) -> None:
 def test_missing_and_unknown_names_are_listed() -> None:
     with pytest.raises(InputError, match=r"Missing.*m.*k"):
         ParameterSet.from_mapping(ALL, {"d": 0.5})
-    with pytest.raises(InputError, match="mm.*Known: m, d, k"):
+    with pytest.raises(InputError, match=r"mm.*Known: m, d, k"):
         ParameterSet.from_mapping(ALL, {"mm": 1.0, "m": 1.0, "d": 0.5, "k": 1.0})
 
 

@@ -19,7 +19,7 @@ def verdict(scored):
 
 def test_none_ends_at_the_floor(verdict) -> None:
     assert verdict(AT_FLOOR, 1.0, 1.0).verdict == "none"
-    assert verdict(AT_FLOOR * ABOVE, 1.0, 1.0).verdict != "none" or AT_FLOOR * ABOVE < 1.1 * 1.0 * ABOVE
+    assert verdict(AT_FLOOR * ABOVE, 0.99, 0.99).verdict == "parameters"
 
 
 def test_a_small_gap_that_new_numbers_close_is_parameters_from_a_tenth_on(verdict) -> None:

@@ -37,9 +37,12 @@ def test_white_residuals_are_right_on_average() -> None:
     derivative = regressors(1000)
     exact = np.diag(np.linalg.inv(derivative.T @ derivative))
     rng = np.random.default_rng(2)
-    ratios = np.array([
-        np.diag(colored_covariance([(rng.standard_normal(1000), derivative)], 3)) / exact for _ in range(100)
-    ])
+    ratios = np.array(
+        [
+            np.diag(colored_covariance([(rng.standard_normal(1000), derivative)], 3)) / exact
+            for _ in range(100)
+        ]
+    )
     # 22 lines averaged in each of 100 draws: 1/sqrt(2200) = 2 %.
     np.testing.assert_allclose(np.mean(ratios, axis=0), 1.0, atol=4.0 / np.sqrt(2200.0))
 
@@ -90,7 +93,9 @@ def test_a_coordinate_that_moves_nothing_has_an_infinite_variance() -> None:
     residual = np.random.default_rng(6).standard_normal(N)
     covariance = colored_covariance([(residual, derivative)], 4)
     assert covariance[3, 3] == np.inf
-    np.testing.assert_allclose(covariance[:3, :3], colored_covariance([(residual, regressors())], 3), rtol=1e-9)
+    np.testing.assert_allclose(
+        covariance[:3, :3], colored_covariance([(residual, regressors())], 3), rtol=1e-9
+    )
 
 
 def test_two_coordinates_that_do_the_same_are_not_determined() -> None:

@@ -68,7 +68,9 @@ def test_a_cubic_axis_returns_its_parameters_from_noisy_records_in_motion() -> N
     first_states = (np.array([4e-3, 0.1]), np.array([-2e-3, -0.15]))
     records = [made(CUBIC, truth, rng, 1500, initial_state=state) for state in first_states]
     free = ("m", "d", "k", "x_off", "k_3")
-    linear = fitted(LINEAR, records, truth, free[:4], {**STAGE, **linear_start(AXIS, records, {"gain": 1.0}, {})})
+    linear = fitted(
+        LINEAR, records, truth, free[:4], {**STAGE, **linear_start(AXIS, records, {"gain": 1.0}, {})}
+    )
     assert linear.weighted_rms > 5.0
     result = fitted(CUBIC, records, truth, free, {**linear.values, "k_3": 0.0})
     assert result.success, result.message
@@ -109,7 +111,9 @@ def test_the_compressed_problem_has_the_solution_of_plain_least_squares() -> Non
         return np.asarray((record["x"] - out[:, 0]) / NOISE)
 
     start = np.array([2.0, 5.0, 800.0, 1e-3, 1e-2])
-    plain = least_squares(residuals, np.array([1.0, 1.0, 1.0, 0.0, 0.0]), diff_step=1e-6, xtol=1e-12, ftol=1e-12)
+    plain = least_squares(
+        residuals, np.array([1.0, 1.0, 1.0, 0.0, 0.0]), diff_step=1e-6, xtol=1e-12, ftol=1e-12
+    )
     assert result.cost == pytest.approx(2.0 * plain.cost, rel=1e-6)
     for name, value in zip(free, plain.x[:3] * start[:3], strict=True):
         assert abs(result.values[name] - value) < 0.02 * result.standard_errors[name], name

@@ -63,7 +63,9 @@ def test_axis(hold: Hold) -> None:
     found = linear_start(AXIS, [record], AXIS_CONSTANTS, {})
     for name in ("m", "d", "k"):
         assert found[name] == pytest.approx(STAGE[name], rel=ENGINE), name
-    unpaid = (STAGE["m"] * np.ptp(np.gradient(record["x"], DT)) + STAGE["d"] * np.ptp(record["x"])) / STAGE["k"]
+    unpaid = (STAGE["m"] * np.ptp(np.gradient(record["x"], DT)) + STAGE["d"] * np.ptp(record["x"])) / STAGE[
+        "k"
+    ]
     assert found["x_off"] == pytest.approx(STAGE["x_off"], abs=unpaid / T[-1])
     assert found["force_off"] == 0.0
 

@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.identify import EffectRegression, FitResult, GreyBoxFit
 from rigsight.simulate import Structure, compose
 
 _LOOK_EVALUATIONS = 25
@@ -81,7 +81,10 @@ def fit_candidates(
     progress
         Called with the name of each candidate that is done.
     """
-    looks = _looks(bench, linear, bench.offered(effects), n_jobs)
+    regression = None
+    if bench.rig.is_driven:
+        regression = EffectRegression(bench.rig, bench.estimation, linear.fit.values, bench.scales)
+    looks = _looks(bench, linear, bench.offered(effects), regression, n_jobs)
     lowest = min((look.cost for look in looks), default=float("inf"))
 
     def one(look: Look) -> Scored:
@@ -94,7 +97,13 @@ def fit_candidates(
     return refine(bench, models, n_jobs)
 
 
-def _looks(bench: Workbench, linear: Scored, effects: Sequence[Effect], n_jobs: int) -> list[Look]:
+def _looks(
+    bench: Workbench,
+    linear: Scored,
+    effects: Sequence[Effect],
+    regression: EffectRegression | None,
+    n_jobs: int,
+) -> list[Look]:
     """Look at every effect; those that start from a simpler one come after it."""
     names = {effect.name for effect in effects}
     done: dict[str, Look] = {}
@@ -105,7 +114,7 @@ def _looks(bench: Workbench, linear: Scored, effects: Sequence[Effect], n_jobs: 
         waiting = [effect for effect in waiting if effect not in ready]
         parents = {name: look.fits[0].values for name, look in done.items() if np.isfinite(look.cost)}
         looks = Parallel(n_jobs=n_jobs, prefer="threads")(
-            delayed(_look)(bench, (effect,), linear.fit.values, parents) for effect in ready
+            delayed(_look)(bench, (effect,), linear.fit.values, parents, regression) for effect in ready
         )
         done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
     return [done[effect.name] for effect in effects]
@@ -130,7 +139,7 @@ def fit_candidate(
     hold
         Rig parameters to keep at their base value.
     """
-    look = _look(bench, effects, base, {}, hold)
+    look = _look(bench, effects, base, {}, hold=hold)
     return refine(bench, [_followed(bench, look, promising=True)])[0]
 
 
@@ -155,12 +164,17 @@ def _look(
     effects: tuple[Effect, ...],
     base: Mapping[str, float],
     parents: Mapping[str, Mapping[str, float]],
+    regression: EffectRegression | None = None,
     hold: frozenset[str] = frozenset(),
 ) -> Look:
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
     structure = compose(bench.rig, effects, special)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
     fit = GreyBoxFit(structure, bench.look, bench.scales, bench.noise, _LOOK_ACCURACY)
+    starts = list(start_values(bench, effects[-1], base, parents))
+    regressed = regression.start(effects[-1]) if regression is not None else None
+    if regressed is not None:
+        starts.append({**starts[0], **regressed})
     fits = [
         fit.fit(
             start,
@@ -169,7 +183,7 @@ def _look(
             tolerance=_LOOK_TOLERANCE,
             finish=False,
         )
-        for start in start_values(bench, effects[-1], base, parents)
+        for start in starts
     ]
     return Look(effects, structure, free, _distinct(fits))
 

@@ -20,9 +20,8 @@ _SAME_INPUT = 1e-3
 _QUIET_INPUT = 1e-3
 _MIN_QUIET = 100
 _TOP_OF_SPECTRUM = 0.85
-_MAX_FALL = 1.3
-"""Standard deviation of the first half over that of the second in a stretch that does not decay."""
-_MAX_FALL_OF_WHITE = 2.0
+_FREE_MODES = 6
+_MAX_HANKEL_ROWS = 200
 _SMALLEST = 1e-9
 
 
@@ -68,29 +67,32 @@ def _repeated(source: str, output: str, records: Sequence[Record]) -> float | No
     for record in records:
         period = _period(record[source])
         if period is None:
-            segments.append((record[source], record[output]))
+            segments.append((record[source], record[output], False))
             continue
         count = record.n_samples // period
         # The first period still holds the transient.
         for i in range(1 if count > 1 else 0, count):
             part = slice(i * period, (i + 1) * period)
-            segments.append((record[source][part], record[output][part]))
+            segments.append((record[source][part], record[output][part], count > 1))
     squares: list[float] = []
     used: set[int] = set()
-    for i, (first_input, first_output) in enumerate(segments):
+    for i, (first_input, first_output, first_settled) in enumerate(segments):
         if i in used:
             continue
         size = float(np.std(first_input)) or 1.0
-        group = [first_output]
+        group, settled = [first_output], first_settled
         for j in range(i + 1, len(segments)):
-            other_input, other_output = segments[j]
+            other_input, other_output, other_settled = segments[j]
             if other_input.size != first_input.size or j in used:
                 continue
             if np.max(np.abs(other_input - first_input)) <= _SAME_INPUT * size:
                 group.append(other_output)
+                settled = settled and other_settled
                 used.add(j)
         if len(group) > 1:
-            squares.append(float(np.mean(np.var(np.array(group), axis=0, ddof=1))))
+            # Whole records may start in different motion; by their second half they have forgotten it.
+            start = 0 if settled else first_input.size // 2
+            squares.append(float(np.mean(np.var(np.array(group)[:, start:], axis=0, ddof=1))))
     return float(np.sqrt(np.mean(squares))) if squares else None
 
 
@@ -130,10 +132,30 @@ def _quiet_stretches(record: Record, source: str, output: str) -> list[float]:
         scatter = float(np.std(np.diff(settled))) / np.sqrt(2.0)
         deviation = float(np.std(settled))
         # A drift or a decaying oscillation is not noise. What is as rough as white noise is no oscillation.
-        fall = _MAX_FALL if deviation > 3.0 * scatter else _MAX_FALL_OF_WHITE
-        if trend <= max(3.0 * scatter, deviation) and np.std(first) <= fall * np.std(second) + 1e-300:
+        steady = trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300
+        if steady and (deviation <= 3.0 * scatter or not _is_free_motion(settled)):
             found.append(deviation)
     return found
+
+
+def _is_free_motion(samples: NDArray[np.float64]) -> bool:
+    """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch.
+
+    Ringing that a disturbance keeps up changes phase and amplitude with every period or so; no exponential follows it for long.
+
+    References
+    ----------
+    R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
+    """
+    rows = min(samples.size // 3, _MAX_HANKEL_ROWS)
+    hankel = np.lib.stride_tricks.sliding_window_view(samples - np.mean(samples), samples.size - rows + 1)
+    subspace = np.linalg.eigh(hankel @ hankel.T)[1][:, -_FREE_MODES:]
+    poles = np.linalg.eigvals(np.linalg.lstsq(subspace[:-1], subspace[1:], rcond=None)[0])
+    poles = poles / np.maximum(np.abs(poles), 1.0)
+    modes = poles[None, :] ** np.arange(samples.size)[:, None]
+    centered = samples - np.mean(samples)
+    explained = np.real(modes @ np.linalg.lstsq(modes, centered.astype(complex), rcond=1e-10)[0])
+    return float(np.std(centered - explained)) < 0.5 * float(np.std(centered))
 
 
 def _top_of_spectrum(samples: NDArray[np.float64]) -> float:

@@ -295,9 +295,11 @@ class _Problem:
         normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
         for index, (residual, derivative) in enumerate(self.sensitivities(theta)):
             columns = self._columns(index)
-            cost += float(residual @ residual)
-            normal[np.ix_(columns, columns)] += derivative.T @ derivative
-            gradient[columns] += derivative.T @ residual
+            # A diverging simulation overflows here; that is what the check below is for.
+            with np.errstate(over="ignore", invalid="ignore"):
+                cost += float(residual @ residual)
+                normal[np.ix_(columns, columns)] += derivative.T @ derivative
+                gradient[columns] += derivative.T @ residual
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
         self._best = min(self._best, cost)

@@ -12,17 +12,17 @@ Identification: A Frequency Domain Approach* (Wiley 2012), sections 6.3 and 9.8.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.identify.equation_error import solve_in_frequency, spectra_of
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
 
-_ITERATIONS = 20
-_TRANSIENT_ORDER = 2
 _OUTPUTS = frozenset(signal.name for rig in RIGS.values() if rig.is_driven for signal in rig.outputs)
 _STILL = 1e-12
 """Range of a signal relative to its size that is rounding."""
@@ -149,61 +149,9 @@ def _equation_error(
     """Solve ``sum_i a_i (j omega)^order_i X = gain U + transient`` for the a_i."""
     for name in (source, response):
         _check_moves(records, name)
-    blocks = [_spectra(record, source, response) for record in records]
-    top = max(float(np.max(omega)) for omega, _, _ in blocks)
-    n_transient = _TRANSIENT_ORDER + 1
-    n_columns = len(orders) + n_transient * len(blocks)
-    denominators = [np.ones_like(omega, dtype=complex) for omega, _, _ in blocks]
-    solution = np.zeros(n_columns)
-    for _ in range(_ITERATIONS):
-        normal = np.zeros((n_columns, n_columns))
-        right = np.zeros(n_columns)
-        for index, ((omega, drive, x), denominator) in enumerate(zip(blocks, denominators, strict=True)):
-            s = 1j * omega / top
-            columns = np.zeros((omega.size, n_columns), dtype=complex)
-            for i, order in enumerate(orders):
-                columns[:, i] = s**order * x
-            first = len(orders) + index * n_transient
-            for power in range(n_transient):
-                columns[:, first + power] = -(s**power)
-            weighted = columns / denominator[:, None]
-            target = gain * drive / denominator
-            normal += np.real(weighted.conj().T @ weighted)
-            right += np.real(weighted.conj().T @ target)
-        size = np.sqrt(np.diag(normal)) + 1e-300
-        previous = solution
-        scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-14)[0]
-        solution = scaled / size
-        for index, (omega, _, _) in enumerate(blocks):
-            s = 1j * omega / top
-            value = sum(solution[i] * s**order for i, order in enumerate(orders))
-            denominators[index] = np.where(np.abs(value) > 0.0, value, 1.0)
-        if np.allclose(solution[: len(orders)], previous[: len(orders)], rtol=1e-6):
-            break
-    return np.array([solution[i] / top**order for i, order in enumerate(orders)])
-
-
-def _spectra(
-    record: Record, source: str, response: str
-) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return omega, held input and response of the lines on which the response stands above its noise."""
-    u = record[source] - np.mean(record[source])
-    x = record[response] - np.mean(record[response])
-    omega = 2.0 * np.pi * np.fft.rfftfreq(u.size, record.dt)[1:]
-    drive, spectrum = np.fft.rfft(u)[1:] / u.size, np.fft.rfft(x)[1:] / u.size
-    phase = omega * record.dt / 2.0
-    sinc = np.sin(phase) / phase
-    # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
-    hold = "band_limited" if source in _OUTPUTS else record.hold
-    if hold == "zoh":
-        drive = drive * sinc * np.exp(-1j * phase)
-    elif hold == "foh":
-        drive = drive * sinc**2
-    power = np.abs(spectrum) ** 2
-    floor = np.median(power[int(0.9 * power.size) :])
-    significant = (power > 25.0 * floor) & (omega < 0.8 * np.pi / record.dt)
-    excited = np.abs(drive) > 1e-3 * np.max(np.abs(drive))
-    keep = significant & excited
-    if np.count_nonzero(keep) < 20:
-        keep = excited
-    return omega[keep], drive[keep], spectrum[keep]
+    if source in _OUTPUTS:
+        # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
+        records = [replace(record, hold="band_limited") for record in records]
+    blocks = [spectra_of(record, source, response) for record in records]
+    terms = [[(order, block.response) for order in orders] for block in blocks]
+    return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks]).coefficients
