@@ -23,6 +23,7 @@ _TOP_OF_SPECTRUM = 0.85
 _FREE_MODES = 6
 _MAX_HANKEL_ROWS = 200
 _SMALLEST = 1e-9
+_WHITE_ONLY = "top of the spectrum (white noise only)"
 
 
 def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
@@ -42,7 +43,15 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
             std, method = _noise_floor(rig, signal.name, holding)
             spread = max(float(np.std(record[signal.name])) for record in holding)
             size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
-            floors.append(NoiseFloor(signal.name, signal.unit, max(std, _SMALLEST * size), method))
+            floors.append(
+                NoiseFloor(
+                    signal.name,
+                    signal.unit,
+                    max(std, _SMALLEST * size),
+                    method,
+                    lower_bound=method == _WHITE_ONLY,
+                )
+            )
     return tuple(floors)
 
 
@@ -58,7 +67,7 @@ def _noise_floor(rig: Rig, output: str, records: Sequence[Record]) -> tuple[floa
     quiet = [q for record in records for q in _quiet_stretches(record, source, output)]
     if quiet:
         return max(float(np.median(quiet)), top), "stretches in which the input rests"
-    return top, "top of the spectrum (white noise only)"
+    return top, _WHITE_ONLY
 
 
 def _repeated(source: str, output: str, records: Sequence[Record]) -> float | None:

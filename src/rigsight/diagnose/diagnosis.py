@@ -130,7 +130,7 @@ def diagnose(
     ranking = rank(singles, vector, rng)
     if ranking.order and ranking.order[0].residuals:
         ranking = _with_offset_rivals(bench, ranking, effects, vector, rng)
-        judgement = judge(before.excess, linear, ranking.order[0])
+        judgement = judge(before.excess, linear, ranking.order[0], any(floor.lower_bound for floor in floors))
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     notes.append(judgement.reason)

@@ -83,12 +83,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Standard deviation of what no model can explain in an output, and how it was found."""
+    """Standard deviation of what no model can explain in an output, and how it was found.
+
+    ``lower_bound`` says that only white noise was seen: colored noise and disturbances may stand above it.
+    """
 
     output: str
     unit: str
     std: float
     method: str
+    lower_bound: bool = False
 
 
 @dataclass(frozen=True)
@@ -181,7 +185,12 @@ class Diagnosis:
                 for output, gap in self.gap.items()
             },
             "noise_floor": {
-                floor.output: {"std": _number(floor.std), "unit": floor.unit, "method": floor.method}
+                floor.output: {
+                    "std": _number(floor.std),
+                    "unit": floor.unit,
+                    "method": floor.method,
+                    "lower_bound": floor.lower_bound,
+                }
                 for floor in self.noise_floors
             },
             "gap_by_record": [],

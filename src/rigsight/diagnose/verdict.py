@@ -9,6 +9,8 @@ from rigsight.diagnose.workbench import Scored
 
 AT_FLOOR = 1.1
 """RMS in units of the noise floor that counts as the floor itself: floors are known to a few percent."""
+AT_LOWER_BOUND = 3.0
+"""The same where the floor is only a lower bound: white noise rarely is less than a third of all noise on a bench."""
 _WORTHWHILE = 1.1
 """Factor by which a model must lower the held-out error to be believed to explain anything."""
 _HALF = 0.5
@@ -24,7 +26,7 @@ class Judgement:
     reason: str
 
 
-def judge(before_excess: float, linear: Scored, best: Scored) -> Judgement:
+def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool = False) -> Judgement:
     """Return the verdict on the held-out errors, all in units of the noise floor.
 
     Parameters
@@ -35,20 +37,26 @@ def judge(before_excess: float, linear: Scored, best: Scored) -> Judgement:
         The re-identified equations.
     best
         The best model with an effect.
+    lower_bound
+        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
+        may stand well above it, so that a modest rest which no model lowers is taken for noise.
     """
-    if before_excess <= AT_FLOOR:
-        return Judgement("none", linear, "The given simulation leaves no more than the noise floor.")
+    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
     helps = best.excess * _WORTHWHILE < linear.excess
-    if linear.excess <= AT_FLOOR or not helps:
-        if linear.excess * _WORTHWHILE < before_excess and linear.excess <= AT_FLOOR:
+    retuned = linear.excess * _WORTHWHILE < before_excess
+    needs_effect = helps and linear.excess > AT_FLOOR
+    if before_excess <= AT_FLOOR or (before_excess <= at_floor and not (needs_effect or retuned)):
+        return Judgement("none", linear, "The given simulation leaves no more than the noise floor.")
+    if not needs_effect and linear.excess <= at_floor:
+        if retuned:
             return Judgement(
                 "parameters", linear, "Better numbers for the same equations reach the noise floor."
             )
-        if linear.excess <= AT_FLOOR:
-            return Judgement("none", linear, "The gap is too small against the noise floor to have a cause.")
+        return Judgement("none", linear, "The gap is too small against the noise floor to have a cause.")
+    if not helps:
         return Judgement("unknown", linear, "No effect of the catalogue lowers the held-out error.")
     closed = (linear.excess - best.excess) / (linear.excess - 1.0)
-    if best.excess > AT_FLOOR and closed < _HALF:
+    if best.excess > at_floor and closed < _HALF:
         return Judgement(
             "unknown",
             best,
@@ -56,9 +64,10 @@ def judge(before_excess: float, linear: Scored, best: Scored) -> Judgement:
         )
     if best.excess <= AT_FLOOR:
         return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
+    floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
     return Judgement(
         "effect",
         best,
-        f"The effect closes {closed:.0%} of the re-identified gap but leaves {best.excess:.3g} times the noise floor: "
-        f"something smaller is missing too, or its form differs.",
+        f"The effect closes {closed:.0%} of the re-identified gap but leaves {best.excess:.3g} times {floor}: "
+        f"something smaller is missing too, its form differs, or there is more noise than the floor tells.",
     )

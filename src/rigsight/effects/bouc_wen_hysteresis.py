@@ -23,7 +23,16 @@ Hysteresis* (Wiley 2007); thesis, equations (6.1) to (6.3).
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State, SumAndDifference
+from rigsight.effects.effect import (
+    Effect,
+    Energy,
+    GainTrend,
+    Place,
+    Signature,
+    Start,
+    State,
+    SumAndDifference,
+)
 from rigsight.effects.symbols import deflection_rate, k, spring_torque, x_size
 from rigsight.parameters import Parameter
 
@@ -62,10 +71,44 @@ BOUC_WEN_HYSTERESIS = Effect(
     summary="Part of the spring torque lags behind the deflection and depends on its history (rounded loops).",
     parameters=(
         Parameter("A", "scale of z, redundant", "", lower=1e-6, upper=1e6, default=1.0, fitted=False),
-        Parameter("a", "share of the stiffness without memory", "", lower=0.0, upper=1.0, null=1.0, starts=(0.3, 0.7), search=(0.0, 1.0)),
-        Parameter("beta", "loop shape, even part", "x^-1", lower=-1e12, upper=1e12, starts=(3.0, 10.0), search=(0.0, 1e3)),
-        Parameter("gamma", "loop shape, odd part", "x^-1", lower=-1e12, upper=1e12, starts=(0.0, -5.0), search=(-1e3, 1e3)),
-        Parameter("n", "sharpness of the transition", "", lower=1.0, upper=20.0, default=1.0, starts=(1.0,), search=(1.0, 20.0)),
+        Parameter(
+            "a",
+            "share of the stiffness without memory",
+            "",
+            lower=0.0,
+            upper=1.0,
+            null=1.0,
+            starts=(0.3, 0.7),
+            search=(0.0, 1.0),
+        ),
+        Parameter(
+            "beta",
+            "loop shape, even part",
+            "x^-1",
+            lower=-1e12,
+            upper=1e12,
+            starts=(3.0, 10.0),
+            search=(0.0, 1e3),
+        ),
+        Parameter(
+            "gamma",
+            "loop shape, odd part",
+            "x^-1",
+            lower=-1e12,
+            upper=1e12,
+            starts=(0.0, -5.0),
+            search=(-1e3, 1e3),
+        ),
+        Parameter(
+            "n",
+            "sharpness of the transition",
+            "",
+            lower=1.0,
+            upper=20.0,
+            default=1.0,
+            starts=(1.0,),
+            search=(1.0, 20.0),
+        ),
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),
@@ -79,7 +122,9 @@ BOUC_WEN_HYSTERESIS = Effect(
             "x",
         ),
     ),
-    searched_as=(SumAndDifference("beta", "gamma", sum_range=(-1.0, 1e3), difference_range=(0.0, 2e3), exponent="n"),),
+    searched_as=(
+        SumAndDifference("beta", "gamma", sum_range=(-1.0, 1e3), difference_range=(0.0, 2e3), exponent="n"),
+    ),
     starts=(
         _from_secant(0.5, 2.0, 2.0),
         _from_secant(0.3, 0.5, 20.0),

@@ -153,7 +153,7 @@ def _weighted_solution(
     size = np.sqrt(np.diag(normal)) + 1e-300
     scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-14)[0]
     solution = scaled / size
-    return solution, float(np.sqrt(max(energy - solution @ right, 0.0)))
+    return solution, float(np.sqrt(max(energy - float(solution @ right), 0.0)))
 
 
 def _own_denominator(
