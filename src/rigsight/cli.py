@@ -13,7 +13,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
@@ -201,9 +201,9 @@ def simulate(
     initial_state: Annotated[
         str | None,
         typer.Option(
-            metavar="STATE=VALUE,...",
+            metavar="STATE=VALUE,...|estimated",
             show_default="rest at the first input",
-            help="States that start elsewhere: psi=0.01,w=0.",
+            help="States that start elsewhere (psi=0.01,w=0), or 'estimated' from the outputs in the record.",
         ),
     ] = None,
     quiet: Quiet = False,
@@ -244,7 +244,9 @@ def _columns(given: list[str]) -> dict[str, ColumnMapping]:
     return columns
 
 
-def _states(given: str | None) -> dict[str, float]:
+def _states(given: str | None) -> dict[str, float] | Literal["estimated"]:
+    if given == "estimated":
+        return "estimated"
     states = {}
     for text in (given or "").split(",") if given else []:
         name, _, value = text.partition("=")
@@ -252,7 +254,7 @@ def _states(given: str | None) -> dict[str, float]:
             states[name.strip()] = float(value)
         except ValueError:
             raise InputError(
-                f"--initial-state '{text}' cannot be read; write STATE=VALUE, for instance psi=0.01,w=0."
+                f"--initial-state '{text}' cannot be read; write STATE=VALUE, for instance psi=0.01,w=0, or estimated."
             ) from None
         if not math.isfinite(states[name.strip()]):
             raise InputError(f"--initial-state '{text}' must be a finite number.")

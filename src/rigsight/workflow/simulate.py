@@ -6,11 +6,13 @@ import io
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
+from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
 from rigsight.simulate import parameter_vector, record_input, rest_state, simulate
@@ -27,7 +29,7 @@ def run_simulate(
     out: str | Path | None = None,
     *,
     columns: Mapping[str, ColumnMapping] | None = None,
-    initial_state: Mapping[str, float] | None = None,
+    initial_state: Mapping[str, float] | Literal["estimated"] | None = None,
 ) -> Record:
     """Simulate a model for the input of a record.
 
@@ -36,14 +38,14 @@ def run_simulate(
     model
         A ``model.json`` or the folder that holds one.
     record
-        Delimited text file with time and input; other columns are not read.
+        Delimited text file with time and input; the outputs are read only where initial states are estimated.
     out
         CSV file for time, input and simulated outputs; None writes nothing.
     columns
         Where time ``t`` and the input stand; by default in columns of their own names.
     initial_state
         States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
-        input sample.
+        input sample; "estimated" fits all of them to the outputs measured in the record, and nothing else.
 
     Raises
     ------
@@ -56,6 +58,8 @@ def run_simulate(
     rig = read.structure.rig
     columns = columns or {}
     known = [TIME, *(signal.name for signal in rig.inputs)]
+    if initial_state == "estimated":
+        known += [signal.name for signal in rig.outputs]
     for name in columns:
         if name not in known:
             raise InputError(
@@ -64,8 +68,20 @@ def run_simulate(
             )
     if out is not None:
         check_target(Path(out))
-    driven = read_record(Path(record), rig.inputs, (), columns=columns, require_outputs=False, hold=read.hold)
-    state = _initial_state(read, driven, initial_state) if initial_state else None
+    estimated = initial_state == "estimated"
+    driven = read_record(
+        Path(record),
+        rig.inputs,
+        rig.outputs if estimated else (),
+        columns=columns,
+        require_outputs=estimated,
+        hold=read.hold,
+    )
+    state = None
+    if estimated:
+        state = _estimated_state(read, driven)
+    elif isinstance(initial_state, Mapping) and initial_state:
+        state = _initial_state(read, driven, initial_state)
     simulated = simulate(read.structure, read.values, driven, state)
     if out is not None:
         names = [signal.name for signal in (*rig.inputs, *rig.outputs)]
@@ -92,6 +108,16 @@ def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> 
             raise InputError(f"Initial state '{name}' must be a finite number, got {value}.")
         state[names.index(own)] = value
     return state
+
+
+def _estimated_state(model: Model, record: Record) -> NDArray[np.float64]:
+    rig = model.structure.rig
+    noise = {s.name: float(np.std(record[s.name])) or 1.0 for s in rig.outputs if s.name in record}
+    scales = characteristic_scales(rig, [record], model.values)
+    result = GreyBoxFit(model.structure, [record], scales, noise).fit(model.values, [])
+    if not result.residuals:
+        raise InputError(f"The initial state cannot be estimated: {result.message}")
+    return result.initial_states[0]
 
 
 def _csv_text(record: Record, names: list[str]) -> str:
