@@ -88,7 +88,11 @@ def diagnosis() -> Diagnosis:
             trace("sweep_A0.25.csv", "estimation", ("psi", "y"), amplitude=0.25),
         ),
         units=UNITS,
-        model={"parameters": {"J_z": 0.56}, "effect_parameters": {}, "units": {"J_z": "kg m^2"}},
+        model={
+            "parameters": {"J_z": 0.5612, "k_c": 700.4, "k_d": 2.04},
+            "effect_parameters": {"A": 1.0, "a": 0.0903, "beta": 1203.0, "gamma": 497.0, "n": 1.0},
+            "units": {"J_z": "kg m^2"},
+        },
         notes=("Record step_A0.6.csv holds no y.", "With the effect the simulation reaches the noise floor."),
     )
 

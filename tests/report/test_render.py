@@ -132,7 +132,7 @@ def test_records_that_were_scored_come_first_and_open(diagnosis: Diagnosis) -> N
 
 def test_parameters_without_a_fit_come_from_the_model(variant: Callable[[str], Diagnosis]) -> None:
     words = Page(render(variant("none"))).words()
-    assert "J_z 0.56 kg m 2 yaw inertia of the axle bridge" in words
+    assert "J_z 0.5612 kg m 2 yaw inertia of the axle bridge" in words
 
 
 def test_long_records_make_no_heavy_page(variant: Callable[[str], Diagnosis]) -> None:

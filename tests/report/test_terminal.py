@@ -26,7 +26,8 @@ def test_ten_lines_say_verdict_gap_ranking_and_parameters(diagnosis: Diagnosis) 
     assert "down to 1.04 x the noise floor" in text
     assert "42 % given, 13 % re-identified, 0.94 % with effect (noise floor 0.9 %)" in text
     assert "Bouc-Wen hysteresis: probability 91 %, 1.04 x floor" in text
-    assert "k_c = 700.4 +/- 1.7 N m/rad" in text
+    assert "beta = 1203 +/- 31 1/rad" in text
+    assert "k_c" not in text, "the rig's own numbers are for the report"
     assert "gamma = not determined by these records" in text
 
 

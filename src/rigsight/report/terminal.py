@@ -76,9 +76,15 @@ def _rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield f"candidate {rank}", _candidate(candidate)
     named = named_candidate(diagnosis)
     if named is not None and named.parameters:
+        # The effect's own numbers are the news; the report and the results hold all of them.
+        own = diagnosis.model.get("effect_parameters", {}) if diagnosis.effects else named.parameters
         yield (
             "parameters",
-            "; ".join(f"{name} = {estimate_text(estimate)}" for name, estimate in named.parameters.items()),
+            "; ".join(
+                f"{name} = {estimate_text(estimate)}"
+                for name, estimate in named.parameters.items()
+                if name in own
+            ),
         )
 
 
