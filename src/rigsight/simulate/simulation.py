@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,7 @@ def simulate(
     record: Record,
     initial_state: NDArray[np.float64] | None = None,
     accuracy: float = DEFAULT_ACCURACY,
+    before: NDArray[np.float64] | None = None,
 ) -> Record:
     """Simulate a record's input and return the outputs as a record of the same form.
 
@@ -62,12 +64,22 @@ def simulate(
         Shape (n_states,), in the order of ``structure.states``; default is the static equilibrium at the first input sample.
     accuracy
         Relative RMS error to aim for.
+    before
+        Input samples (the prescribed displacement, where there is one) just before the record at its sample time, shape
+        (n_before,): what hysteresis, friction and delays remember. The initial state is then that at the first of them.
 
     Raises
     ------
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
+    if before is not None and len(before) > 0:
+        source = structure.rig.inputs[0].name
+        earlier = np.concatenate([before, record[source]])
+        longer = replace(record, signals={source: earlier}, t0=record.t0 - len(before) * record.dt)
+        whole = simulate(structure, values, longer, initial_state, accuracy)
+        names = [signal.name for signal in structure.rig.outputs]
+        return record.with_signals(**{name: whole[name][len(before) :] for name in names})
     complete = structure
     structure, values = without_vanished_effects(complete, values)
     held = record_input(structure, record)
