@@ -187,13 +187,13 @@ def _with_offset_rivals(
     A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
     """
     best = ranking.order[0]
-    bias = {symbol.name for symbol in bench.rig.motion.bias.free_symbols}
+    released = bench.releasable_parameters(best.fit.structure)
     needed = [
         name
         for name in best.fit.free
-        if name in bias and abs(best.fit.values[name]) > _SIGNIFICANT * best.fit.standard_errors[name]
+        if name in released and abs(best.fit.values[name]) > _SIGNIFICANT * best.fit.standard_errors[name]
     ]
-    if not (needed and bench.rig.is_driven) or best.effects[0].signature.even_harmonics:
+    if not needed:
         return ranking
     rivals = []
     for effect in effects:

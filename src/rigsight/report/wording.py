@@ -173,7 +173,7 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
 def basis_sentence(diagnosis: Diagnosis) -> str:
     """Return on which records the errors were measured."""
     windows = (
-        f" in windows of {diagnosis.windows:.3g} s, each with its own initial state"
+        f", scored in windows of {diagnosis.windows:.3g} s, each with its own initial state"
         if diagnosis.windows is not None
         else ""
     )
