@@ -23,7 +23,7 @@ from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge
 from rigsight.diagnose.windows import WINDOW, cut, window_length
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.errors import InputError
+from rigsight.errors import InputError, SimulationError
 from rigsight.identify import GreyBoxFit, characteristic_scales, linear_start
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
@@ -89,7 +89,7 @@ def diagnose(
     InputError
         If there is no estimation record or it does not move the rig.
     SimulationError
-        If the given simulation cannot be run.
+        If the rig's own equations cannot be simulated near the records.
     """
     say = progress or (lambda _: None)
     estimation = tuple(r for r in task.records if r.role == "estimation")
@@ -108,7 +108,7 @@ def diagnose(
 
     no_spring = _no_spring(task)
     length = window_length(task.rig, estimation) if no_spring else None
-    start = _start(task, estimation, {})
+    start = _start(task, estimation)
     fitted = cut(estimation, length)
     bench = Workbench(
         rig=task.rig,
@@ -120,6 +120,10 @@ def diagnose(
         held=_held(task, estimation, no_spring),
     )
     linear = fit_linear(bench, start)
+    if not linear.residuals:
+        raise SimulationError(
+            f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
+        )
     say("re-identified")
     before = _before(task, bench, estimation, linear)
     say("given simulation")
@@ -141,9 +145,9 @@ def _no_spring(task: Task) -> bool:
     return task.rig.name == "axis" and task.given.get("k") == 0.0
 
 
-def _start(task: Task, estimation: Sequence[Record], known: Mapping[str, float]) -> dict[str, float]:
+def _start(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
     held = {"k": 0.0} if _no_spring(task) else {}
-    return {**task.constants, **linear_start(task.rig, estimation, task.constants, {**held, **known})}
+    return {**task.constants, **linear_start(task.rig, estimation, task.constants, held)}
 
 
 def _held(task: Task, estimation: Sequence[Record], no_spring: bool) -> frozenset[str]:
@@ -167,7 +171,7 @@ def _before(task: Task, bench: Workbench, estimation: Sequence[Record], linear: 
     if not task.given:
         return linear
     structure = compose(task.rig)
-    start = {**_start(task, estimation, {}), **linear.fit.values, **task.given}
+    start = {**_start(task, estimation), **linear.fit.values, **task.given}
     missing = [name for name in bench.free_parameters(structure) if name not in task.given]
     fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise).fit(start, missing)
     if not fit.residuals:
