@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.excitation import linear_sweep, log_sweep, step
+from rigsight.excitation import (
+    crest_factor,
+    linear_sweep,
+    log_sweep,
+    multisine,
+    multisine_lines,
+    step,
+    stepped_sine,
+    time_bandwidth_product,
+)
 
 T = 1e-3 * np.arange(20_001)
 
@@ -47,3 +56,89 @@ def test_a_step_rises_at_its_start() -> None:
     signal = step(T, 0.6, 5.0)
     assert set(signal[T < 5.0]) == {0.0}
     assert set(signal[T >= 5.0]) == {0.6}
+
+
+N = 2000
+DT = 5e-3
+
+
+def test_the_thesis_sweep_has_the_time_bandwidth_product_it_reports() -> None:
+    assert time_bandwidth_product(150.0, 1e-3, 640.0) == pytest.approx(15278.9, abs=0.05)
+
+
+def test_a_sine_has_the_crest_factor_of_a_sine() -> None:
+    assert crest_factor(np.sin(2.0 * np.pi * np.arange(1000) / 100)) == pytest.approx(np.sqrt(2.0))
+    with pytest.raises(InputError, match="no crest factor"):
+        crest_factor(np.zeros(10))
+
+
+def test_a_stepped_sine_gives_every_frequency_its_whole_periods() -> None:
+    omega = 2.0 * np.pi * np.array([2.0, 4.0, 5.0])
+    signal = stepped_sine(T, 1.5, omega, cycles=8)
+    ends = np.concatenate([[0.0], np.cumsum(8.0 * 2.0 * np.pi / omega)])
+    for one, start, end in zip(omega, ends, ends[1:], strict=False):
+        turn = (start <= T) & (end > T)
+        np.testing.assert_allclose(signal[turn], 1.5 * np.sin(one * (T[turn] - start)), atol=1e-9)
+    assert np.all(signal[ends[-1] < T] == 0.0)
+    assert np.max(np.abs(np.diff(signal))) < 1.01 * 1.5 * omega[-1] * T[1]
+    with pytest.raises(InputError, match="give more time"):
+        stepped_sine(T, 1.0, omega, cycles=100)
+    with pytest.raises(InputError, match="highest frequency must be above 0"):
+        stepped_sine(T, 1.0, np.array([1.0, 5000.0]))
+    with pytest.raises(InputError, match="at least one period"):
+        stepped_sine(T, 1.0, omega, cycles=0)
+
+
+@pytest.mark.parametrize("kind", ["full", "odd", "odd_random"])
+def test_a_multisine_excites_its_lines_and_nothing_else(kind: str) -> None:
+    lines = multisine_lines(N, DT, 1.0, 60.0, kind, np.random.default_rng(1))
+    wave = multisine(N, DT, lines, 0.7, np.random.default_rng(2))
+    amplitudes = 2.0 / N * np.abs(np.fft.rfft(wave.samples))
+    np.testing.assert_allclose(amplitudes[lines], wave.amplitudes)
+    assert np.max(np.delete(amplitudes, lines)) < 1e-12
+    assert np.sqrt(np.mean(wave.periods(3) ** 2)) == pytest.approx(0.7)
+    assert wave.omega[0] >= 1.0
+    assert wave.omega[-1] <= 60.0
+
+
+def test_one_odd_line_of_every_group_detects() -> None:
+    odd = multisine_lines(N, DT, 1.0, 60.0, "odd")
+    kept = multisine_lines(N, DT, 1.0, 60.0, "odd_random", np.random.default_rng(3), group=4)
+    omitted = np.setdiff1d(odd, kept)
+    assert np.all(odd % 2 == 1)
+    assert omitted.size == odd.size // 4
+    np.testing.assert_array_equal(np.searchsorted(odd, omitted) // 4, np.arange(omitted.size))
+
+
+def test_a_given_spectrum_stays_while_the_crest_factor_falls() -> None:
+    lines = multisine_lines(N, DT, 1.0, 60.0)
+    spectrum = 1.0 / np.sqrt(lines)
+    plain = multisine(N, DT, lines, 1.0, np.random.default_rng(4), spectrum)
+    flat = multisine(N, DT, lines, 1.0, np.random.default_rng(4), spectrum, crest_iterations=300)
+    assert flat.crest_factor < 1.75 < 2.5 < plain.crest_factor
+    found = np.abs(np.fft.rfft(flat.samples))[lines]
+    np.testing.assert_allclose(found / found[0], spectrum / spectrum[0])
+    turned = multisine(N, DT, lines[::-1], 1.0, np.random.default_rng(4), spectrum[::-1])
+    np.testing.assert_allclose(turned.samples, plain.samples)
+
+
+def test_a_multisine_that_cannot_be_is_told() -> None:
+    rng = np.random.default_rng(5)
+    with pytest.raises(InputError, match="Nyquist frequency 628"):
+        multisine_lines(N, DT, 1.0, 700.0)
+    with pytest.raises(InputError, match="use a longer period"):
+        multisine_lines(N, DT, 1.0, 1.1)
+    with pytest.raises(InputError, match="needs 4"):
+        multisine_lines(N, DT, 1.0, 3.0, "odd_random", rng)
+    with pytest.raises(InputError, match="need a random generator"):
+        multisine_lines(N, DT, 1.0, 60.0, "odd_random")
+    with pytest.raises(InputError, match="The kind of lines is 'even'"):
+        multisine_lines(N, DT, 1.0, 60.0, "even")
+    with pytest.raises(InputError, match="different whole numbers from 1"):
+        multisine(N, DT, np.array([0, 1]), 1.0, rng)
+    with pytest.raises(InputError, match="one number or of shape"):
+        multisine(N, DT, np.array([1, 3]), 1.0, rng, np.ones(3))
+    with pytest.raises(InputError, match="must be positive"):
+        multisine(N, DT, np.array([1, 3]), -1.0, rng)
+    with pytest.raises(InputError, match="at least one period"):
+        multisine(N, DT, np.array([1, 3]), 1.0, rng).periods(0)

@@ -1,4 +1,4 @@
-"""Which input signals to drive a rig with: sweeps and steps as samples over given times."""
+"""Which inputs change their frequency or level in time: sweeps, stepped sines and steps, as samples over given times."""
 
 from __future__ import annotations
 
@@ -86,6 +86,46 @@ def step(t: NDArray[np.float64], amplitude: float, start: float) -> NDArray[np.f
     return np.where(t >= start, amplitude, 0.0)
 
 
+def stepped_sine(
+    t: NDArray[np.float64], amplitude: float, omega: NDArray[np.float64], cycles: int = 10
+) -> NDArray[np.float64]:
+    """Return one sine after the other without a break, each for whole periods, then zero, shape (n_samples,).
+
+    Parameters
+    ----------
+    t
+        Equally spaced times [s], shape (n_samples,); the first sine begins at the first.
+    amplitude
+        Amplitude, in the unit of the input.
+    omega
+        Angular frequencies [rad/s] in the order of their turns, shape (n_frequencies,).
+    cycles
+        Periods of each frequency.
+
+    Raises
+    ------
+    InputError
+        If a frequency is not positive or above the Nyquist frequency, or the times are too short for all periods.
+    """
+    tau, duration = _elapsed(t)
+    wished = np.asarray(omega, dtype=np.float64)
+    if wished.ndim != 1 or wished.size == 0 or cycles < 1:
+        raise InputError(
+            f"A stepped sine needs frequencies of shape (n_frequencies,) and at least one period of each, got shape "
+            f"{wished.shape} and {cycles} periods."
+        )
+    _check_frequencies(t, float(wished.min()), float(wished.max()), math.ulp(0.0), ("lowest", "highest"))
+    ends = np.concatenate([[0.0], np.cumsum(2.0 * np.pi * cycles / wished)])
+    # The last period ends one sample after the last one, as the last sample of a period is not its first.
+    if ends[-1] > (duration + tau[1]) * (1.0 + 1e-9):
+        raise InputError(
+            f"{cycles} periods of {wished.size} frequencies last {ends[-1]:.4g} s, and the times {duration:.4g} s: give more "
+            "time, fewer periods or fewer low frequencies."
+        )
+    phase = np.interp(tau, ends, 2.0 * np.pi * cycles * np.arange(ends.size))
+    return np.where(tau < ends[-1], amplitude * np.sin(phase), 0.0)
+
+
 def _elapsed(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     if t.ndim != 1 or t.size < 2:
         raise InputError(
@@ -95,12 +135,18 @@ def _elapsed(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     return tau, float(tau[-1])
 
 
-def _check_frequencies(t: NDArray[np.float64], omega_start: float, omega_stop: float, lowest: float) -> None:
+def _check_frequencies(
+    t: NDArray[np.float64],
+    omega_start: float,
+    omega_stop: float,
+    lowest: float,
+    names: tuple[str, str] = ("start", "end"),
+) -> None:
     nyquist = math.pi * (t.size - 1) / float(t[-1] - t[0])
-    for what, omega in (("start", omega_start), ("end", omega_stop)):
+    for what, omega in zip(names, (omega_start, omega_stop), strict=True):
         if not lowest <= omega <= nyquist:
             least = "at least 0" if lowest == 0.0 else "above 0"
             raise InputError(
-                f"The sweep's {what} frequency must be {least} and at most the Nyquist frequency {nyquist:.4g} rad/s, "
+                f"The {what} frequency must be {least} and at most the Nyquist frequency {nyquist:.4g} rad/s, "
                 f"got {omega:g} rad/s."
             )

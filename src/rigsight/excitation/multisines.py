@@ -1,0 +1,200 @@
+"""Which periodic inputs excite chosen lines: multisines with random phases.
+
+References
+----------
+R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 4 and 5. E. Van der
+Ouderaa, J. Schoukens and J. Renneboog, IEEE Trans. Instrumentation and Measurement 37 (1988) 145, for the crest factor.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigsight.errors import InputError, check_option
+from rigsight.excitation.measures import crest_factor
+
+Lines = Literal["full", "odd", "odd_random"]
+
+_CLIP = 0.9
+"""Share of the peak that an iteration clips at: lower converges faster, and to a higher crest factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Multisine:
+    """One period of a sum of sines.
+
+    Attributes
+    ----------
+    dt
+        Sample time [s].
+    lines
+        Excited multiples of the fundamental, increasing, shape (n_lines,).
+    amplitudes
+        Amplitude of each sine, in the unit of the input, shape (n_lines,).
+    phases
+        Phase of each cosine at the first sample [rad], shape (n_lines,).
+    samples
+        One period, shape (n_per_period,).
+    """
+
+    dt: float
+    lines: NDArray[np.int_]
+    amplitudes: NDArray[np.float64]
+    phases: NDArray[np.float64]
+    samples: NDArray[np.float64]
+
+    @property
+    def omega(self) -> NDArray[np.float64]:
+        """Angular frequencies of the lines [rad/s], shape (n_lines,)."""
+        return np.asarray(2.0 * np.pi * self.lines / (self.samples.size * self.dt))
+
+    @property
+    def crest_factor(self) -> float:
+        """Peak over root mean square."""
+        return crest_factor(self.samples)
+
+    def periods(self, count: int) -> NDArray[np.float64]:
+        """Return `count` periods, shape (count * n_per_period,).
+
+        Raises
+        ------
+        InputError
+            If `count` is below one.
+        """
+        if count < 1:
+            raise InputError(f"A multisine lasts at least one period, got {count}.")
+        return np.tile(self.samples, count)
+
+
+def multisine_lines(
+    n_per_period: int,
+    dt: float,
+    omega_lower: float,
+    omega_upper: float,
+    kind: Lines = "full",
+    rng: np.random.Generator | None = None,
+    group: int = 4,
+) -> NDArray[np.int_]:
+    """Return the multiples of the fundamental to excite, shape (n_lines,).
+
+    Parameters
+    ----------
+    n_per_period
+        Samples in one period; its length sets the distance of the lines.
+    dt
+        Sample time [s].
+    omega_lower, omega_upper
+        Limits of the band [rad/s].
+    kind
+        ``"full"``: all; ``"odd"``: odd multiples, so that even distortion falls beside them; ``"odd_random"``: of every
+        `group` odd multiples a random one is left out, so that odd distortion shows there.
+    rng
+        Chooses the lines to leave out; only ``"odd_random"`` needs it.
+    group
+        Odd multiples per detection line, at least 2.
+
+    Raises
+    ------
+    InputError
+        If the band holds no line, reaches the Nyquist frequency, or is too narrow for one group.
+    """
+    check_option("The kind of lines", kind, get_args(Lines))
+    fundamental = 2.0 * math.pi / (n_per_period * dt)
+    nyquist = math.pi / dt
+    if not 0.0 <= omega_lower <= omega_upper < nyquist:
+        raise InputError(
+            f"A multisine needs 0 <= lower <= upper limit < Nyquist frequency {nyquist:.4g} rad/s, got {omega_lower:g} and "
+            f"{omega_upper:g} rad/s."
+        )
+    first = max(math.ceil(omega_lower / fundamental - 1e-9), 1)
+    lines = np.arange(first, math.floor(omega_upper / fundamental + 1e-9) + 1)
+    if kind != "full":
+        lines = lines[lines % 2 == 1]
+    needed = group if kind == "odd_random" else 1
+    if lines.size < needed:
+        raise InputError(
+            f"The band {omega_lower:g} to {omega_upper:g} rad/s holds {lines.size} lines of kind '{kind}' at a distance of "
+            f"{fundamental:.4g} rad/s, and needs {needed}: widen it, or use a longer period."
+        )
+    if kind != "odd_random":
+        return lines
+    if rng is None or group < 2:
+        raise InputError(
+            f"Random detection lines need a random generator and groups of at least 2 lines, got group {group}."
+        )
+    groups = lines.size // group
+    omitted = group * np.arange(groups) + rng.integers(group, size=groups)
+    return np.delete(lines, omitted)
+
+
+def multisine(
+    n_per_period: int,
+    dt: float,
+    lines: NDArray[np.int_],
+    effective: float,
+    rng: np.random.Generator,
+    spectrum: ArrayLike = 1.0,
+    crest_iterations: int = 0,
+) -> Multisine:
+    """Return one period of a multisine with independent, uniformly distributed phases.
+
+    Parameters
+    ----------
+    n_per_period
+        Samples in one period.
+    dt
+        Sample time [s].
+    lines
+        Multiples of the fundamental to excite, shape (n_lines,), as of `multisine_lines`.
+    effective
+        Root mean square, in the unit of the input.
+    rng
+        Draws the phases.
+    spectrum
+        Relative amplitudes of the lines, positive, one number or shape (n_lines,); they are scaled to `effective`.
+    crest_iterations
+        Rounds of clipping that lower the crest factor. The phases are random no more then: leave it at 0 for realisations
+        that a best linear approximation is averaged over.
+
+    Raises
+    ------
+    InputError
+        If lines repeat or lie outside 1 to below the Nyquist line, or an amplitude or `effective` is not positive.
+    """
+    chosen = np.unique(lines)
+    if chosen.size == 0 or chosen.size != np.size(lines) or chosen[0] < 1 or 2 * chosen[-1] >= n_per_period:
+        raise InputError(
+            f"Lines must be different whole numbers from 1 to below {n_per_period / 2:g}, half the samples of a period."
+        )
+    try:
+        relative = np.broadcast_to(np.asarray(spectrum, dtype=np.float64), chosen.shape)
+    except ValueError:
+        raise InputError(
+            f"The spectrum must be one number or of shape {chosen.shape}, got {np.shape(spectrum)}."
+        ) from None
+    if not ((relative > 0.0).all() and np.isfinite(relative).all() and 0.0 < effective < math.inf):
+        raise InputError("Amplitudes of lines and the root mean square must be positive, finite numbers.")
+    # Amplitudes belong to the lines as they were given, whatever their order.
+    amplitudes = relative[np.argsort(lines)]
+    amplitudes = amplitudes * (effective * math.sqrt(2.0) / float(np.linalg.norm(amplitudes)))
+
+    def period(phases: NDArray[np.float64]) -> NDArray[np.float64]:
+        coefficients = np.zeros(n_per_period // 2 + 1, dtype=np.complex128)
+        coefficients[chosen] = 0.5 * n_per_period * amplitudes * np.exp(1j * phases)
+        return np.asarray(np.fft.irfft(coefficients, n_per_period))
+
+    phases = rng.uniform(0.0, 2.0 * np.pi, chosen.size)
+    samples = period(phases)
+    best = phases, samples
+    for _ in range(crest_iterations):
+        peak = _CLIP * float(np.max(np.abs(samples)))
+        phases = np.angle(np.fft.rfft(np.clip(samples, -peak, peak))[chosen])
+        samples = period(phases)
+        if crest_factor(samples) < crest_factor(best[1]):
+            best = phases, samples
+    return Multisine(dt=dt, lines=chosen, amplitudes=amplitudes, phases=best[0], samples=best[1])

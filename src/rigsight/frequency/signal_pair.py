@@ -1,0 +1,172 @@
+"""Which two signals of a record an estimator reads, and at which frequencies the source says anything."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.record import Hold, Record
+
+_UNEXCITED = 1e-4
+"""Power, relative to the strongest frequency, below which a source counts as silent: 40 dB."""
+
+
+def pair_unit(record: Record, source: str, response: str) -> str:
+    """Return the unit of response over source, ``"1"`` where both are dimensionless."""
+    above, below = (record.units.get(signal) or "1" for signal in (response, source))
+    return above if below == "1" else f"{above}/{below}"
+
+
+def check_alike(records: Sequence[Record], source: str, response: str) -> None:
+    """Check that the records can be averaged.
+
+    Raises
+    ------
+    InputError
+        If there are none, or sample times or units differ.
+    """
+    if not records:
+        raise InputError("A frequency response needs at least one record, got none.")
+    first = records[0]
+    for record in records:
+        record[source], record[response]
+        if not math.isclose(record.dt, first.dt, rel_tol=1e-9):
+            raise InputError(
+                f"Records to be averaged need the same sample time: '{first.name}' has {first.dt:g} s, "
+                f"'{record.name}' {record.dt:g} s."
+            )
+        units = pair_unit(first, source, response), pair_unit(record, source, response)
+        if units[0] != units[1]:
+            raise InputError(
+                f"Records to be averaged need the same units: '{first.name}' gives {units[0]}, '{record.name}' {units[1]}."
+            )
+
+
+def line_frequencies(n_samples: int, dt: float) -> NDArray[np.float64]:
+    """Return the angular frequencies between zero and Nyquist, both excluded, of `n_samples` samples [rad/s].
+
+    Shape ((n_samples - 1) // 2,); they are lines ``1 : (n_samples + 1) // 2`` of a real Fourier transform.
+    """
+    lines = np.arange(1, (n_samples + 1) // 2, dtype=np.float64)
+    return np.asarray(lines * (2.0 * math.pi / (n_samples * dt)), dtype=np.float64)
+
+
+def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[np.complex128]:
+    """Return how a hold changes the ratio of sampled signals, shape (n_frequencies,).
+
+    Samples of the response divided by samples of a held source show ``G(j omega)`` times this factor, and images of
+    ``G`` around multiples of the sampling frequency, which are small for a response that falls off below Nyquist.
+
+    Parameters
+    ----------
+    omega
+        Angular frequencies [rad/s], shape (n_frequencies,).
+    dt
+        Sample time [s].
+    hold
+        How the source goes on between its samples: constant (``"zoh"``), on a straight line (``"foh"``), or without
+        content above the Nyquist frequency (``"band_limited"``: the factor is 1), as a measured motion does.
+
+    References
+    ----------
+    K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prentice Hall 1997), section 7.6.
+    """
+    half = 0.5 * omega * dt
+    sinc = np.sinc(half / np.pi)
+    if hold == "zoh":
+        return np.asarray(sinc * np.exp(-1j * half))
+    if hold == "foh":
+        return np.asarray(sinc**2, dtype=np.complex128)
+    return np.ones(omega.shape, dtype=np.complex128)
+
+
+def excited(
+    omega: NDArray[np.float64],
+    power: NDArray[np.float64],
+    band: tuple[float, float] | None,
+    what: str,
+) -> NDArray[np.bool_]:
+    """Return which frequencies can be estimated, shape (n_frequencies,).
+
+    Parameters
+    ----------
+    omega
+        Angular frequencies [rad/s], shape (n_frequencies,).
+    power
+        Power density of the source, shape (n_frequencies,).
+    band
+        Lower and upper limit wished for [rad/s]; None takes all that the source excites.
+    what
+        Names record and source in the message.
+
+    Raises
+    ------
+    InputError
+        If the source is silent, or silent in a part of `band`.
+
+    Notes
+    -----
+    A frequency is silent if its power is 40 dB below the strongest both per rad/s and per octave: neither the falling
+    density of a logarithmic sweep nor the few low octaves of a linear one are a lack of excitation.
+    """
+    strongest, per_octave = power.max(initial=0.0), omega * power
+    if strongest <= 0.0:
+        raise InputError(f"{what} is constant: without excitation there is no frequency response.")
+    heard = np.asarray(
+        (power >= _UNEXCITED * strongest) | (per_octave >= _UNEXCITED * per_octave.max()), dtype=np.bool_
+    )
+    if band is None:
+        return heard
+    lower, upper = band
+    if not 0.0 <= lower < upper:
+        raise InputError(
+            f"A band needs 0 <= lower < upper limit, got {lower:g} and {upper:g} rad/s: swap or widen them."
+        )
+    wished = np.asarray((omega >= lower) & (omega <= upper), dtype=np.bool_)
+    if not wished.any():
+        raise InputError(
+            f"{what} has no frequency from {lower:g} to {upper:g} rad/s; it reaches from {omega[0]:.4g} to "
+            f"{omega[-1]:.4g} rad/s in steps of {omega[1] - omega[0] if omega.size > 1 else omega[0]:.4g} rad/s."
+        )
+    silent = wished & ~heard
+    if silent.any():
+        heard_omega = omega[heard]
+        raise InputError(
+            f"{what} does not excite {omega[silent][0]:.4g} to {omega[silent][-1]:.4g} rad/s of the band wished for, "
+            f"{lower:g} to {upper:g} rad/s. It excites {heard_omega[0]:.4g} to {heard_omega[-1]:.4g} rad/s: choose a band "
+            "within, or record with a wider excitation."
+        )
+    return wished
+
+
+def check_resolution(resolution: float, duration: float, needed: float, what: str) -> None:
+    """Check that a record is long enough for a resolution.
+
+    Parameters
+    ----------
+    resolution
+        Width wished for [rad/s].
+    duration
+        Length of the record [s].
+    needed
+        Spectral lines of the record that must fit into that width.
+    what
+        Names the record in the message.
+
+    Raises
+    ------
+    InputError
+        Saying how long the record must be, or which resolution it has.
+    """
+    if not (math.isfinite(resolution) and resolution > 0.0):
+        raise InputError(f"A resolution must be a positive number of rad/s, got {resolution!r}.")
+    line = 2.0 * math.pi / duration
+    if resolution < needed * line * (1.0 - 1e-9):
+        raise InputError(
+            f"{what} lasts {duration:.4g} s: too short for a resolution of {resolution:.4g} rad/s. Record at least "
+            f"{needed * 2.0 * math.pi / resolution:.4g} s, or allow at least {needed * line:.4g} rad/s."
+        )
