@@ -47,7 +47,24 @@ def colored_covariance(
         first += n_own
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
         filling[np.ix_(columns, columns)] += _spectral_product(residual, derivative)
-    if n_total == 0:
+    return sandwich_covariance(bread, filling)[:n_common, :n_common]
+
+
+def sandwich_covariance(bread: NDArray[np.float64], filling: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``bread^-1 filling bread^-1`` with infinite variances of coordinates that the bread does not determine.
+
+    Parameters
+    ----------
+    bread
+        J^T J of the weighted residuals, shape (n, n).
+    filling
+        Covariance of J^T r, shape (n, n); the bread itself where the residuals are independent with variance 1.
+
+    Returns
+    -------
+    Shape (n, n).
+    """
+    if bread.shape[0] == 0:
         return np.zeros((0, 0))
     size = np.sqrt(np.diag(bread))
     size[size == 0.0] = 1.0
@@ -61,7 +78,7 @@ def colored_covariance(
     covariance[undetermined, :] = 0.0
     covariance[:, undetermined] = 0.0
     covariance[undetermined, undetermined] = np.inf
-    return np.asarray(covariance[:n_common, :n_common])
+    return np.asarray(covariance)
 
 
 def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,281 @@
+"""Do sweeps and steps share one parameter set? One fit of all records beside fits of each kind alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from rigsight.errors import InputError
+from rigsight.identify.fit_result import FitResult
+from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.linear_start import linear_start
+from rigsight.identify.physical import LEVEL
+from rigsight.identify.scales import characteristic_scales
+from rigsight.records.record import Record
+from rigsight.simulate import Structure
+
+_NOISE_ROUNDS = 3
+_SETTLED = 0.02
+_DIFFERENT = 0.01
+"""Probability of a difference as large by chance, below which two parameter sets are told apart."""
+
+
+@dataclass(frozen=True)
+class RecordResidual:
+    """What a parameter set leaves of one record.
+
+    Attributes
+    ----------
+    record, kind
+        Name and kind of the record.
+    rms
+        RMS of measured minus simulated by output, in its unit.
+    relative
+        The same over the RMS of the measured output about its mean.
+    """
+
+    record: str
+    kind: str
+    rms: dict[str, float]
+    relative: dict[str, float]
+
+
+@dataclass(frozen=True)
+class KindFit:
+    """The fit of one kind of records, and how it does on all.
+
+    Attributes
+    ----------
+    kind
+        ``"sweep"``, ``"step"``, ...
+    fit
+        Fit of the records of this kind alone.
+    residuals
+        Of every record, also those that were not fitted (only their initial state is).
+    shift
+        By parameter: this kind's value less the joint one's, in standard errors of this kind's; NaN where it is undetermined.
+    """
+
+    kind: str
+    fit: FitResult
+    residuals: tuple[RecordResidual, ...]
+    shift: dict[str, float]
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """One parameter set for records of several kinds.
+
+    Attributes
+    ----------
+    fit
+        The fit of all records.
+    noise
+        Standard deviation by which residuals of each output were divided.
+    residuals
+        What it leaves of every record.
+    kinds
+        The fits of each kind alone.
+    probability
+        Chance of parameter differences between the kinds as large as found, if one set serves all (chi-squared).
+    statement
+        The answer in words.
+    """
+
+    fit: FitResult
+    noise: dict[str, float]
+    residuals: tuple[RecordResidual, ...]
+    kinds: tuple[KindFit, ...]
+    probability: float
+    statement: str
+
+    def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
+        """Return the confidence interval of a fitted parameter of the joint set."""
+        width = float(norm.ppf(0.5 + 0.5 * level)) * self.fit.standard_errors[name]
+        return self.fit.values[name] - width, self.fit.values[name] + width
+
+
+def fit_jointly(
+    structure: Structure,
+    records: Sequence[Record],
+    constants: Mapping[str, float],
+    known: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
+    output_noise: Mapping[str, float] | None = None,
+    max_evaluations: int = 60,
+) -> JointFit:
+    """Fit one parameter set to sweeps and steps together, and one to each kind for comparison.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    records
+        Records of at least two kinds (``Record.kind``).
+    constants
+        The rig's constants by name.
+    known
+        Parameters that keep their value.
+    start
+        Start values, required for parameters of effects; those of the rig are found from the spectra where missing.
+    output_noise
+        Standard deviation of the residuals of each output. Default: estimated from the joint fit's own residuals, repeatedly.
+    max_evaluations
+        Limit of each fit.
+
+    Raises
+    ------
+    InputError
+        If all records are of one kind, a record's input never moves, or an effect's start value is missing.
+    """
+    groups = {kind: [r for r in records if r.kind == kind] for kind in dict.fromkeys(r.kind for r in records)}
+    _check(structure, records, list(groups))
+    held = dict(known or {})
+    begin = {
+        **constants,
+        **linear_start(structure.rig, records, constants, held),
+        **dict(start or {}),
+        **held,
+    }
+    begin = {**{p.name: p.default for p in structure.parameters if p.default is not None}, **begin}
+    missing = [name for name in structure.names if name not in begin]
+    if missing:
+        raise InputError(
+            f"Start values are missing for: {', '.join(missing)}. Give them as start, or as known to keep them."
+        )
+    fixed = {*held, *constants}
+    free = tuple(p.name for p in structure.parameters if p.fitted and p.name not in fixed)
+    scales = characteristic_scales(structure.rig, records, begin)
+    noise = dict(output_noise) if output_noise is not None else _spread(structure, records)
+    fit = GreyBoxFit(structure, records, scales, noise).fit(begin, free, max_evaluations=max_evaluations)
+    if output_noise is None:
+        for _ in range(_NOISE_ROUNDS):
+            found = _residual_noise(structure, fit, noise)
+            settled = all(abs(found[name] / noise[name] - 1.0) < _SETTLED for name in noise)
+            noise = found
+            fit = GreyBoxFit(structure, records, scales, noise).fit(
+                fit.values, free, fit.initial_states, max_evaluations
+            )
+            if settled:
+                break
+    kinds = []
+    for kind, own in groups.items():
+        alone = GreyBoxFit(structure, own, scales, noise).fit(fit.values, free, None, max_evaluations)
+        scored = GreyBoxFit(structure, records, scales, noise).fit(alone.values, ())
+        kinds.append(KindFit(kind, alone, _residuals(records, scored), _shift(alone, fit)))
+    probability, differing = _same_set(kinds)
+    return JointFit(
+        fit,
+        noise,
+        _residuals(records, fit),
+        tuple(kinds),
+        probability,
+        _statement(kinds, probability, differing, fit),
+    )
+
+
+def _check(structure: Structure, records: Sequence[Record], kinds: Sequence[str]) -> None:
+    if len(kinds) < 2:
+        found = f"all {len(records)} are of kind '{kinds[0]}'" if kinds else "there are none"
+        raise InputError(
+            f"A joint fit compares records of different kinds, and {found}. Add steps to sweeps or sweeps to steps (Record.kind) "
+            "or use GreyBoxFit for one kind."
+        )
+    source = structure.rig.inputs[0].name
+    for record in records:
+        if np.ptp(record[source]) <= 1e-12 * np.max(np.abs(record[source])):
+            raise InputError(
+                f"Record '{record.name}': '{source}' never moves, so this {record.kind} tells nothing. Leave the record out."
+            )
+
+
+def _spread(structure: Structure, records: Sequence[Record]) -> dict[str, float]:
+    names = [s.name for s in structure.rig.outputs if any(s.name in r for r in records)]
+    return {
+        name: max(0.01 * float(np.std(np.concatenate([r[name] for r in records if name in r]))), 1e-12)
+        for name in names
+    }
+
+
+def _residual_noise(structure: Structure, fit: FitResult, noise: Mapping[str, float]) -> dict[str, float]:
+    if not fit.residuals:
+        return dict(noise)
+    found = {}
+    for i, signal in enumerate(structure.rig.outputs):
+        if signal.name in noise:
+            left = np.concatenate([residual[:, i] for residual in fit.residuals])
+            found[signal.name] = max(float(np.sqrt(np.nanmean(left**2))), 1e-6 * noise[signal.name])
+    return found
+
+
+def _residuals(records: Sequence[Record], fit: FitResult) -> tuple[RecordResidual, ...]:
+    results = []
+    for record, residual in zip(records, fit.residuals, strict=False):
+        rms, relative = {}, {}
+        for i, signal in enumerate(fit.structure.rig.outputs):
+            if signal.name in record:
+                rms[signal.name] = float(np.sqrt(np.mean(residual[:, i] ** 2)))
+                relative[signal.name] = rms[signal.name] / max(float(np.std(record[signal.name])), 1e-300)
+        results.append(RecordResidual(record.name, record.kind, rms, relative))
+    return tuple(results)
+
+
+def _shift(alone: FitResult, joint: FitResult) -> dict[str, float]:
+    shift = {}
+    for name in joint.free:
+        error = alone.standard_errors[name]
+        known = 0.0 < error < np.inf
+        shift[name] = (alone.values[name] - joint.values[name]) / error if known else float("nan")
+    return shift
+
+
+def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
+    """Test that all kinds have one set: deviations from the weighted mean; records of different kinds are independent.
+
+    Parameters that one of the kinds leaves undetermined (alone or by a direction shared with others) do not take part.
+    """
+    free = kinds[0].fit.free
+    usable = [
+        i
+        for i in range(len(free))
+        if all(
+            np.isfinite(k.fit.covariance[i, i]) and 0.0 < k.fit.standard_errors[free[i]] < np.inf
+            for k in kinds
+        )
+    ]
+    if not usable or not all(k.fit.residuals for k in kinds):
+        return float("nan"), ()
+    picked = np.ix_(usable, usable)
+    values = [np.array([k.fit.values[free[i]] for i in usable]) for k in kinds]
+    size = np.sqrt(np.mean([np.diag(k.fit.covariance[picked]) for k in kinds], axis=0))
+    weights = [np.linalg.pinv(k.fit.covariance[picked] / np.outer(size, size), hermitian=True) for k in kinds]
+    mean = np.linalg.solve(sum(weights), sum(w @ (v / size) for w, v in zip(weights, values, strict=True)))
+    distance = sum(
+        float((v / size - mean) @ w @ (v / size - mean)) for w, v in zip(weights, values, strict=True)
+    )
+    degrees = len(usable) * (len(kinds) - 1)
+    differing = []
+    for j, i in enumerate(usable):
+        spread = [v[j] for v in values]
+        error = float(np.sqrt(sum(k.fit.covariance[i, i] for k in kinds)))
+        if max(spread) - min(spread) > float(norm.ppf(1.0 - _DIFFERENT / 2.0)) * error:
+            differing.append(free[i])
+    return float(chi2.sf(distance, degrees)), tuple(differing)
+
+
+def _statement(kinds: Sequence[KindFit], probability: float, differing: Sequence[str], fit: FitResult) -> str:
+    names = " and ".join(k.kind + "s" for k in kinds)
+    if not np.isfinite(probability):
+        return f"{names} have no parameter in common that each of them determines; nothing can be compared."
+    if not fit.success:
+        return f"The joint fit did not converge: {fit.message}"
+    if probability >= _DIFFERENT:
+        return f"One parameter set serves {names}: differences as large arise by chance with probability {probability:.2g}."
+    which = f" They differ in {', '.join(differing)}." if differing else ""
+    return (
+        f"{names} have different parameters under this model (probability of chance {probability:.1g}).{which} The model lacks "
+        "something that changes with amplitude or frequency."
+    )

@@ -1,0 +1,127 @@
+"""One parameter set for sweeps and steps where there is one, and a plain no where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.effects import effect_named
+from rigsight.errors import InputError
+from rigsight.excitation import log_sweep, step
+from rigsight.identify import JointFit, estimate_conicity, fit_jointly
+from rigsight.records import Record
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs.running_gear import creep_factor
+from rigsight.simulate import compose, simulate
+
+CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
+TRUTH = {
+    "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 1e-3, "l_0": 0.25, "c_y": creep_factor(0.024, 0.1, 0.3), "y_off": -5e-4,
+}  # fmt: skip
+NOISE = 2e-5
+GEAR = compose(RUNNING_GEAR)
+
+
+def campaign(seed: int, cubic: float = 0.0) -> list[Record]:
+    """A sweep and two steps of the virtual rig with sensor noise; a cubic spring makes the steps another rig than the sweep."""
+    rng = np.random.default_rng(seed)
+    t = 5e-3 * np.arange(4000)
+    inputs = {
+        "sweep": ("sweep", log_sweep(t, 0.5, 0.5, 60.0)),
+        "up": ("step", step(t[:1600], 0.6, 1.0)),
+        "down": ("step", -step(t[:1600], 0.6, 1.0)),
+    }
+    structure = compose(RUNNING_GEAR, [effect_named("cubic_stiffness")])
+    records = []
+    for name, (kind, u) in inputs.items():
+        record = Record(name=name, dt=5e-3, signals={"u": u}, units={}, kind=kind, hold="zoh")  # type: ignore[arg-type]
+        clean = simulate(structure, {**CONSTANTS, **TRUTH, "k_3": cubic}, record)
+        noisy = {s: clean[s] + rng.normal(0.0, NOISE, u.size) for s in ("psi", "y")}
+        records.append(clean.with_signals(**noisy))
+    return records
+
+
+@pytest.fixture(scope="module")
+def linear() -> JointFit:
+    return fit_jointly(GEAR, campaign(1), CONSTANTS)
+
+
+def test_the_joint_set_is_the_truth_within_its_errors(linear: JointFit) -> None:
+    assert linear.fit.success, linear.fit.message
+    for name, value in TRUTH.items():
+        assert abs(linear.fit.values[name] - value) < 4.0 * linear.fit.standard_errors[name], name
+        low, high = linear.interval(name, 0.9999)
+        assert low < value < high
+    for name in ("J_z", "k_c", "k_d", "l_0", "c_y"):
+        assert linear.fit.values[name] == pytest.approx(TRUTH[name], rel=0.01), name
+
+
+def test_the_noise_is_found_from_the_residuals(linear: JointFit) -> None:
+    assert linear.noise == pytest.approx({"psi": NOISE, "y": NOISE}, rel=0.03)
+    for residual in linear.residuals:
+        assert residual.rms == pytest.approx({"psi": NOISE, "y": NOISE}, rel=0.08)
+        assert residual.relative["psi"] < 0.02
+
+
+def test_sweeps_and_steps_of_one_linear_rig_share_their_parameters(linear: JointFit) -> None:
+    assert linear.probability > 0.01
+    assert linear.statement.startswith("One parameter set serves")
+    assert [k.kind for k in linear.kinds] == ["sweep", "step"]
+    for kind in linear.kinds:
+        assert len(kind.residuals) == 3
+        for name in linear.fit.free:
+            assert linear.fit.standard_errors[name] < 1.1 * kind.fit.standard_errors[name], name
+
+
+def test_the_conicity_of_the_joint_fit_comes_with_its_interval(linear: JointFit) -> None:
+    found = estimate_conicity(
+        linear.fit.values["c_y"], linear.fit.standard_errors["c_y"], 0.1, 0.3, level=0.9999
+    )
+    assert found.interval is not None
+    assert found.determined
+    assert found.interval[0] < 0.024 < found.interval[1]
+
+
+def test_the_comparison_is_calm_over_repeated_experiments() -> None:
+    probabilities = [
+        fit_jointly(GEAR, campaign(seed), CONSTANTS, output_noise={"psi": NOISE, "y": NOISE}).probability
+        for seed in range(10, 22)
+    ]
+    # Uniform on 0 to 1 where one set serves all; twelve draws have a mean of 0.5 with a standard deviation of 0.083.
+    assert np.mean(probabilities) == pytest.approx(0.5, abs=0.25)
+    assert min(probabilities) > 1e-3
+
+
+def test_an_amplitude_dependent_rig_has_no_common_linear_set_and_says_so() -> None:
+    records = campaign(3, cubic=4e5)
+    found = fit_jointly(GEAR, records, CONSTANTS)
+    assert found.probability < 1e-3
+    assert "different parameters" in found.statement
+    assert "k_c" in found.statement
+    sweep_only = found.kinds[0].residuals
+    step_only = found.kinds[1].residuals
+    # Each kind alone fits its own records better than the other's set does.
+    assert sweep_only[0].rms["psi"] < step_only[0].rms["psi"]
+    assert step_only[1].rms["psi"] < sweep_only[1].rms["psi"]
+    cured = fit_jointly(
+        compose(RUNNING_GEAR, [effect_named("cubic_stiffness")]), records, CONSTANTS, start={"k_3": 1e5}
+    )
+    assert cured.probability > 0.01
+    assert abs(cured.fit.values["k_3"] - 4e5) < 4.0 * cured.fit.standard_errors["k_3"]
+
+
+def test_a_known_parameter_keeps_its_value() -> None:
+    found = fit_jointly(GEAR, campaign(4), CONSTANTS, known={"l_0": 0.25})
+    assert found.fit.values["l_0"] == 0.25
+    assert "l_0" not in found.fit.free
+
+
+def test_bad_campaigns_are_told_in_words() -> None:
+    records = campaign(5)
+    with pytest.raises(InputError, match="all 2 are of kind 'step'"):
+        fit_jointly(GEAR, records[1:], CONSTANTS)
+    still = records[1].with_signals(u=np.zeros(records[1].n_samples))
+    with pytest.raises(InputError, match="never moves"):
+        fit_jointly(GEAR, [records[0], still], CONSTANTS)
+    with pytest.raises(InputError, match="k_3"):
+        fit_jointly(compose(RUNNING_GEAR, [effect_named("cubic_stiffness")]), records, CONSTANTS)

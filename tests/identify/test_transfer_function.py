@@ -1,0 +1,274 @@
+"""PT1 and PT2 come back from frequency responses and steps, with standard errors that are the scatter."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.excitation import step
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify import TransferFit, TransferForm, fit_frequency_response, fit_step
+from rigsight.records import Record
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.simulate import compose, simulate
+
+PT2 = TransferForm("pt2", with_dead_time=True)
+PT1 = TransferForm("pt1", with_dead_time=True)
+OMEGA = np.geomspace(0.5, 80.0, 120)
+YAW = {"gain": 0.01, "omega_b": 12.0, "zeta": 0.15}
+GEAR_VALUES = {
+    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27,
+    "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "psi_off": 1e-3, "l_0": 0.25, "c_y": 0.98, "y_off": -5e-4,
+}  # fmt: skip
+
+
+def measured(
+    values: dict[str, float],
+    relative_noise: float = 0.03,
+    seed: int = 0,
+    omega: NDArray[np.float64] = OMEGA,
+    with_variance: bool = True,
+) -> FrequencyResponse:
+    """A frequency response with circular normal errors, `relative_noise` of its median magnitude."""
+    form = PT2 if "zeta" in values else PT1
+    theta = form.vector(values["omega_b"], values.get("zeta", 1.0), values.get("dead_time", 0.0))
+    theta[0] = values["gain"]
+    exact = form.response(omega, theta)
+    std = relative_noise * np.median(np.abs(exact)) * (1.0 + omega / omega[-1])
+    parts = np.random.default_rng(seed).standard_normal((2, omega.size))
+    noise = (parts[0] + 1j * parts[1]) / np.sqrt(2.0)
+    return FrequencyResponse(
+        omega, exact + std * noise, "u", "psi", "rad/A", variance=std**2 if with_variance else None
+    )
+
+
+def pulls(fit: TransferFit, truth: dict[str, float]) -> list[float]:
+    return [(fit.values[name] - truth[name]) / fit.standard_errors[name] for name in truth]
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        YAW,
+        {**YAW, "zeta": 0.005},
+        {**YAW, "zeta": 1.6},
+        {**YAW, "gain": -0.01, "dead_time": 0.04},
+        {"gain": 0.5, "omega_b": 2.0},
+        {"gain": 0.5, "omega_b": 2.0, "dead_time": 0.3},
+    ],
+)
+@pytest.mark.parametrize("with_variance", [True, False])
+def test_a_known_system_comes_back_within_its_errors(truth: dict[str, float], with_variance: bool) -> None:
+    frequency_response = measured(truth, with_variance=with_variance)
+    order = "pt2" if "zeta" in truth else "pt1"
+    fit = fit_frequency_response(frequency_response, order, 0.5 if "dead_time" in truth else 0.0)
+    assert fit.success, fit.message
+    assert np.all(np.abs(pulls(fit, truth)) < 4.0)
+    if with_variance:
+        assert fit.misfit == pytest.approx(1.0, abs=4.0 / np.sqrt(4.0 * OMEGA.size))
+
+
+def test_intervals_contain_the_truth_as_often_as_they_say() -> None:
+    truth = {**YAW, "dead_time": 0.02}
+    found = np.array(
+        [pulls(fit_frequency_response(measured(truth, seed=i), "pt2", 0.1), truth) for i in range(100)]
+    )
+    inside = np.mean(np.abs(found) < 1.96, axis=0)
+    # 100 draws of a 95 % interval: a standard deviation of 2.2 %, four parameters.
+    assert np.all(inside > 0.95 - 3.0 * 0.022), inside
+    assert np.all(np.abs(np.std(found, axis=0, ddof=1) - 1.0) < 3.0 / np.sqrt(198.0))
+
+
+def test_maximum_likelihood_beats_uniform_weights_where_noise_differs() -> None:
+    std = np.where(OMEGA < 10.0, 1e-5, 5e-4)
+    exact = measured(YAW, 0.0).values
+    errors: dict[str, list[float]] = {"variance": [], "uniform": []}
+    for seed in range(20):
+        parts = np.random.default_rng(seed).standard_normal((2, OMEGA.size))
+        values = exact + std * (parts[0] + 1j * parts[1]) / np.sqrt(2.0)
+        response = FrequencyResponse(OMEGA, values, "u", "psi", "rad/A", variance=std**2)
+        for weighting, collected in errors.items():
+            fit = fit_frequency_response(response, "pt2", weighting=weighting)
+            collected.append(fit.values["omega_b"] - YAW["omega_b"])
+    assert np.std(errors["variance"]) < 0.3 * np.std(errors["uniform"])
+
+
+def test_dependent_lines_widen_the_errors() -> None:
+    """The same line twice is not twice the information."""
+    truth = {"gain": 0.5, "omega_b": 2.0}
+    single = measured(truth, omega=np.geomspace(0.1, 30.0, 300))
+    omega = np.sort(np.concatenate([single.omega, single.omega * (1.0 + 1e-9)]))
+    double = FrequencyResponse(
+        omega, np.repeat(single.values, 2), "psi", "y", "m/rad", variance=np.repeat(single.variance, 2)
+    )
+    honest = fit_frequency_response(single, "pt1").standard_errors["omega_b"]
+    naive = fit_frequency_response(double, "pt1").standard_errors["omega_b"]
+    robust = fit_frequency_response(double, "pt1", dependent_lines=4).standard_errors["omega_b"]
+    assert naive == pytest.approx(honest / np.sqrt(2.0), rel=0.05)
+    assert robust > 1.2 * naive
+
+
+def test_a_lag_has_a_negative_phase_and_a_dead_time_bends_it_further() -> None:
+    late = fit_frequency_response(measured({**YAW, "dead_time": 0.05}, 1e-3), "pt2", 0.2)
+    phase = np.unwrap(np.angle(late.at(OMEGA)))
+    assert phase[0] < 0.0
+    assert phase[-1] == pytest.approx(-np.pi - 0.05 * OMEGA[-1], abs=0.1)
+    assert late.values["gain"] > 0.0
+
+
+def test_magnitudes_see_neither_sign_nor_dead_time() -> None:
+    straight = measured(YAW, 0.01)
+    turned = FrequencyResponse(
+        OMEGA, -straight.values * np.exp(-0.05j * OMEGA), "u", "psi", "rad/A", variance=straight.variance
+    )
+    first, second = (fit_frequency_response(r, "pt2", magnitude_only=True) for r in (straight, turned))
+    assert second.values == pytest.approx(first.values, rel=1e-6)
+    assert first.values["gain"] > 0.0
+    assert "sign" in second.message
+    assert np.all(np.abs(pulls(first, YAW)) < 4.0)
+    assert fit_frequency_response(turned, "pt2", 0.1).values["gain"] < 0.0
+    with pytest.raises(InputError, match="phase only"):
+        fit_frequency_response(straight, "pt2", 0.1, magnitude_only=True)
+
+
+def test_the_fit_is_a_python_control_transfer_function() -> None:
+    fit = fit_frequency_response(measured({**YAW, "dead_time": 0.03}, 0.0), "pt2", 0.1)
+    rational = fit.to_control()
+    assert control.dcgain(rational) == pytest.approx(YAW["gain"], rel=1e-6)
+    assert np.abs(rational(1j * 12.0)) == pytest.approx(YAW["gain"] / (2.0 * YAW["zeta"]), rel=1e-6)
+    omega = np.array([1.0, 10.0, 30.0])
+    assert fit.to_control(pade_order=4)(1j * omega) == pytest.approx(fit.at(omega), rel=1e-5)
+    with pytest.raises(InputError, match="at least 1"):
+        fit.to_control(pade_order=0)
+
+
+def test_the_error_band_is_the_scatter_of_the_fitted_response() -> None:
+    omega = np.array([1.0, 11.0, 13.0, 40.0])
+    fits = [fit_frequency_response(measured(YAW, seed=i), "pt2") for i in range(60)]
+    scatter = np.sqrt(
+        np.mean(np.abs([f.at(omega) - measured(YAW, 0.0, omega=omega).values for f in fits]) ** 2, 0)
+    )
+    assert fits[0].standard_error_at(omega) == pytest.approx(scatter, rel=0.35)
+
+
+def test_bad_frequency_responses_are_told_in_words() -> None:
+    with pytest.raises(InputError, match="too few for 3 parameters"):
+        fit_frequency_response(measured(YAW, omega=np.array([1.0, 5.0, 10.0])), "pt2")
+    with pytest.raises(InputError, match="no excitation in this band"):
+        fit_frequency_response(measured(YAW, 300.0), "pt2")
+    with pytest.raises(InputError, match="needs variances"):
+        fit_frequency_response(measured(YAW, with_variance=False), "pt2", weighting="variance")
+    with pytest.raises(InputError, match="at least 0 s"):
+        fit_frequency_response(measured(YAW), "pt2", -1.0)
+    with pytest.raises(InputError, match="pt1"):
+        fit_frequency_response(measured(YAW), "pt3")  # type: ignore[arg-type]
+
+
+def test_a_band_below_the_break_frequency_is_no_success() -> None:
+    low = fit_frequency_response(measured(YAW, omega=np.linspace(0.05, 0.6, 50)), "pt2")
+    assert not low.success
+    assert "does not show the break frequency" in low.message
+
+
+def test_the_wrong_form_is_named_by_its_misfit() -> None:
+    fit = fit_frequency_response(measured(YAW, 0.01), "pt1")
+    assert fit.misfit > 3.0
+    assert "not the whole of the rig" in fit.message
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_the_answer_over_time_is_the_one_of_the_simulator(hold: str) -> None:
+    """Another code, another method: generated Runge-Kutta kernel against matrix exponentials."""
+    t = 5e-3 * np.arange(600)
+    u = step(t, 0.6, 0.5) + np.where(t > 1.0, 0.3 * np.sin(9.0 * (t - 1.0)), 0.0)
+    record = Record(name="r", dt=5e-3, signals={"u": u}, units={}, hold=hold)  # type: ignore[arg-type]
+    values = {**GEAR_VALUES, "psi_off": 0.0, "y_off": 0.0}
+    simulated = simulate(compose(RUNNING_GEAR), values, record, accuracy=1e-8)
+    theta = TransferForm("pt2").vector(np.sqrt(81.0 / 0.56), 2.0 / (2.0 * np.sqrt(81.0 * 0.56)), 0.0)
+    theta[0] = 0.81 / 81.0
+    answer = TransferForm("pt2").over_time(u, 5e-3, hold, theta)  # type: ignore[arg-type]
+    assert answer == pytest.approx(simulated["psi"], abs=1e-6 * np.max(np.abs(answer)))
+
+
+@pytest.mark.parametrize("dead_time", [0.0125, 0.02])
+def test_a_dead_time_shifts_the_answer_also_between_samples(dead_time: float) -> None:
+    t = 5e-3 * np.arange(400)
+    theta = PT1.vector(3.0, 1.0, dead_time)
+    answer = PT1.over_time(step(t, 1.0, 0.1), 5e-3, "zoh", theta)
+    since = np.maximum(t - 0.1 - dead_time, 0.0)
+    assert answer == pytest.approx(1.0 - np.exp(-3.0 * since), abs=1e-9)
+
+
+def stepped(seed: int, noise: float = 2e-5, color: float = 0.0) -> Record:
+    """The thesis's step: 0.6 A at 180 s."""
+    t = 176.0 + 5e-3 * np.arange(1800)
+    record = Record(
+        name="step",
+        dt=5e-3,
+        signals={"u": step(t, 0.6, 180.0)},
+        units={"u": "A", "psi": "rad"},
+        t0=176.0,
+        hold="zoh",
+    )
+    clean = simulate(compose(RUNNING_GEAR), GEAR_VALUES, record)
+    white = np.random.default_rng(seed).standard_normal(t.size)
+    for i in range(1, t.size):
+        white[i] = color * white[i - 1] + np.sqrt(1.0 - color**2) * white[i]
+    return clean.with_signals(psi=clean["psi"] + noise * white)
+
+
+STEP_TRUTH = {
+    "gain": 0.01,
+    "omega_b": float(np.sqrt(81.0 / 0.56)),
+    "zeta": float(1.0 / np.sqrt(81.0 * 0.56)),
+    "offset": 1e-3,
+}
+
+
+@pytest.mark.parametrize("start", [None, 178.0, 180.0])
+def test_a_step_gives_the_pt2_from_any_window_at_rest(start: float | None) -> None:
+    fit = fit_step(stepped(1), "u", "psi", "pt2", start, 184.0)
+    assert fit.success, fit.message
+    assert fit.unit == "rad/A"
+    assert np.all(np.abs(pulls(fit, STEP_TRUTH)) < 4.0)
+    assert fit.residual_rms == pytest.approx(2e-5, rel=0.1)
+
+
+@pytest.mark.parametrize("color", [0.0, 0.8])
+def test_errors_from_steps_are_the_scatter_also_with_colored_noise(color: float) -> None:
+    found = np.array(
+        [
+            pulls(fit_step(stepped(i, 5e-5, color), "u", "psi", "pt2", 178.0, 183.0), STEP_TRUTH)
+            for i in range(12)
+        ]
+    )
+    # 48 pulls of unit variance, not all independent: three standard deviations of an rms of 24.
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(1.0, abs=3.0 / np.sqrt(48.0))
+
+
+def test_a_dead_time_is_found_in_a_step() -> None:
+    record = stepped(3)
+    late = record.with_signals(psi=np.concatenate([np.full(7, record["psi"][0]), record["psi"][:-7]]))
+    fit = fit_step(late, "u", "psi", "pt2", 179.0, 184.0, longest_dead_time=0.2)
+    assert abs(fit.values["dead_time"] - 0.035) < 4.0 * fit.standard_errors["dead_time"]
+    assert fit.standard_errors["dead_time"] < 2e-3
+
+
+def test_bad_steps_are_told_in_words() -> None:
+    record = stepped(4)
+    with pytest.raises(InputError, match="makes no step"):
+        fit_step(record, "u", "psi", "pt2", 181.0, 184.0)
+    noisy = record.with_signals(u=1e-3 * np.random.default_rng(5).standard_normal(record.n_samples))
+    with pytest.raises(InputError, match="makes no step"):
+        fit_step(noisy, "u", "psi", "pt2")
+    with pytest.raises(InputError, match="samples before the end"):
+        fit_step(record, "u", "psi", "pt2", 178.0, 180.05)
+    with pytest.raises(InputError, match="the window holds"):
+        fit_step(record, "u", "psi", "pt2", 200.0, 210.0)
+    deaf = record.with_signals(psi=2e-5 * np.random.default_rng(6).standard_normal(record.n_samples))
+    fit = fit_step(deaf, "u", "psi", "pt2", 178.0, 184.0)
+    assert not fit.success
+    assert "does not stand out" in fit.message
