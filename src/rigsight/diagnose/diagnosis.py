@@ -265,7 +265,10 @@ def _assembled(
 
 
 def _explained(judgement: Judgement, ranking: Ranking) -> float:
-    """Return the probability that the cause is among the candidates at all, from what the best leaves above the floor."""
+    """Return the probability that the cause is among the candidates at all, from what the best leaves above the floor.
+
+    Near 1 at the floor and one half far above it: an assumed shape, not calibrated on known causes.
+    """
     if judgement.verdict in ("none", "parameters"):
         return 0.0  # the equations without an effect explain the records
     if not ranking.order or not np.isfinite(ranking.order[0].excess):

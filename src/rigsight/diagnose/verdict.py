@@ -10,11 +10,15 @@ from rigsight.diagnose.workbench import Scored
 AT_FLOOR = 1.1
 """RMS in units of the noise floor that counts as the floor itself: floors are known to a few percent."""
 AT_LOWER_BOUND = 3.0
-"""The same where the floor is only a lower bound: white noise rarely is less than a third of all noise on a bench."""
+"""The same where the floor is only a lower bound: an assumption, white noise is taken to be at least a third of all."""
 _WORTHWHILE = 1.1
-"""Factor by which a model must lower the held-out error to be believed to explain anything."""
+"""Factor by which a model must lower the held-out error to be believed to explain anything; an assumption."""
 _HALF = 0.5
-"""Share of the re-identified gap that an effect must close to be named its cause."""
+"""Share of the re-identified gap that an effect must close to be named its cause.
+
+An assumption, not a result: measured hysteresis never has exactly the form of its equation (the dampers it was first tried on
+leave three to four times their noise floor), but a relative of an unknown cause may close as much.
+"""
 
 
 @dataclass(frozen=True)
