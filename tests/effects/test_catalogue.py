@@ -188,6 +188,7 @@ def test_declaration_is_complete(effect):
     assert effect.summary.endswith(".")
     parts = (effect.torque, effect.spring, effect.deflection, effect.drive, effect.delay)
     equations = [part for part in parts if part is not None] + [state.rate for state in effect.states]
+    equations += [state.limit for state in effect.states if state.limit is not None]
     assert equations
     used = {symbol.name for equation in equations for symbol in equation.free_symbols}
     for p in effect.parameters:

@@ -62,7 +62,8 @@ def test_every_pair_has_equations():
         for pair in combinations(offered, 2):
             structure = compose(rig, pair)
             assert len(set(structure.names)) == len(structure.names)
-            free = set().union(*(rate.free_symbols for rate in (*structure.rates, *structure.outputs)))
+            rates = [*(state.limited_rate for state in structure.equations), *structure.outputs]
+            free = set().union(*(rate.free_symbols for rate in rates))
             known = {*structure.parameter_symbols, *structure.states}
             assert {s.name for s in free - known} <= {"input_value", "input_rate", "time"}
 

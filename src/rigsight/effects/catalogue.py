@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rigsight.effects.actuator_lag import ACTUATOR_LAG
 from rigsight.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
+from rigsight.effects.backlash import BACKLASH
 from rigsight.effects.bouc_wen_hysteresis import BOUC_WEN_HYSTERESIS
 from rigsight.effects.coulomb_friction import COULOMB_FRICTION
 from rigsight.effects.cubic_stiffness import CUBIC_STIFFNESS
@@ -13,18 +14,21 @@ from rigsight.effects.free_play import FREE_PLAY
 from rigsight.effects.input_dead_zone import INPUT_DEAD_ZONE
 from rigsight.effects.input_delay import INPUT_DELAY
 from rigsight.effects.input_saturation import INPUT_SATURATION
+from rigsight.effects.iwan_hysteresis import IWAN_HYSTERESIS
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
 from rigsight.effects.stribeck_friction import STRIBECK_FRICTION
 from rigsight.errors import check_option
 
 CATALOGUE: tuple[Effect, ...] = (
     BOUC_WEN_HYSTERESIS,
+    IWAN_HYSTERESIS,
     COULOMB_FRICTION,
     STRIBECK_FRICTION,
     QUADRATIC_DAMPING,
     CUBIC_STIFFNESS,
     END_STOP,
     FREE_PLAY,
+    BACKLASH,
     ASYMMETRIC_STIFFNESS,
     INPUT_DELAY,
     ACTUATOR_LAG,

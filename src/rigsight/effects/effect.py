@@ -64,11 +64,15 @@ class State:
         Time derivative in terms of `rigsight.effects.symbols`, the effect's parameters and states.
     dimension
         Dimension text of `rigsight.units`.
+    limit
+        Half-width of the range that the state cannot leave: it rests at the end it is driven against and leaves it at once
+        when its rate turns (the stop operator of play and of dry friction behind a spring). None for a free state.
     """
 
     symbol: sp.Symbol
     rate: sp.Expr
     dimension: str
+    limit: sp.Expr | None = None
 
 
 @dataclass(frozen=True)

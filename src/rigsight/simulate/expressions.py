@@ -8,6 +8,12 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 
+class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """First argument, kept within plus and minus the second: two instructions, where `clamp` would print six."""
+
+    is_real = True
+
+
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     """Prints expressions in the vocabulary of the kernel: products for small powers, selects for signs."""
 
@@ -30,6 +36,10 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_positive_part(self, expr: sp.Function) -> str:
         return f"max({self._print(expr.args[0])}, 0.0)"
+
+    def _print_limited(self, expr: sp.Function) -> str:
+        value, half_width = (self._print(argument) for argument in expr.args)
+        return f"min(max({value}, -{half_width}), {half_width})"
 
     def _print_sign(self, expr: sp.sign) -> str:
         return f"sign_of({self._print(expr.args[0])})"

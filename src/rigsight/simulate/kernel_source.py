@@ -21,7 +21,7 @@ from importlib.resources import files
 
 import sympy as sp
 
-from rigsight.simulate.expressions import assignments, hoist_constants
+from rigsight.simulate.expressions import assignments, hoist_constants, limited
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
 
@@ -60,17 +60,20 @@ class _Writer:
             self._padded(self.frozen.rates),
             list(self.frozen.switches),
             list(self.frozen.outputs),
-            self._padded(structure.rates),
+            self._padded(self._live(structure)),
             list(structure.outputs),
+            [equation.limit for equation in structure.equations if equation.limit is not None],
         ]
         delay = [structure.delay if structure.delay is not None else sp.Integer(0)]
         flat, self.hoisted = hoist_constants([e for g in groups for e in g] + delay, constants)
         sizes = [len(group) for group in groups]
         bounds = [sum(sizes[:i]) for i in range(len(sizes) + 1)]
-        self.rates, self.switches, self.outputs, self.live_rates, self.live_outputs = (
+        self.rates, self.switches, self.outputs, self.live_rates, self.live_outputs, limits = (
             flat[bounds[i] : bounds[i + 1]] for i in range(len(sizes))
         )
         self.delay = flat[-1]
+        limited = (i for i, equation in enumerate(structure.equations) if equation.limit is not None)
+        self.limits: dict[int, sp.Expr] = dict(zip(limited, limits, strict=True))
         self.constants = [symbol.name for symbol in self.hoisted]
         self.names: dict[sp.Symbol, str] = {
             INPUT: "input_value",
@@ -83,6 +86,19 @@ class _Writer:
     def _padded(self, rates: tuple[sp.Expr, ...]) -> list[sp.Expr]:
         """Give a structure without states one that rests, so that the kernels have one form."""
         return list(rates) or [sp.Integer(0)]
+
+    @staticmethod
+    def _live(structure: Structure) -> tuple[sp.Expr, ...]:
+        """Return the rates with what is held at an end of its range seen there.
+
+        The state itself runs on within a substep and is put back at its end: exact as long as its rate keeps its sign.
+        """
+        held = {
+            equation.symbol: limited(equation.symbol, equation.limit)
+            for equation in structure.equations
+            if equation.limit is not None
+        }
+        return tuple(equation.rate.xreplace(held) for equation in structure.equations)
 
     def module(self) -> str:
         template = files("rigsight.simulate").joinpath("kernel_template.py.txt").read_text("utf-8")
@@ -97,6 +113,9 @@ class _Writer:
             "FRICTION": str(-1 if friction is None else friction),
             "VELOCITY": str(self.structure.velocity_index or 0),
             "HAS_DELAY": str(self.structure.delay is not None),
+            "DEPENDENT_MODES": repr(self.frozen.dependent_modes),
+            "HAS_LIMITS": str(bool(self.limits)),
+            "PUT_BACK": self._put_back(),
             "PREPARE": self._prepare(),
             "DELAY": self._delay(),
             "RATES_ARGUMENTS": self._arguments([*self.states, *self.modes]),
@@ -148,6 +167,22 @@ class _Writer:
     def _delay(self) -> str:
         names = {symbol: f"q[{i}]" for i, symbol in enumerate(self.hoisted)}
         return _indent([*assignments(["delay"], [self.delay], names, "c"), "return delay"], 1)
+
+    def _put_back(self) -> str:
+        names = {symbol: f"q[{i}]" for i, symbol in enumerate(self.hoisted)}
+        targets = [f"x[{i}]" for i in self.limits]
+        held = [limited(sp.Symbol(f"x[{i}]", real=True), limit) for i, limit in self.limits.items()]
+        return _indent(assignments(targets, held, names, "c") or ["pass"], 1)
+
+    def _within_limits(self, prefix: str) -> list[str]:
+        """Put states that a substep drove beyond an end of their range back on it."""
+        names = dict(zip(self.hoisted, self.constants, strict=True))
+        targets = [f"{prefix}{i}" for i in self.limits]
+        held = [
+            limited(sp.Symbol(name, real=True), limit)
+            for name, limit in zip(targets, self.limits.values(), strict=True)
+        ]
+        return assignments(targets, held, names, "c")
 
     def _array_names(self) -> dict[sp.Symbol, str]:
         arrays = {s: f"x[{i}]" for i, s in enumerate(self.structure.states)}
@@ -253,7 +288,7 @@ class _Writer:
             previous = f"k{stage}"
         for i in range(n):
             lines.append(f"{target}{i} = x{i} + h / 6.0 * (k0_{i} + 2.0 * (k1_{i} + k2_{i}) + k3_{i})")
-        return lines
+        return lines + self._within_limits(target)
 
     def _input_at(self, point: str, tau: str, start: str = "start") -> list[str]:
         return [

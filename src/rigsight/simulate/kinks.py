@@ -30,7 +30,7 @@ class FrozenStructure:
     modes
         Symbols that take the values -1 and +1.
     switches
-        Expression whose sign each mode is.
+        Expression whose sign each mode is; it may hold modes of earlier switches.
     friction_mode
         Index of the mode whose flip makes the acceleration jump (dry friction: the velocity can stay at zero), or None.
     """
@@ -41,11 +41,16 @@ class FrozenStructure:
     switches: tuple[sp.Expr, ...]
     friction_mode: int | None
 
+    @property
+    def dependent_modes(self) -> tuple[int, ...]:
+        """Indices of the modes whose switch holds another mode: when that one flips, they are to be read anew."""
+        return tuple(i for i, switch in enumerate(self.switches) if switch.free_symbols & set(self.modes))
+
 
 def freeze(structure: Structure) -> FrozenStructure:
     """Replace every Abs, sign and positive part in a structure's equations by a mode symbol."""
     constant = set(structure.parameter_symbols)
-    expressions = [*structure.rates, *structure.outputs]
+    expressions = [*(state.limited_rate for state in structure.equations), *structure.outputs]
     modes: dict[sp.Expr, sp.Symbol] = {}
     while True:
         kink = _innermost_kink(expressions, constant)

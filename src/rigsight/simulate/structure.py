@@ -21,7 +21,22 @@ INPUT = sp.Symbol("input_value", real=True)
 INPUT_RATE = sp.Symbol("input_rate", real=True)
 TIME = sp.Symbol("time", real=True)
 
-_StateEquation = tuple[sp.Symbol, sp.Expr, str]
+
+@dataclass(frozen=True)
+class StateEquation:
+    """One state of a structure: its rate, its dimension and the half-width of the range it cannot leave, if any."""
+
+    symbol: sp.Symbol
+    rate: sp.Expr
+    dimension: str
+    limit: sp.Expr | None = None
+
+    @property
+    def limited_rate(self) -> sp.Expr:
+        """The rate, zero while the state is driven against an end of its range."""
+        if self.limit is None:
+            return self.rate
+        return self.rate * (1 - sp.sign(self.symbol * sp.sign(self.rate) - self.limit)) / 2
 
 
 @dataclass(frozen=True)
@@ -36,10 +51,8 @@ class Structure:
         Effect parameters written into the equations as numbers.
     parameters, parameter_symbols
         Constants, rig parameters and effect parameters with units, and their symbols; names are unique.
-    states, rates
-        State symbols and their time derivatives.
-    state_dimensions
-        Dimension text of each state.
+    equations
+        The states with their rates, dimensions and limits.
     outputs
         The rig's outputs as expressions.
     delay
@@ -53,9 +66,7 @@ class Structure:
     fixed: tuple[tuple[str, float], ...]
     parameters: tuple[Parameter, ...]
     parameter_symbols: tuple[sp.Symbol, ...]
-    states: tuple[sp.Symbol, ...]
-    rates: tuple[sp.Expr, ...]
-    state_dimensions: tuple[str, ...]
+    equations: tuple[StateEquation, ...]
     outputs: tuple[sp.Expr, ...]
     delay: sp.Expr | None
     velocity_index: int | None
@@ -64,6 +75,16 @@ class Structure:
     def names(self) -> tuple[str, ...]:
         """Parameter names in order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def states(self) -> tuple[sp.Symbol, ...]:
+        """State symbols in order."""
+        return tuple(equation.symbol for equation in self.equations)
+
+    @property
+    def state_dimensions(self) -> tuple[str, ...]:
+        """Dimension text of each state."""
+        return tuple(equation.dimension for equation in self.equations)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -139,15 +160,15 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
 
     motion = rig.motion
     resisting = spring + binder.rig(motion.damping) * binder.velocity + torque
-    states: list[_StateEquation]
+    states: list[StateEquation]
     outputs: tuple[sp.Expr, ...]
     if motion.inertia is not None:
         driving = binder.rig(motion.drive_gain) * binder.drive + binder.rig(motion.bias)
         acceleration = (driving - resisting) / binder.rig(motion.inertia)
         states = [
-            (motion.displacement, motion.velocity, "x"),
-            (motion.velocity, acceleration, "x time^-1"),
-            *((symbol, binder.rig(rate), "length") for symbol, rate in rig.downstream.items()),
+            StateEquation(motion.displacement, motion.velocity, "x"),
+            StateEquation(motion.velocity, acceleration, "x time^-1"),
+            *(StateEquation(symbol, binder.rig(rate), "length") for symbol, rate in rig.downstream.items()),
             *memories,
             *lags,
         ]
@@ -161,9 +182,7 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
         fixed=fixed,
         parameters=parameters,
         parameter_symbols=tuple(symbols[p.name] for p in parameters),
-        states=tuple(symbol for symbol, _, _ in states),
-        rates=tuple(rate for _, rate, _ in states),
-        state_dimensions=tuple(dimension for _, _, dimension in states),
+        equations=tuple(states),
         outputs=outputs,
         delay=delay,
         velocity_index=1 if rig.is_driven else None,
@@ -250,10 +269,15 @@ class _Binder:
                 replacement[symbol] = self._fixed[name] if name in self._fixed else self._symbols[name]
         return expression.xreplace(replacement)
 
-    def states(self, effect: Effect, **signals: sp.Expr) -> list[_StateEquation]:
+    def states(self, effect: Effect, **signals: sp.Expr) -> list[StateEquation]:
         """Bind the states that an effect adds."""
         return [
-            (state_symbol(effect, s.symbol), self.effect(effect, s.rate, **signals), s.dimension)
+            StateEquation(
+                state_symbol(effect, s.symbol),
+                self.effect(effect, s.rate, **signals),
+                s.dimension,
+                None if s.limit is None else self.effect(effect, s.limit),
+            )
             for s in effect.states
         ]
 
@@ -263,10 +287,10 @@ def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:
     return sp.Symbol(f"{effect.name}.{symbol.name}", real=True)
 
 
-def _actuator(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr | None, list[_StateEquation]]:
+def _actuator(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr | None, list[StateEquation]]:
     """Chain the actuator effects; leaves the drive in the binder and returns delay and lag states."""
     delay: sp.Expr | None = None
-    lags: list[_StateEquation] = []
+    lags: list[StateEquation] = []
     for effect in effects:
         if effect.delay is not None:
             own_delay = binder.effect(effect, effect.delay)
@@ -277,15 +301,21 @@ def _actuator(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr | N
     return delay, lags
 
 
-def _spring(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr, list[_StateEquation]]:
+def _spring(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr, list[StateEquation]]:
     """Chain what stands between displacement and spring, then what changes the spring's torque."""
-    deflection = binder.x
+    deflection, deflection_rate = binder.x, binder.velocity
+    memories: list[StateEquation] = []
     for effect in effects:
         if effect.deflection is not None:
-            deflection = binder.effect(effect, effect.deflection, x=deflection)
-    deflection_rate = sp.diff(deflection, binder.displacement) * binder.velocity
+            own = binder.states(effect, x=deflection, v=deflection_rate)
+            before = sp.Symbol("deflection_before", real=True)
+            after = binder.effect(effect, effect.deflection, x=before)
+            deflection_rate = sp.diff(after, before).xreplace({before: deflection}) * deflection_rate + sum(
+                (sp.diff(after, state.symbol) * state.limited_rate for state in own), start=sp.Integer(0)
+            )
+            deflection = after.xreplace({before: deflection})
+            memories += own
     torque = binder.stiffness * deflection
-    memories: list[_StateEquation] = []
     for effect in effects:
         if effect.spring is not None:
             signals = {

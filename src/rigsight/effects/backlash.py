@@ -1,0 +1,48 @@
+"""Backlash: play between displacement and spring that is carried along.
+
+Equation
+--------
+``spring deflection w = x - z``,  ``z' = x'`` within ``-g <= z <= g`` (held at the ends)
+
+g: half-width of the play; the effect vanishes at 0. w rests until x has crossed the play and then follows it.
+
+Applies to gears, keyways and loose joints whose far side is held by friction, so that it stays where it was left. Play whose
+far side returns by itself is free play.
+
+Signature: at small amplitude the spring is missing altogether, at large amplitude it is softer and less damped, because its
+torque lags the motion and so gives energy back that it never took (a lightly damped rig hunts); odd harmonics; loops at any
+speed, as wide at every amplitude.
+
+References: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (Springer 1989), the play operator;
+M. Nordin and P.-O. Gutman, Automatica 38 (2002) 1633.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import v, x
+from rigsight.parameters import Parameter
+
+g, z = sp.symbols("g z", real=True)
+
+BACKLASH = Effect(
+    name="backlash",
+    place=Place.DYNAMICS,
+    summary="The spring follows the motion only after the motion has crossed a play.",
+    parameters=(
+        Parameter(
+            "g",
+            "half-width of the play",
+            "x",
+            lower=0.0,
+            upper=1e9,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(0.0, 1.0),
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.FALLS),
+    deflection=x - z,
+    states=(State(z, v, "x", limit=g),),
+)
