@@ -391,3 +391,57 @@ def test_an_interrupted_diagnosis_leaves_nothing(stage: str, axis_campaign: Path
     assert "Traceback" not in stderr
     assert stderr.strip().endswith("interrupted; nothing was written.")
     assert not out.parent.exists()
+
+
+def test_identify_leaves_all_results_and_shows_the_table(
+    axis_campaign: Path, tmp_path: Path, run: Run
+) -> None:
+    out = tmp_path / "out"
+    code, stdout, stderr = run("identify", axis_campaign, "-o", out, "-j", "1")
+    assert code == 0, stderr
+    figures = ["amplitudes.svg", "bode_fit.svg", "responses.svg"]
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        [*figures, "identification.json", "model.json"]
+    )
+    for part in ("amplitude [input]", "k [N/m]", "resonance [rad/s]", "One estimation record", "score"):
+        assert part in stdout
+    assert json.loads((out / "identification.json").read_text())["schema_version"] == 1
+    code, _, stderr = run("simulate", out, axis_campaign / "score.csv", "-o", tmp_path / "predicted.csv")
+    assert code == 0, stderr
+
+
+def test_identify_says_nothing_if_quiet(axis_campaign: Path, tmp_path: Path, run: Run) -> None:
+    assert run("identify", axis_campaign, "-o", tmp_path / "out", "--quiet") == (0, "", "")
+
+
+@pytest.mark.parametrize("case", ["unknown rig", "missing file", "NaN", "constant input"])
+def test_identify_gives_a_broken_campaign_one_helpful_message(
+    case: str, axis_campaign: Path, tmp_path: Path, run: Run
+) -> None:
+    change, expected = BROKEN_CAMPAIGNS[case]
+    change(axis_campaign)
+    code, stdout, stderr = run("identify", axis_campaign, "--out", tmp_path / "out")
+    assert (code, stdout) == (2, "")
+    assert stderr.startswith("rigsight: ")
+    assert "Traceback" not in stderr
+    for part in expected:
+        assert part in stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--method", "thesi"], "Did you mean 'thesis'"),
+        (["--resolution", "0.01"], "too short for a resolution"),
+        (["--resolution", "0"], "positive number"),
+        (["--jobs", "0"], "--jobs"),
+    ],
+)
+def test_options_of_identify_are_checked(
+    arguments: list[str], expected: str, axis_campaign: Path, tmp_path: Path, run: Run
+) -> None:
+    code, stdout, stderr = run("identify", axis_campaign, "-o", tmp_path / "out", *arguments)
+    assert (code, stdout) == (2, "")
+    assert expected in stderr
+    assert not (tmp_path / "out").exists()

@@ -8,6 +8,7 @@ import pytest
 
 from rigsight import plot
 from rigsight.diagnose.result import Trace
+from rigsight.frequency import FrequencyResponse
 
 
 def record(before_error: np.ndarray, n_samples: int = 6000) -> Trace:
@@ -80,3 +81,76 @@ def test_drawing_leaves_the_style_of_a_notebook_alone() -> None:
         with plot.style():
             assert mpl.rcParams["font.size"] == 9.0
         assert mpl.rcParams["font.size"] == 21.0
+
+
+def pt2(omega: np.ndarray) -> np.ndarray:
+    return np.asarray(1.0 / (1.0 - (omega / 12.0) ** 2 + 0.2j * omega / 12.0))
+
+
+def panel(n_lines: int = 200, label: str = "") -> plot.Panel:
+    """A PT2 that is measured with an error of 2 % and fitted exactly."""
+    omega = np.linspace(1.0, 60.0, n_lines)
+    truth = pt2(omega)
+    grid = np.linspace(1.0, 60.0, 400)
+    rng = np.random.default_rng(0)
+    error = 0.02 * np.abs(truth) * (rng.normal(size=n_lines) + 1j * rng.normal(size=n_lines)) / np.sqrt(2.0)
+    measured = FrequencyResponse(
+        omega, truth + error, "u", "psi", "rad/A", variance=(0.02 * np.abs(truth)) ** 2
+    )
+    return plot.Panel(
+        "u to psi", measured, plot.FittedCurve(grid, pt2(grid), 0.01 * np.abs(pt2(grid)), "PT2"), label
+    )
+
+
+def test_a_bode_plot_shows_magnitude_and_phase_in_db_and_degrees() -> None:
+    figure = plot.bode([panel(), panel()])
+    assert len(figure.axes) == 4
+    magnitude, phase = figure.axes[0], figure.axes[2]
+    assert magnitude.get_ylabel() == "magnitude [dB re 1 rad/A]"
+    assert phase.get_ylabel() == "phase [deg]"
+    assert phase.get_xlabel() == "angular frequency [rad/s]"
+    fitted = magnitude.lines[1]
+    assert np.max(fitted.get_ydata()) == pytest.approx(20.0 * np.log10(5.0), abs=0.2)
+    assert np.min(phase.lines[0].get_ydata()) == pytest.approx(-178.0, abs=2.0)
+
+
+def test_a_wild_line_does_not_turn_the_phase_of_those_after_it() -> None:
+    whole = panel()
+    values = np.array(whole.measured.values)
+    values[100] *= np.exp(1j * np.pi)
+    measured = FrequencyResponse(whole.measured.omega, values, "u", "psi", "rad/A")
+    figure = plot.bode([plot.Panel("wild", measured, whole.fitted)])
+    points = np.asarray(figure.axes[1].lines[1].get_ydata())
+    expected = np.degrees(np.angle(pt2(whole.measured.omega)))
+    assert np.max(np.abs(np.delete(points - expected, 100))) < 10.0
+
+
+def test_a_bode_plot_of_many_lines_stays_small() -> None:
+    assert len(plot.svg_text(plot.bode([panel(20_000)]), "many")) < 600_000
+
+
+def test_the_same_figure_is_the_same_text() -> None:
+    assert plot.svg_text(plot.bode([panel()]), "a") == plot.svg_text(plot.bode([panel()]), "a")
+
+
+def test_overlaid_responses_name_every_amplitude_once() -> None:
+    figure = plot.overlaid_responses([[panel(label="0.25 A"), panel(label="1 A")], [panel(label="1 A")]])
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["0.25 A", "1 A", "fitted"]
+
+
+def test_parameters_over_amplitude_carry_their_intervals() -> None:
+    points = (
+        plot.AmplitudePoint(0.25, "sweep", 800.0, 10.0),
+        plot.AmplitudePoint(1.0, "sweep", 80.0, 1.0),
+        plot.AmplitudePoint(0.6, "step", 99.0, np.nan),
+    )
+    panels = [
+        plot.AmplitudePanel("k_c", "N m/rad", points, (90.0, 1.0)),
+        plot.AmplitudePanel("J_z", "kg m^2", points),
+    ]
+    figure = plot.amplitude_dependence(panels, "amplitude of u [A]")
+    assert [ax.get_title(loc="left") for ax in figure.axes] == ["k_c [N m/rad]", "J_z [kg m^2]"]
+    (bars, _) = figure.axes[0].containers
+    low, high = bars.lines[2][0].get_segments()[0][:, 1]
+    assert (low, high) == (pytest.approx(800.0 - 19.6), pytest.approx(800.0 + 19.6))

@@ -1,33 +1,38 @@
 """Which single model gives the frequency responses of Table 5.2 and the resonances of Figure 5.6?
 
 The rig's only public measurements are one linear fit (a PT2) per sweep amplitude, each with other parameters. Here ONE
-model with parameters that do not depend on amplitude is fitted to all of them:
+running gear with effects of the catalogue, and with parameters that do not depend on amplitude, is fitted to all of them.
 
-``J_z psi'' + k_d psi' + k_inf psi + k_3 psi^3 + sum_j F_j = (b k_tau / r_0) u_a``,  ``T_a u_a' = u - u_a``
+Each set is swept at every amplitude at the rate of the thesis (ln(640/1e-3)/150 s per e-fold). The response is the ratio of
+output and input spectra, averaged over neighboring lines; the error is the rms of its magnitude [dB] against the PT2 over
+64 logarithmically spaced frequencies from 1 to 70 rad/s. Peaks beyond 8 % cost extra, half as much above 1 A, where no fit is
+published.
 
-F_j are Jenkins elements (a spring k_j in series with dry friction k_j x_j: a Maxwell-slip or discrete Iwan model). Their
-6 slip displacements x_j lie logarithmically over `DECADES` up to x_s, k_j is proportional to x_j^q and the k_j add up to k_0.
+    fit_tables.py check                          residuals of the published set `iwan_tables`
+    fit_tables.py search SECONDS SEED EFFECT...  a new search, by default with the effects of that set
+    fit_tables.py rivals SECONDS                 one search for each of several combinations of effects
 
-Each set is swept at every amplitude at the rate of the thesis (ln(640/1e-3)/150 s per e-fold). The response is the ratio
-of the Fourier transforms of output and input, averaged over neighbouring lines; the error is the rms of its magnitude
-[dB] against the PT2 over 64 logarithmically spaced frequencies from 1 to 70 rad/s. Peaks beyond 8 % cost extra.
-
-Run with ``python experiments/thesis/fit_tables.py [seconds] [seed]``, or with ``check`` to evaluate the set found before.
-The search stops by the clock: another machine gets a little further or less far with the same seed.
+A search stops by the clock: another machine gets a little further or less far with the same seed.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import differential_evolution
 
+from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep
+from rigsight.identify.hysteresis import SpectralRatio
+from rigsight.records import Record
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs.published import PublishedSet, published_sets
+from rigsight.simulate import Structure, compose, parameter_vector, record_input, simulate_sets
 
 Array = NDArray[np.float64]
 
@@ -38,133 +43,64 @@ GROWTH = float(np.log(640.0 / 1e-3)) / 150.0
 BAND = (0.5, 110.0)
 """Angular frequency at the beginning and the end of the simulated sweep [rad/s]."""
 OMEGA = np.geomspace(1.0, 70.0, 64)
-DRIVE = 0.3 * 0.27 / 0.1
-"""b k_tau / r_0 [N m/A], Table 2.1."""
-TABLE_5_2 = {
-    0.25: (0.46, 810.0, 11.6),
-    0.50: (0.60, 405.0, 7.8),
-    0.75: (0.56, 202.5, 5.3),
-    1.00: (0.56, 81.0, 2.0),
+FITTED = {
+    published.amplitude: published
+    for published in published_sets().values()
+    if published.amplitude is not None
 }
-"""Amplitude [A] -> J_z, k_c, k_d."""
+"""Amplitude [A] -> the linear set of Table 5.2."""
 FIGURE_5_6 = {1.25: 12.0, 1.50: 14.0}
 """Amplitude [A] -> resonance [rad/s], where no fit is published."""
 
-N_ELEMENTS = 6
-DECADES = 2.7
-LANES = 16
 SPACE = {
     "J_z": (0.3, 0.7),
-    "k_d": (0.03, 3.0),
-    "k_inf": (20.0, 100.0),
-    "k_0": (500.0, 4000.0),
-    "x_s": (1e-3, 1e-2),
+    "k_d": (0.01, 3.0),
+    "k_c": (500.0, 5000.0),
+    "a": (4e-3, 0.2),
+    "x_s": (1e-3, 2e-2),
     "q": (-0.9, 1.0),
-    "k_3": (1e3, 5e4),
-    "T_a": (5e-3, 6e-2),
+    "beta": (200.0, 2e4),
+    "gamma": (-2e4, 2e4),
+    "k_3": (3e2, 5e4),
+    "T_a": (1e-3, 8e-2),
+    "c_2": (0.1, 100.0),
+    "T_c": (1e-3, 0.1),
+    "g": (1e-6, 1e-3),
+    "u_0": (1e-3, 0.1),
+    "s": (5e-3, 5e-2),
+    "k_s": (1e1, 1e4),
 }
-"""Parameter -> range searched; all but q on a logarithmic scale."""
-FOUND = {
-    "J_z": 0.39945,
-    "k_d": 0.063386,
-    "k_inf": 42.743,
-    "k_0": 2275.7,
-    "x_s": 0.0045301,
-    "q": -0.44573,
-    "k_3": 4008.3,
-    "T_a": 0.038438,
-}
-"""What ``fit_tables.py 40 1`` gave. The ranges of `SPACE` were narrowed after wider searches of the same model."""
+"""Parameter -> range searched; on a logarithmic scale where it is positive."""
+RIVALS = (
+    ("bouc_wen_hysteresis",),
+    ("bouc_wen_hysteresis", "cubic_stiffness", "actuator_lag"),
+    ("iwan_hysteresis",),
+    ("iwan_hysteresis", "cubic_stiffness"),
+    ("iwan_hysteresis", "actuator_lag"),
+    ("iwan_hysteresis", "cubic_stiffness", "actuator_lag"),
+    ("iwan_hysteresis", "cubic_stiffness", "quadratic_damping"),
+    ("iwan_hysteresis", "actuator_lag", "end_stop"),
+    ("iwan_hysteresis", "cubic_stiffness", "actuator_lag", "quadratic_damping"),
+    ("iwan_hysteresis", "cubic_stiffness", "actuator_lag", "coulomb_friction"),
+    ("iwan_hysteresis", "cubic_stiffness", "actuator_lag", "input_dead_zone"),
+    ("iwan_hysteresis", "cubic_stiffness", "actuator_lag", "free_play"),
+    ("iwan_hysteresis", "cubic_stiffness", "actuator_lag", "end_stop"),
+)
+"""Combinations of effects; the last five have one more than the published set."""
 
 
-@numba.njit(fastmath=True, cache=True)
-def _simulate(torque: Array, dt: float, steps: int, p: Array, k: Array, f: Array, out: Array) -> None:
-    """Leapfrog with `steps` per sample; p holds J_z, k_d, k_inf, k_3, T_a in rows, a column per set."""
-    n_elements, n = k.shape
-    h = dt / steps
-    x = np.zeros(n)
-    v = np.zeros(n)
-    before = np.zeros(n)
-    lagged = np.zeros(n)
-    forces = np.zeros((n_elements, n))
-    total = np.zeros(n)
-    decay = np.exp(-h / (2.0 * p[4]))
-    for i in range(torque.size):
-        for s in range(n):
-            out[i, s] = x[s]
-        for _ in range(steps):
-            for s in range(n):
-                x[s] += 0.5 * h * v[s]
-                total[s] = 0.0
-            for j in range(n_elements):
-                for s in range(n):
-                    trial = forces[j, s] + k[j, s] * (x[s] - before[s])
-                    held = min(max(trial, -f[j, s]), f[j, s])
-                    forces[j, s] = held
-                    total[s] += held
-            for s in range(n):
-                before[s] = x[s]
-                middle = torque[i] + (lagged[s] - torque[i]) * decay[s]
-                lagged[s] = torque[i] + (middle - torque[i]) * decay[s]
-                rest = middle - total[s] - p[2, s] * x[s] - p[3, s] * x[s] ** 3
-                half = 0.5 * h * p[1, s] / p[0, s]
-                v[s] = (v[s] * (1.0 - half) + h * rest / p[0, s]) / (1.0 + half)
-                x[s] += 0.5 * h * v[s]
-
-
-def sweep_time(growth: float) -> Array:
-    """Return the sample times of a sweep over `BAND`."""
-    return np.arange(round(np.log(BAND[1] / BAND[0]) / growth / DT) + 1) * DT
-
-
-def response_rows(unit_sweep: Array, width: float = 0.035) -> Array:
-    """Return the rows whose product with the output is the averaged cross spectrum over the input's spectrum."""
-    n = unit_sweep.size
-    lines = 2.0 * np.pi * np.fft.rfftfreq(n, DT)
-    spectrum = np.fft.rfft(unit_sweep)
-    rows = np.zeros((OMEGA.size, n), dtype=complex)
-    for row, omega in zip(rows, OMEGA, strict=True):
-        spread = max(width * omega, 0.75 * lines[1])
-        near = np.flatnonzero(np.abs(lines - omega) < 2.0 * spread)
-        weight = np.exp(-0.5 * ((lines[near] - omega) / spread) ** 2)
-        row[near] = weight * np.conj(spectrum[near]) / np.sum(weight * np.abs(spectrum[near]) ** 2)
-    return np.concatenate([part(np.fft.fft(rows, axis=1)) for part in (np.real, np.imag)])
-
-
-def element_properties(values: Mapping[str, Array], n_elements: int = N_ELEMENTS) -> tuple[Array, Array]:
-    """Return stiffness and slip force of the elements, each of shape (n_elements, n_sets)."""
-    place = (np.arange(n_elements)[:, None] + 0.5) / n_elements
-    slip = values["x_s"] * 10.0 ** (-DECADES * (1.0 - place))
-    share = (slip / values["x_s"]) ** values["q"]
-    stiffness = values["k_0"] * share / share.sum(axis=0)
-    return stiffness, stiffness * slip
-
-
-def simulate(values: Mapping[str, Array], current: Array, steps: int) -> Array:
-    """Return the yaw angle, shape (n_samples, n_sets)."""
-    p = np.array([values[name] for name in ("J_z", "k_d", "k_inf", "k_3", "T_a")])
-    k, f = element_properties(values)
-    blocks = []
-    for start in range(0, p.shape[1], LANES):
-        lanes = np.s_[:, start : start + LANES]
-        out = np.empty((current.size, p[lanes].shape[1]))
-        own_p, own_k, own_f = (np.ascontiguousarray(part[lanes]) for part in (p, k, f))
-        _simulate(DRIVE * current, DT, steps, own_p, own_k, own_f, out)
-        blocks.append(out)
-    return np.concatenate(blocks, axis=1)
-
-
-def table_magnitude(amplitude: float) -> Array:
-    """Return the magnitude of the published PT2 [rad/A]."""
-    J_z, k_c, k_d = TABLE_5_2[amplitude]
-    return np.asarray(np.abs(DRIVE / (k_c - J_z * OMEGA**2 + 1j * k_d * OMEGA)))
+def table_magnitude(published: PublishedSet) -> Array:
+    """Return the magnitude of a published PT2 [rad/A] at `OMEGA`."""
+    J_z, k_c, k_d = (published.parameters[name] for name in ("J_z", "k_c", "k_d"))
+    drive = published.constants["b"] * published.constants["k_tau"] / published.constants["r_0"]
+    return np.asarray(np.abs(drive / (k_c - J_z * OMEGA**2 + 1j * k_d * OMEGA)))
 
 
 def target_peak(amplitude: float) -> float:
     """Return the frequency [rad/s] at which the published magnitude is largest."""
     if amplitude in FIGURE_5_6:
         return FIGURE_5_6[amplitude]
-    J_z, k_c, k_d = TABLE_5_2[amplitude]
+    J_z, k_c, k_d = (FITTED[amplitude].parameters[name] for name in ("J_z", "k_c", "k_d"))
     return float(np.sqrt(k_c / J_z - 0.5 * (k_d / J_z) ** 2))
 
 
@@ -193,62 +129,87 @@ class Evaluation:
         cost = self.total**2
         for amplitude, found in self.peaks.items():
             beyond = np.maximum(np.abs(np.log(found / target_peak(amplitude))) / 0.1 - 0.8, 0.0)
-            cost = cost + (1.5 if amplitude in TABLE_5_2 else 0.3) * beyond**2
+            cost = cost + (1.5 if amplitude in FITTED else 0.75) * beyond**2
         return cost
 
 
 class Sweeps:
-    """The sweeps at all amplitudes, and what a set makes of them."""
+    """The sweeps at all amplitudes, and what parameter sets of a structure make of them."""
 
-    def __init__(self, growth: float = GROWTH, width: float = 0.035) -> None:
-        t = sweep_time(growth)
-        self.unit = log_sweep(t, 1.0, *BAND)
-        self.rows = response_rows(self.unit, width)
+    def __init__(self, structure: Structure, growth: float = GROWTH, width: float = 0.035) -> None:
+        t = np.arange(round(np.log(BAND[1] / BAND[0]) / growth / DT) + 1) * DT
+        self.structure = structure
+        unit = Record("sweep", DT, {"u": log_sweep(t, 1.0, *BAND)}, {"u": "A"})
+        self.rows = SpectralRatio("u", "psi", OMEGA, width).rows(unit)
+        self.inputs = {
+            amplitude: record_input(structure, unit.with_signals(u=amplitude * unit["u"]))
+            for amplitude in sorted((*FITTED, *FIGURE_5_6))
+        }
+        self.n_samples = t.size
 
-    def evaluate(self, values: Mapping[str, Array], steps: int = 3) -> Evaluation:
+    def evaluate(self, p: Array, substeps: int = 3) -> Evaluation:
+        """Evaluate parameter sets of shape (n_parameters, n_sets) about the rest position."""
         errors, tops = {}, {}
-        for amplitude in (*TABLE_5_2, *FIGURE_5_6):
-            real, imag = np.split(self.rows @ simulate(values, amplitude * self.unit, steps), 2)
-            magnitude = np.maximum(np.nan_to_num(np.hypot(real, imag) / amplitude), 1e-12)
+        rest = np.zeros((len(self.structure.states), p.shape[1]))
+        for amplitude, held in self.inputs.items():
+            psi = simulate_sets(self.structure, held, p, rest, self.n_samples, substeps)[:, 0]
+            # A set that diverges gets a response of nearly nothing, and with it a large error.
+            real, imaginary = np.split(self.rows @ np.nan_to_num(psi, posinf=0.0, neginf=0.0), 2)
+            magnitude = np.maximum(np.hypot(real, imaginary) / amplitude, 1e-12)
             tops[amplitude] = peaks(magnitude)
-            if amplitude in TABLE_5_2:
-                ratio = 20.0 * np.log10(magnitude / table_magnitude(amplitude)[:, None])
+            if amplitude in FITTED:
+                ratio = 20.0 * np.log10(magnitude / table_magnitude(FITTED[amplitude])[:, None])
                 errors[amplitude] = np.sqrt(np.mean(ratio**2, axis=0))
         return Evaluation(errors, tops)
 
 
-def decode(places: Array) -> dict[str, Array]:
-    """Return the values at places in the unit cube, shape (n_sets, n_parameters)."""
-    return {
-        name: low + (high - low) * place if name == "q" else low * (high / low) ** place
-        for (name, (low, high)), place in zip(SPACE.items(), places.T, strict=True)
-    }
+def vectors(structure: Structure, values: Mapping[str, float]) -> Array:
+    """Return one parameter set as `Sweeps.evaluate` takes it; the rest position plays no part in a response."""
+    return parameter_vector(structure, {**values, "psi_off": 0.0, "y_off": 0.0})[:, None]
+
+
+def structure_with(effects: Sequence[str]) -> Structure:
+    """Return the running gear with effects; the exponent of Bouc-Wen is 1, which saves a power."""
+    fixed = {"n": 1.0, "A": 1.0} if "bouc_wen_hysteresis" in effects else {}
+    return compose(RUNNING_GEAR, [effect_named(name) for name in effects], fixed)
 
 
 def search(sweeps: Sweeps, seconds: float, seed: int, n_sets: int = 48) -> dict[str, float]:
-    """Return the best set of a differential evolution (current to one of the best, all sets side by side)."""
-    rng = np.random.default_rng(seed)
-    x = rng.random((n_sets, len(SPACE)))
-    cost = sweeps.evaluate(decode(x)).cost
+    """Return the best set that a differential evolution finds in the time given, all sets of a generation side by side."""
+    structure = sweeps.structure
+    known = published_sets()["nominal"].values()
+    free = [name for name in structure.names if name in SPACE]
+    bounds = [SPACE[name] if SPACE[name][0] <= 0.0 else tuple(np.log(SPACE[name])) for name in free]
+    fixed = vectors(structure, {**known, **{name: SPACE[name][1] for name in free}})
+
+    def decode(places: Array) -> Array:
+        p = np.repeat(fixed, places.shape[1], axis=1)
+        for name, place in zip(free, places, strict=True):
+            p[structure.names.index(name)] = place if SPACE[name][0] <= 0.0 else np.exp(place)
+        return p
+
     end = time.monotonic() + seconds
-    generations = 0
-    while time.monotonic() < end and np.ptp(cost) > 1e-3:
-        good = x[np.argsort(cost)[rng.integers(0, n_sets // 8, n_sets)]]
-        one, other = (x[rng.integers(0, n_sets, n_sets)] for _ in range(2))
-        scale = rng.uniform(0.3, 0.9, (n_sets, 1))
-        trial = x + scale * (good - x + one - other)
-        trial = np.where(trial < 0.0, rng.random(x.shape) * x, trial)
-        trial = np.where(trial > 1.0, 1.0 - rng.random(x.shape) * (1.0 - x), trial)
-        crossed = rng.random(x.shape) < rng.choice([0.3, 0.7, 0.95], (n_sets, 1))
-        crossed[np.arange(n_sets), rng.integers(0, len(SPACE), n_sets)] = True
-        trial = np.where(crossed, trial, x)
-        generations += 1
-        trial_cost = sweeps.evaluate(decode(trial)).cost
-        better = trial_cost < cost
-        x[better], cost[better] = trial[better], trial_cost[better]
-    print(f"{generations} generations of {n_sets} sets, cost {cost.min():.3f} to {cost.max():.3f}")
-    best = decode(x[[np.argmin(cost)]])
-    return {name: float(value[0]) for name, value in best.items()}
+
+    def out_of_time(*_: object, **__: object) -> bool:
+        return time.monotonic() > end
+
+    found = differential_evolution(
+        lambda places: sweeps.evaluate(decode(places)).cost,
+        bounds,
+        strategy="currenttobest1bin",
+        popsize=-(-n_sets // len(free)),
+        init="sobol",
+        mutation=(0.4, 0.9),
+        recombination=0.9,
+        maxiter=10**6,
+        tol=1e-3,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        callback=out_of_time,
+        rng=np.random.default_rng(seed),
+    )
+    return dict(zip(structure.names, map(float, decode(found.x[:, None])[:, 0]), strict=True))
 
 
 def show(title: str, found: Evaluation) -> None:
@@ -262,23 +223,44 @@ def show(title: str, found: Evaluation) -> None:
         )
 
 
-def main(arguments: list[str]) -> None:
-    """Search or check, then print the residuals and how they depend on steps, sweep rate and averaging."""
-    sweeps = Sweeps()
-    if arguments[:1] == ["check"]:
-        best = FOUND
-    else:
-        seconds, seed = (
-            float(arguments[0]) if arguments else 150.0,
-            int(arguments[1]) if arguments[1:] else 1,
+def show_all(structure: Structure, values: Mapping[str, float]) -> None:
+    """Print the residuals of a set and how they depend on steps, sweep rate and averaging."""
+    p = vectors(structure, values)
+    show("As searched", Sweeps(structure).evaluate(p))
+    show("Four times as many steps", Sweeps(structure).evaluate(p, substeps=12))
+    show("Sweep four times slower", Sweeps(structure, GROWTH / 4.0).evaluate(p))
+    show("Half the averaging", Sweeps(structure, width=0.0175).evaluate(p))
+
+
+def show_rivals(seconds: float) -> None:
+    """Print what the best set of each combination of effects leaves."""
+    for effects in RIVALS:
+        sweeps = Sweeps(structure_with(effects))
+        best = min(
+            (
+                sweeps.evaluate(vectors(sweeps.structure, search(sweeps, 0.5 * seconds, seed)))
+                for seed in (1, 2)
+            ),
+            key=lambda evaluation: float(evaluation.cost[0]),
         )
-        best = search(sweeps, seconds, seed)
-    print(", ".join(f"{name} = {value:.5g}" for name, value in best.items()))
-    values = {name: np.array([value]) for name, value in best.items()}
-    show("As searched", sweeps.evaluate(values))
-    show("Four times as many steps", sweeps.evaluate(values, steps=12))
-    show("Sweep four times slower", Sweeps(GROWTH / 4.0).evaluate(values))
-    show("Half the averaging", Sweeps(width=0.0175).evaluate(values))
+        worst = max(abs(tops[0] / target_peak(amplitude) - 1.0) for amplitude, tops in best.peaks.items())
+        print(f"{best.total[0]:.2f} dB, worst peak {worst:3.0%}  {', '.join(effects)}", flush=True)
+
+
+def main(arguments: list[str]) -> None:
+    published = published_sets()["iwan_tables"]
+    match arguments:
+        case ["search", seconds, seed, *effects]:
+            structure = structure_with(effects or tuple(published.effects))
+            found = search(Sweeps(structure), float(seconds), int(seed))
+            print(", ".join(f"{name} = {found[name]:.5g}" for name in structure.names if name in SPACE))
+            show_all(structure, found)
+        case ["rivals", seconds]:
+            show_rivals(float(seconds))
+        case ["check"]:
+            show_all(structure_with(tuple(published.effects)), published.values())
+        case _:
+            raise SystemExit(__doc__)
 
 
 if __name__ == "__main__":

@@ -43,7 +43,11 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything ran
 Jobs = Annotated[
     int | None,
     typer.Option(
-        "--jobs", "-j", min=1, show_default="one per processor", help="Candidates fitted at the same time."
+        "--jobs",
+        "-j",
+        min=1,
+        show_default="one per processor",
+        help="Candidates fitted, or records identified, at the same time.",
     ),
 ]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -172,6 +176,55 @@ def diagnose(
 
 
 @app.command()
+def identify(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "identification"
+    ),
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="How frequency responses are estimated: local_rational, local_polynomial, h1 or thesis.",
+        ),
+    ] = "local_rational",
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            "--resolution",
+            metavar="RAD_S",
+            show_default="what each record gives",
+            help="Width in frequency wished for: of a local band, or between averaged frequencies.",
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Fit frequency responses and steps: the parameters of the linear rig, by record and for all together.
+
+    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR, all or none.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.workflow.identify import run_identify
+
+        identification = run_identify(
+            campaign, out, method=method, resolution=resolution, n_jobs=jobs, listener=listener
+        )
+    if not quiet:
+        from rich.console import Console
+
+        from rigsight.report import identification_summary
+
+        Console(highlight=False).print(identification_summary(identification))
+        for line in ("", f"Results: {out / 'identification.json'}", f"Model:   {out / 'model.json'}"):
+            typer.echo(line)
+
+
+@app.command()
 def simulate(
     model: Annotated[
         Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
@@ -222,6 +275,72 @@ def simulate(
         )
     if not quiet:
         typer.echo(f"{simulated.n_samples} samples simulated: {file}")
+
+
+@app.command()
+def vary(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="A model.json, the folder that holds one, or a published set such as hysteresis_r.",
+        ),
+    ],
+    parameter: Annotated[
+        list[str],
+        typer.Option(metavar="NAME", help="The parameter to vary. May be repeated: one picture each."),
+    ],
+    low: Annotated[
+        float | None,
+        typer.Option("--from", metavar="VALUE", show_default="half the model's", help="First value."),
+    ] = None,
+    high: Annotated[
+        float | None,
+        typer.Option("--to", metavar="VALUE", show_default="twice the model's", help="Last value."),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Number of values.")] = 5,
+    amplitude: Annotated[float, typer.Option(help="Amplitude of the sweep, in the unit of the input.")] = 1.0,
+    lowest: Annotated[
+        float | None,
+        typer.Option(
+            metavar="OMEGA", show_default="1/12 of the natural frequency", help="Begin of the band [rad/s]."
+        ),
+    ] = None,
+    highest: Annotated[
+        float | None,
+        typer.Option(metavar="OMEGA", show_default="6 times the natural frequency", help="Its end [rad/s]."),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "vary"
+    ),
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Show how the frequency response of a model changes with a parameter.
+
+    Writes vary.svg, vary.png (vary_NAME.svg, ... where several parameters are named) and vary.json into DIR, all or none.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.workflow.vary import run_vary, table_text
+
+        if (lowest is None) != (highest is None):
+            raise InputError("--lowest and --highest go together: give both, or neither.")
+        band = None if lowest is None or highest is None else (lowest, highest)
+        variations = run_vary(
+            model,
+            parameter,
+            out,
+            low=low,
+            high=high,
+            steps=steps,
+            amplitude=amplitude,
+            band=band,
+            listener=listener,
+        )
+    if not quiet:
+        for variation in variations:
+            typer.echo(table_text(variation) + "\n")
+        typer.echo(f"Pictures and numbers: {out}")
 
 
 def _effects(names: list[str]) -> tuple[Effect, ...]:

@@ -97,7 +97,8 @@ def test_an_amplitude_dependent_rig_has_no_common_linear_set_and_says_so() -> No
     found = fit_jointly(GEAR, records, CONSTANTS)
     assert found.probability < 1e-3
     assert "different parameters" in found.statement
-    assert "k_c" in found.statement
+    # The misfit of the sweep around its resonance widens the interval of its own k_c; J_z lives above it and tells.
+    assert "J_z" in found.statement
     sweep_only = found.kinds[0].residuals
     step_only = found.kinds[1].residuals
     # Each kind alone fits its own records better than the other's set does.

@@ -41,11 +41,12 @@ def test_the_campaign_is_one_that_a_measurement_would_leave(campaign_only: Path)
 def test_the_campaign_does_not_tell_what_is_hidden(campaign_only: Path) -> None:
     for file in campaign_only.iterdir():
         text = file.read_text()
-        for secret in ("bouc", "hysteresis", "beta", "2660", "700"):
+        for secret in ("iwan", "hysteresis", "x_s", "2318", "0.0184"):
             if file.suffix == ".toml":
                 assert secret not in text.lower()
     table = tomllib.loads((campaign_only / "campaign.toml").read_text())
-    assert set(table["rig"]) == {"model", "constants", "parameters"}
+    assert set(table["rig"]) == {"model", "effects", "constants", "parameters"}
+    assert demo.HIDDEN_EFFECT not in table["rig"]["effects"]
 
 
 def test_a_failed_diagnosis_leaves_no_campaign_behind(
@@ -65,7 +66,8 @@ def test_a_failed_diagnosis_leaves_no_campaign_behind(
 def test_the_demo_finds_the_hidden_hysteresis_down_to_the_noise(tmp_path: Path) -> None:
     diagnosis = demo.run_demo(tmp_path / "demo")
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", (demo.HIDDEN_EFFECT,))
+    # In motion the torque disturbance adds to the noise that was seen at rest.
     for gap in diagnosis.gap.values():
-        assert gap.after <= 1.1 * gap.noise_floor
+        assert gap.after <= 1.25 * gap.noise_floor
     written = {path.name for path in (tmp_path / "demo").iterdir()}
     assert written == {"campaign", "diagnosis.json", "model.json", "report.html"}

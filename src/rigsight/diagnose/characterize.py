@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from rigsight.diagnose.starts import start_values
+from rigsight.diagnose.starts import start_values, with_own_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.identify import EffectRegression, FitResult, GreyBoxFit
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure
 
 _LOOK_EVALUATIONS = 25
 _LOOK_TOLERANCE = 1e-3
@@ -24,6 +24,7 @@ _LOOK_ACCURACY = 1e-3
 _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-4
 _HOPELESS_EVALUATIONS = 8
+_REFINE_EVALUATIONS = 150
 _HOPELESS_TOLERANCE = 1e-2
 _PROMISING = 9.0
 """A candidate whose first look costs less than this factor of the best (three times its RMS) is followed to the end."""
@@ -54,7 +55,7 @@ class Look:
 
 def fit_linear(bench: Workbench, start: Mapping[str, float]) -> Scored:
     """Re-identify the equations without an effect."""
-    structure = compose(bench.rig)
+    structure = bench.composed()
     fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise)
     return bench.score((), fit.fit(start, bench.free_parameters(structure)))
 
@@ -112,9 +113,9 @@ def _looks(
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]
         ready = ready or waiting
         waiting = [effect for effect in waiting if effect not in ready]
-        parents = {name: look.fits[0].values for name, look in done.items() if np.isfinite(look.cost)}
+        parents = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
         looks = Parallel(n_jobs=n_jobs, prefer="threads")(
-            delayed(_look)(bench, (effect,), linear.fit.values, parents, regression) for effect in ready
+            delayed(_look)(bench, (effect,), linear.fit, parents, regression) for effect in ready
         )
         done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
     return [done[effect.name] for effect in effects]
@@ -123,7 +124,7 @@ def _looks(
 def fit_candidate(
     bench: Workbench,
     effects: tuple[Effect, ...],
-    base: Mapping[str, float],
+    base: FitResult,
     hold: frozenset[str] = frozenset(),
 ) -> Scored:
     """Fit and score one set of effects to full precision.
@@ -135,7 +136,7 @@ def fit_candidate(
     effects
         All effects of the model; the last is new.
     base
-        Values fitted without the last.
+        Fit without the last.
     hold
         Rig parameters to keep at their base value.
     """
@@ -151,7 +152,12 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
         if not (np.isfinite(model.excess) and model.excess <= _CONTENDER * best):
             return model
         fit = GreyBoxFit(model.fit.structure, bench.estimation, bench.scales, bench.noise)
-        result = fit.fit(model.fit.values, model.fit.free, initial_states=model.fit.initial_states)
+        result = fit.fit(
+            model.fit.values,
+            model.fit.free,
+            initial_states=model.fit.initial_states,
+            max_evaluations=_REFINE_EVALUATIONS,
+        )
         if not result.residuals or result.cost > model.fit.cost * (1.0 + 1e-3):
             return model
         return bench.score(model.effects, result)
@@ -162,19 +168,19 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
 def _look(
     bench: Workbench,
     effects: tuple[Effect, ...],
-    base: Mapping[str, float],
-    parents: Mapping[str, Mapping[str, float]],
+    base: FitResult,
+    parents: Mapping[str, FitResult],
     regression: EffectRegression | None = None,
     hold: frozenset[str] = frozenset(),
 ) -> Look:
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
-    structure = compose(bench.rig, effects, special)
+    structure = bench.composed(effects, special)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
     fit = GreyBoxFit(structure, bench.look, bench.scales, bench.noise, _LOOK_ACCURACY)
-    starts = list(start_values(bench, effects[-1], base, parents))
+    starts = list(start_values(bench, structure, effects[-1], base, parents))
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
-        starts.append({**starts[0], **regressed})
+        starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
     fits = [
         fit.fit(
             start,
@@ -193,9 +199,7 @@ def _followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising)
     special = look.effects[-1].special_cases
     if promising and special:
-        structure = compose(
-            bench.rig, look.effects, {n: v for n, v in look.structure.fixed if n not in special}
-        )
+        structure = bench.composed(look.effects, {n: v for n, v in look.structure.fixed if n not in special})
         scored = _released(bench, scored, structure, list(special))
     if promising:
         scored = _released(bench, scored, scored.fit.structure, bench.releasable_parameters(look.structure))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.result import NoiseFloor
+from rigsight.records.periods import repeated_period
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -74,7 +75,7 @@ def _repeated(source: str, output: str, records: Sequence[Record]) -> float | No
     """Return the scatter over repetitions of the same input, within records and from record to record."""
     segments = []
     for record in records:
-        period = _period(record[source])
+        period = repeated_period(record[source])
         if period is None:
             segments.append((record[source], record[output], False))
             continue
@@ -103,24 +104,6 @@ def _repeated(source: str, output: str, records: Sequence[Record]) -> float | No
             start = 0 if settled else first_input.size // 2
             squares.append(float(np.mean(np.var(np.array(group)[:, start:], axis=0, ddof=1))))
     return float(np.sqrt(np.mean(squares))) if squares else None
-
-
-def _period(samples: NDArray[np.float64]) -> int | None:
-    """Return the period of an exactly repeated input in samples, None if it does not repeat."""
-    centered = samples - np.mean(samples)
-    n = centered.size
-    size = float(np.std(centered))
-    if size == 0.0:
-        return None
-    padded = np.fft.rfft(centered, 2 * n)
-    correlation = np.fft.irfft(np.abs(padded) ** 2)[: n // 2 + 1]
-    overlap = n - np.arange(correlation.size)
-    normalized = correlation / overlap / size**2
-    peaks = np.flatnonzero(normalized > 0.99)
-    for lag in peaks[peaks > 30]:
-        if np.max(np.abs(samples[lag:] - samples[:-lag])) <= _SAME_INPUT * size:
-            return int(lag)
-    return None
 
 
 def _quiet_stretches(record: Record, source: str, output: str) -> list[float]:

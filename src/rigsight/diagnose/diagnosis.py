@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,6 @@ from rigsight.identify import GreyBoxFit, characteristic_scales, linear_start
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 
 _SIGNIFICANT = 3.0
@@ -50,9 +49,11 @@ class Task:
     constants
         Every constant of the rig.
     given
-        Parameters of the simulation whose gap is in question; what is missing is identified.
+        Parameters of the simulation whose gap is in question; what is missing of the rig's is identified.
     records
         Estimation and validation records.
+    modelled
+        Effects that this simulation has already; `given` holds all their values.
     """
 
     title: str
@@ -60,6 +61,7 @@ class Task:
     constants: Mapping[str, float]
     given: Mapping[str, float]
     records: tuple[Record, ...]
+    modelled: tuple[Effect, ...] = ()
 
 
 def diagnose(
@@ -118,6 +120,7 @@ def diagnose(
         scales=characteristic_scales(task.rig, estimation, start),
         noise=noise,
         held=_held(task, estimation, no_spring),
+        modelled=task.modelled,
     )
     linear = fit_linear(bench, start)
     if not linear.residuals:
@@ -147,7 +150,9 @@ def _no_spring(task: Task) -> bool:
 
 def _start(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
     held = {"k": 0.0} if _no_spring(task) else {}
-    return {**task.constants, **linear_start(task.rig, estimation, task.constants, held)}
+    start = {**task.constants, **linear_start(task.rig, estimation, task.constants, held)}
+    # Numbers fitted without the effects that the simulation has are farther off than those it came with.
+    return {**start, **task.given} if task.modelled else start
 
 
 def _held(task: Task, estimation: Sequence[Record], no_spring: bool) -> frozenset[str]:
@@ -157,12 +162,7 @@ def _held(task: Task, estimation: Sequence[Record], no_spring: bool) -> frozense
         symbol for symbol in task.rig.downstream if not any(symbol.name in record for record in estimation)
     ]
     if unmeasured:
-        motion = task.rig.motion
-        own = set().union(
-            *(e.free_symbols for e in (motion.stiffness, motion.damping, motion.rest, motion.bias) if e),
-            motion.inertia.free_symbols if motion.inertia is not None else set(),
-        )
-        held |= {p.name for p in task.rig.parameters} - {symbol.name for symbol in own}
+        held |= task.rig.downstream_parameters
     return frozenset(held)
 
 
@@ -170,7 +170,7 @@ def _before(task: Task, bench: Workbench, estimation: Sequence[Record], linear: 
     """Score the given simulation; parameters that were not given are identified with the given ones held."""
     if not task.given:
         return linear
-    structure = compose(task.rig)
+    structure = bench.composed()
     start = {**_start(task, estimation), **linear.fit.values, **task.given}
     missing = [name for name in bench.free_parameters(structure) if name not in task.given]
     fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise).fit(start, missing)
@@ -202,7 +202,7 @@ def _with_offset_rivals(
     rivals = []
     for effect in effects:
         if effect.signature.even_harmonics and bench.rig.offers(effect):
-            base = {**best.fit.values, **dict.fromkeys(needed, 0.0)}
+            base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
     return rank([*ranking.order, *rivals], noise, rng)
 

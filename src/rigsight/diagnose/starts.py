@@ -10,14 +10,17 @@ import sympy as sp
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
+from rigsight.identify import FitResult
+from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
 
 def start_values(
     bench: Workbench,
+    structure: Structure,
     effect: Effect,
-    base: Mapping[str, float],
-    parents: Mapping[str, Mapping[str, float]],
+    base: FitResult,
+    parents: Mapping[str, FitResult],
 ) -> Iterator[dict[str, float]]:
     """Yield values of all parameters from which a fit with `effect` is worth trying.
 
@@ -25,12 +28,14 @@ def start_values(
     ----------
     bench
         Gives the characteristic sizes.
+    structure
+        The equations with `effect`.
     effect
         The effect to add.
     base
-        Fitted values without it.
+        Fit without it.
     parents
-        Fitted values of simpler effects, by name.
+        Fits with a simpler effect in its place, by name of that effect.
     """
     fitted = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
     rest = {p.name: p.default for p in effect.parameters if p not in fitted and p.default is not None}
@@ -38,12 +43,33 @@ def start_values(
         for start in effect.starts:
             origin = base if start.parent is None else parents.get(start.parent)
             if origin is not None:
-                yield {**origin, **rest, **_evaluated(bench, start.values, origin)}
+                own = _evaluated(bench, start.values, _known(origin, start.parent))
+                yield with_own_values(structure, effect, origin, {**rest, **own})
         return
     sizes = [characteristic_value(p.dimension, bench.scales) for p in fitted]
     for combination in itertools.product(*(p.starts for p in fitted)):
         own = {p.name: c * size for p, c, size in zip(fitted, combination, sizes, strict=True)}
-        yield {**base, **rest, **own}
+        yield with_own_values(structure, effect, base, {**rest, **own})
+
+
+def with_own_values(
+    structure: Structure, effect: Effect, origin: FitResult, own: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the values of a fit for a structure with an effect more, with own values of that effect and of the rig."""
+    names = {p.name: structure.parameter_name(effect, p.name) for p in effect.parameters}
+    return {
+        **carried_over(origin.values, origin.structure, structure),
+        **{names.get(name, name): value for name, value in own.items()},
+    }
+
+
+def _known(origin: FitResult, parent: str | None) -> dict[str, float]:
+    """Return the values that a start's formulas may use: the rig's, and the parent effect's by their own names."""
+    values = dict(origin.values)
+    for effect in origin.structure.effects:
+        if effect.name == parent:
+            values |= origin.structure.values_of(effect, origin.values)
+    return values
 
 
 def _evaluated(

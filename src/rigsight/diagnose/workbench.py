@@ -13,7 +13,7 @@ from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult, GreyBoxFit
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure
+from rigsight.simulate import Structure, compose
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,8 @@ class Workbench:
         Noise floor of each output.
     held
         Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
+    modelled
+        Effects that the simulation in question has already; every candidate is added to them.
     """
 
     rig: Rig
@@ -78,6 +80,11 @@ class Workbench:
     scales: Mapping[str, float]
     noise: Mapping[str, float]
     held: frozenset[str]
+    modelled: tuple[Effect, ...] = ()
+
+    def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
+        """Return the equations of the simulation in question with effects added."""
+        return compose(self.rig, (*self.modelled, *effects), fixed)
 
     def free_parameters(self, structure: Structure) -> list[str]:
         """Return what a fit of this structure moves from the start."""
@@ -122,6 +129,7 @@ class Workbench:
             effect
             for effect in effects
             if self.rig.offers(effect)
+            and effect not in self.modelled
             and (self._has_spring or (effect.spring is None and effect.deflection is None))
         ]
 

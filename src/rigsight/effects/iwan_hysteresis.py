@@ -25,8 +25,8 @@ F. Al-Bender, V. Lampaert and J. Swevers, IEEE Trans. Autom. Control 50 (2005) 1
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
-from rigsight.effects.symbols import deflection_rate, k, spring_torque
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.symbols import deflection_rate, k, spring_torque, x_size
 from rigsight.parameters import Parameter
 
 N_ELEMENTS = 6
@@ -40,6 +40,20 @@ elements = sp.symbols(f"z0:{N_ELEMENTS}", real=True)
 _reaches = [sp.Float(10.0 ** (-DECADES * (1.0 - (i + 0.5) / N_ELEMENTS))) for i in range(N_ELEMENTS)]
 """Deflections at which the elements slip, as shares of x_s."""
 _weights = [reach**q for reach in _reaches]
+
+
+def _from_secant(share: float, reach: float, power: float) -> Start:
+    """Start with the fitted stiffness as the secant of the loop at the records' displacement.
+
+    `share` is a, `reach` is x_s in units of that displacement and `power` is q.
+    """
+    slips = [float(r) for r in _reaches]
+    weights = [slip**power for slip in slips]
+    stuck = sum(w * min(1.0, slip * reach) for w, slip in zip(weights, slips, strict=True)) / sum(weights)
+    softening = share + (1.0 - share) * stuck
+    values = {"k": k / softening, "a": share, "x_s": reach * x_size, "q": power}
+    return Start({name: sp.sympify(value) for name, value in values.items()})
+
 
 IWAN_HYSTERESIS = Effect(
     name="iwan_hysteresis",
@@ -82,5 +96,11 @@ IWAN_HYSTERESIS = Effect(
     + (1 - a) * k * sum(w * z for w, z in zip(_weights, elements, strict=True)) / sum(_weights),
     states=tuple(
         State(z, deflection_rate, "x", limit=reach * x_s) for z, reach in zip(elements, _reaches, strict=True)
+    ),
+    starts=(
+        _from_secant(0.03, 0.5, -0.3),
+        _from_secant(0.1, 2.0, -0.3),
+        _from_secant(0.3, 0.5, 0.0),
+        _from_secant(0.5, 2.0, 0.5),
     ),
 )

@@ -3,7 +3,8 @@
 References
 ----------
 R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 4 and 5. E. Van der
-Ouderaa, J. Schoukens and J. Renneboog, IEEE Trans. Instrumentation and Measurement 37 (1988) 145, for the crest factor.
+Ouderaa, J. Schoukens and J. Renneboog, "Peak factor minimization using a time-frequency domain swapping algorithm", IEEE
+Trans. Instrumentation and Measurement (1988), for the crest factor.
 """
 
 from __future__ import annotations

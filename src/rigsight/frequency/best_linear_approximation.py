@@ -6,8 +6,8 @@ changes between periods is noise; what changes only between realisations of the 
 References
 ----------
 R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 3 and 4. J.
-Schoukens, M. Vaes and R. Pintelon, "Linear system identification in a nonlinear setting", IEEE Control Systems Magazine 36-3
-(2016) 38.
+Schoukens, M. Vaes and R. Pintelon, "Linear system identification in a nonlinear setting", IEEE Control Systems Magazine
+(2016).
 """
 
 from __future__ import annotations

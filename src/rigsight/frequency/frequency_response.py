@@ -38,6 +38,11 @@ class FrequencyResponse:
         Names of the records the values came from.
     method
         Name of the estimator.
+    noise_shares, noise_lines
+        How neighbors share their errors, shape (n_frequencies, n_shares), None where values are independent or it is not known:
+        the error of value i is ``sum_j noise_shares[i, j] xi[noise_lines[i, j]]`` with independent circular xi of variance 1.
+    noise_freedom
+        Complex degrees of freedom from which each variance was estimated, infinite where it is known otherwise.
 
     Raises
     ------
@@ -55,6 +60,9 @@ class FrequencyResponse:
     coherence: NDArray[np.float64] | None = None
     records: tuple[str, ...] = ()
     method: str = ""
+    noise_shares: NDArray[np.complex128] | None = None
+    noise_lines: NDArray[np.intp] | None = None
+    noise_freedom: float = float("inf")
 
     def __post_init__(self) -> None:
         omega = np.array(self.omega, dtype=np.float64)
@@ -78,6 +86,15 @@ class FrequencyResponse:
                 raise InputError(f"{self._what}: {field} must not be negative, got {array.min():.4g}.")
             array.flags.writeable = False
             object.__setattr__(self, field, array)
+        if self.noise_shares is not None and (
+            self.noise_lines is None
+            or self.noise_lines.shape != self.noise_shares.shape
+            or self.noise_shares.shape[:1] != omega.shape
+        ):
+            raise InputError(
+                f"{self._what}: noise_shares needs noise_lines, both of shape ({omega.size}, n_shares), got "
+                f"{self.noise_shares.shape} and {None if self.noise_lines is None else self.noise_lines.shape}."
+            )
         if (np.diff(omega) <= 0.0).any():
             raise InputError(
                 f"{self._what}: angular frequencies must increase; sort them and drop repeated ones."

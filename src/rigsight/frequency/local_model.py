@@ -7,8 +7,9 @@ squares; what is left over is the noise.
 References
 ----------
 R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapter 7. R. Pintelon, J.
-Schoukens, G. Vandersteen and K. Barbe, Mech. Syst. Signal Process. 24 (2010) 573. T. McKelvey and G. Guerin,
-"Non-parametric frequency response estimation using a local rational model", IFAC Proc. 45-16 (2012) 49.
+Schoukens, G. Vandersteen and K. Barbe, "Estimation of nonparametric noise and FRF models for multivariable systems", Mech.
+Syst. Signal Process. (2010). T. McKelvey and G. Guerin, "Non-parametric frequency response estimation using a local rational
+model", 16th IFAC Symposium on System Identification (2012).
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def local_polynomial_response(
     -------
     FrequencyResponse
         At every line of the record's spectrum in the band; neighbors share data, so their errors are correlated over
-        `bandwidth`.
+        `bandwidth`: `FrequencyResponse.noise_shares` tells how.
 
     Raises
     ------
@@ -184,18 +185,21 @@ def _local_response(
         _solve(U, Y, lines[start : start + _CHUNK], half, order, poles, transient)
         for start in range(0, lines.size, _CHUNK)
     ]
-    values, variance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    values, shares, near = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     held = hold_response(omega[lines], record.dt, hold)
-    total = np.asarray(variance.real / np.abs(held) ** 2)
+    shares = np.asarray(shares / held[:, None])
     return FrequencyResponse(
         omega=omega[lines],
         values=values / held,
         source=source,
         response=response,
         unit=pair_unit(record, source, response),
-        variance=total,
+        variance=np.sum(np.abs(shares) ** 2, axis=1),
         records=(record.name,),
         method=f"{method}, order {order}, {width} lines",
+        noise_shares=shares,
+        noise_lines=near,
+        noise_freedom=float(width - unknowns),
     )
 
 
@@ -207,8 +211,11 @@ def _solve(
     order: int,
     poles: int,
     transient: bool,
-) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Return the values at some lines and their variance; at the ends of the spectrum the band is one-sided."""
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp]]:
+    """Return the values at some lines, and what the noise of which lines has in them.
+
+    At the ends of the spectrum the band is one-sided.
+    """
     width = 2 * half + 1
     first = np.clip(lines - half, 0, U.size - width)
     picked = first[:, None] + np.arange(width)
@@ -232,5 +239,5 @@ def _solve(
     freedom = width - np.count_nonzero(kept, axis=1)
     noise = np.sum(np.abs(residual) ** 2, axis=1) / freedom
     scale = scales[:, 0, 0]
-    gain = np.sum(np.abs(right[:, :, 0]) ** 2 * inverse**2, axis=1)
-    return theta[:, 0] / scale, noise * gain / scale**2
+    rows = np.einsum("ls,lws->lw", right[:, :, 0].conj() * inverse, left.conj())
+    return theta[:, 0] / scale, rows * (np.sqrt(noise) / scale)[:, None], picked

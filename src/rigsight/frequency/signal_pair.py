@@ -73,7 +73,7 @@ def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[
 
     References
     ----------
-    K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prentice Hall 1997), section 7.6.
+    K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prentice Hall 1997).
     """
     half = 0.5 * omega * dt
     sinc = np.sinc(half / np.pi)

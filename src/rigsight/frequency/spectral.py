@@ -3,7 +3,7 @@
 References
 ----------
 J. S. Bendat and A. G. Piersol, *Random Data* (Wiley 2010), chapters 6 and 9. G. T. Rocklin, J. Crowley and H. Vold, "A
-comparison of H1, H2 and Hv frequency response functions", Proc. IMAC 3 (1985) 272. P. D. Welch, IEEE Trans. Audio and
+comparison of H1, H2 and Hv frequency response functions", Proc. IMAC (1985). P. D. Welch, IEEE Trans. Audio and
 Electroacoustics 15 (1967) 70.
 """
 

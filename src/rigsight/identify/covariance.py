@@ -10,15 +10,21 @@ from numpy.typing import NDArray
 _DEPENDENT = 1e-14
 """Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
 _TAKES_PART = 1e-9
+_SMOOTHED = 15
+"""Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
+record however fast it is sampled, and what a disturbance leaves of a resonance is some of them wide."""
 
 
 def colored_covariance(
-    sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]], n_common: int
+    sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    n_common: int,
+    n_outputs: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
     """Return the covariance of the common coordinates, allowing for colored residuals.
 
-    ``(J^T J)^-1 (sum_f S(f) J(f)^* J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record. Coordinates that
-    the records do not determine get an infinite variance.
+    ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
+    outputs: a disturbance in front of two sensors moves both. Coordinates that the records do not determine get an infinite
+    variance.
 
     Parameters
     ----------
@@ -27,6 +33,8 @@ def colored_covariance(
         belong to common coordinates, the others to this record's own (its initial states).
     n_common
         Number of common coordinates.
+    n_outputs
+        Per record how many outputs of equal length stand one after the other in its residuals; by default one.
 
     Returns
     -------
@@ -34,7 +42,7 @@ def colored_covariance(
 
     References
     ----------
-    L. Ljung, *System Identification* (Prentice Hall 1999), equation (9.42); W. K. Newey and K. D. West, Econometrica 55
+    L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9; W. K. Newey and K. D. West, Econometrica 55
     (1987) 703.
     """
     own_sizes = [derivative.shape[1] - n_common for _, derivative in sensitivities]
@@ -42,11 +50,12 @@ def colored_covariance(
     bread = np.zeros((n_total, n_total))
     filling = np.zeros((n_total, n_total))
     first = n_common
-    for (residual, derivative), n_own in zip(sensitivities, own_sizes, strict=True):
+    stacked = [1] * len(sensitivities) if n_outputs is None else n_outputs
+    for (residual, derivative), n_own, count in zip(sensitivities, own_sizes, stacked, strict=True):
         columns = np.concatenate([np.arange(n_common), first + np.arange(n_own)]).astype(np.intp)
         first += n_own
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
-        filling[np.ix_(columns, columns)] += _spectral_product(residual, derivative)
+        filling[np.ix_(columns, columns)] += _spectral_product(residual, derivative, count)
     return sandwich_covariance(bread, filling)[:n_common, :n_common]
 
 
@@ -105,16 +114,29 @@ def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.flo
     return np.asarray(result)
 
 
-def _spectral_product(residual: NDArray[np.float64], derivative: NDArray[np.float64]) -> NDArray[np.float64]:
-    n = residual.size
-    power = np.abs(np.fft.rfft(residual)) ** 2 / n
-    width = max(5, int(np.sqrt(power.size)))
-    smooth = np.convolve(np.pad(power, width, mode="reflect"), np.full(width, 1.0 / width), "same")
-    smooth = smooth[width:-width]
-    spectra = np.fft.rfft(derivative, axis=0)
-    folded = np.full(power.size, 2.0)
+def _spectral_product(
+    residual: NDArray[np.float64], derivative: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Return the covariance of J^T r for residuals of `count` outputs, one after the other."""
+    by_output = residual.reshape(count, -1)
+    n = by_output.shape[1]
+    lines = np.fft.rfft(by_output, axis=1)
+    spectra = np.fft.rfft(derivative.reshape(count, n, -1), axis=1)
+    folded = np.full(lines.shape[1], 2.0)
     folded[0] = 1.0
     if n % 2 == 0:
         folded[-1] = 1.0
-    weighted = spectra * np.sqrt(smooth * folded / n)[:, None]
-    return np.asarray(np.real(weighted.conj().T @ weighted))
+    product = np.zeros((derivative.shape[1], derivative.shape[1]))
+    for one in range(count):
+        for other in range(count):
+            power = _smoothed(lines[one] * lines[other].conj() / n) * (folded / n)
+            product += np.real((spectra[one].conj() * power[:, None]).T @ spectra[other])
+    return np.asarray(product)
+
+
+def _smoothed(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Average over neighbors; beyond zero and Nyquist the spectrum of a real signal goes on conjugated."""
+    half = min(_SMOOTHED // 2, spectrum.size - 1)
+    before, after = spectrum[half:0:-1].conj(), spectrum[-2 : -2 - half : -1].conj()
+    around = np.concatenate([before, spectrum, after])
+    return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))

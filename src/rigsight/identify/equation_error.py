@@ -5,8 +5,8 @@ polynomial per record takes up what its ends do to the spectra.
 
 References
 ----------
-C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic Control 8 (1963) 56. R. Pintelon and J. Schoukens, *System
-Identification: A Frequency Domain Approach* (Wiley 2012), sections 6.3 and 9.8.
+C. K. Sanathanan and J. Koerner, "Transfer function synthesis as a ratio of two complex polynomials", IEEE Trans. Automatic
+Control (1963). R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapter 9.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ compressed problem: it only uses J^T J, J^T r and r^T r, so a square root of J^T
 
 References
 ----------
-L. Ljung, *System Identification* (Prentice Hall 1999), sections 7.2 and 9.4 for output error and its covariance with colored
+L. Ljung, *System Identification* (Prentice Hall 1999), chapters 7 and 9, for output error and its covariance with colored
 residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999) 1, for the optimizer.
 """
 
@@ -30,6 +30,7 @@ from rigsight.simulate import (
     record_input,
     simulate_outputs,
     simulate_sets,
+    state_limits,
 )
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.units import characteristic_value
@@ -39,6 +40,9 @@ DEFAULT_ACCURACY = 1e-4
 _MOST_SUBSTEPS = 16
 """A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
 _STATE_RANGE = 20.0
+"""How far an initial state may move from its guess, in units of its size."""
+_LEAST_RANGE = 1e-9
+"""Least unit of a limited state, in units of its size: a play of zero has no range."""
 _WORSE = 1e3
 
 
@@ -81,9 +85,9 @@ class GreyBoxFit:
         self.structure = structure
         self.scales = dict(scales)
         self.accuracy = accuracy
-        self._state_scales = np.array(
-            [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
-        )
+        sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
+        self._state_sizes = np.array(sizes).reshape(-1, 1)
+        self._limited = np.array([equation.limit is not None for equation in structure.equations], dtype=bool)
         names = [signal.name for signal in structure.rig.outputs]
         self._data = [self._prepared(record, names, output_noise) for record in records]
         self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self._data))
@@ -129,9 +133,16 @@ class GreyBoxFit:
         coordinates = Coordinates.of(self.structure, free, start, self.scales)
         n_states = len(self.structure.states)
         states = list(initial_states) if initial_states is not None else [d.first_state for d in self._data]
-        theta = np.concatenate([coordinates.from_values(start), *(s / self._state_scales for s in states)])
-        lower = np.concatenate([coordinates.lower, *(s / self._state_scales - _STATE_RANGE for s in states)])
-        upper = np.concatenate([coordinates.upper, *(s / self._state_scales + _STATE_RANGE for s in states)])
+        own = coordinates.from_values(start)
+        sizes = self.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
+        places = [np.where(self._limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
+        theta = np.concatenate([own, *places])
+        lower = np.concatenate(
+            [coordinates.lower, *(np.where(self._limited, -1.0, x - _STATE_RANGE) for x in places)]
+        )
+        upper = np.concatenate(
+            [coordinates.upper, *(np.where(self._limited, 1.0, x + _STATE_RANGE) for x in places)]
+        )
         problem = _Problem(self, coordinates, n_states, upper)
         problem.choose_substeps(theta)
         if not np.isfinite(problem.at(theta).cost):
@@ -192,7 +203,8 @@ class GreyBoxFit:
             cost = float(
                 sum(np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self._data, strict=True))
             )
-            covariance = colored_covariance(problem.sensitivities(theta), n_free)
+            outputs = [int(np.count_nonzero(d.weights)) for d in self._data]
+            covariance = colored_covariance(problem.sensitivities(theta), n_free, outputs)
             covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
         return FitResult(
@@ -215,10 +227,17 @@ class GreyBoxFit:
         """The records as the fit sees them."""
         return self._data
 
-    @property
-    def state_scales(self) -> NDArray[np.float64]:
-        """Size of each state, shape (n_states,)."""
-        return self._state_scales
+    def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
+
+        A state that cannot leave a range is moved in units of that range, whatever the parameters make of it: beyond an end
+        nothing depends on it, and a fit that wandered there would not come back.
+        """
+        sizes = np.repeat(self._state_sizes, p.shape[1], axis=1)
+        if np.any(self._limited):
+            limits = state_limits(self.structure, p)
+            sizes[self._limited] = np.maximum(limits[self._limited], _LEAST_RANGE * sizes[self._limited])
+        return sizes
 
 
 @dataclass(frozen=True)
@@ -251,8 +270,9 @@ class _Problem:
 
     def states(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Return the initial states per record."""
-        own = theta[self.n_free :].reshape(len(self.fit.data), self.n_states)
-        return [row * self.fit.state_scales for row in own]
+        places = theta[self.n_free :].reshape(len(self.fit.data), self.n_states)
+        sizes = self.fit.state_sizes(self.coordinates.to_parameters(theta[: self.n_free])[:, None])[:, 0]
+        return [row * sizes for row in places]
 
     def choose_substeps(self, theta: NDArray[np.float64]) -> None:
         """Choose the substeps of each record from the accuracy wish at these coordinates."""
@@ -323,13 +343,15 @@ class _Problem:
             moved[i] += shifts[i]
             shifted.append(self.coordinates.to_parameters(moved))
         p = np.column_stack([base, *shifted, *[base] * self.n_states])
+        sizes = self.fit.state_sizes(p)
         results = []
-        for index, (data, state) in enumerate(zip(self.fit.data, self.states(theta), strict=True)):
+        for index, data in enumerate(self.fit.data):
             columns = self._columns(index)
             step = shifts[columns]
-            x0 = np.repeat(state[:, None], p.shape[1], axis=1)
+            places = np.repeat(theta[columns[self.n_free :], None], p.shape[1], axis=1)
             for i in range(self.n_states):
-                x0[i, 1 + self.n_free + i] += step[self.n_free + i] * self.fit.state_scales[i]
+                places[i, 1 + self.n_free + i] += step[self.n_free + i]
+            x0 = places * sizes
             with np.errstate(all="ignore"):
                 out = simulate_sets(
                     self.fit.structure, data.held, p, x0, data.record.n_samples, self.substeps[index]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +50,7 @@ class KindFit:
     Attributes
     ----------
     kind
-        ``"sweep"``, ``"step"``, ...
+        ``"sweep"``, ``"step"``, ..., or the name of its group.
     fit
         Fit of the records of this kind alone.
     residuals
@@ -106,6 +106,7 @@ def fit_jointly(
     start: Mapping[str, float] | None = None,
     output_noise: Mapping[str, float] | None = None,
     max_evaluations: int = 60,
+    group_of: Callable[[Record], str] | None = None,
 ) -> JointFit:
     """Fit one parameter set to sweeps and steps together, and one to each kind for comparison.
 
@@ -125,14 +126,20 @@ def fit_jointly(
         Standard deviation of the residuals of each output. Default: estimated from the joint fit's own residuals, repeatedly.
     max_evaluations
         Limit of each fit.
+    group_of
+        Name of the group that a record is compared in, where it is not its kind; one group alone is allowed then, and leaves
+        nothing to compare.
 
     Raises
     ------
     InputError
         If all records are of one kind, a record's input never moves, or an effect's start value is missing.
     """
-    groups = {kind: [r for r in records if r.kind == kind] for kind in dict.fromkeys(r.kind for r in records)}
-    _check(structure, records, list(groups))
+    label = group_of or (lambda record: record.kind)
+    groups = {name: [r for r in records if label(r) == name] for name in dict.fromkeys(map(label, records))}
+    if group_of is None:
+        _check_kinds(records, list(groups))
+    _check_moves(structure, records)
     held = dict(known or {})
     begin = {
         **constants,
@@ -173,17 +180,25 @@ def fit_jointly(
         _residuals(records, fit),
         tuple(kinds),
         probability,
-        _statement(kinds, probability, differing, fit),
+        _statement(
+            "Records" if group_of else " and ".join(f"{k.kind}s" for k in kinds),
+            probability,
+            differing,
+            fit,
+        ),
     )
 
 
-def _check(structure: Structure, records: Sequence[Record], kinds: Sequence[str]) -> None:
+def _check_kinds(records: Sequence[Record], kinds: Sequence[str]) -> None:
     if len(kinds) < 2:
         found = f"all {len(records)} are of kind '{kinds[0]}'" if kinds else "there are none"
         raise InputError(
             f"A joint fit compares records of different kinds, and {found}. Add steps to sweeps or sweeps to steps (Record.kind) "
             "or use GreyBoxFit for one kind."
         )
+
+
+def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
     source = structure.rig.inputs[0].name
     for record in records:
         if np.ptp(record[source]) <= 1e-12 * np.max(np.abs(record[source])):
@@ -246,7 +261,7 @@ def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
             for k in kinds
         )
     ]
-    if not usable or not all(k.fit.residuals for k in kinds):
+    if len(kinds) < 2 or not usable or not all(k.fit.residuals for k in kinds):
         return float("nan"), ()
     picked = np.ix_(usable, usable)
     values = [np.array([k.fit.values[free[i]] for i in usable]) for k in kinds]
@@ -266,8 +281,7 @@ def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
     return float(chi2.sf(distance, degrees)), tuple(differing)
 
 
-def _statement(kinds: Sequence[KindFit], probability: float, differing: Sequence[str], fit: FitResult) -> str:
-    names = " and ".join(k.kind + "s" for k in kinds)
+def _statement(names: str, probability: float, differing: Sequence[str], fit: FitResult) -> str:
     if not np.isfinite(probability):
         return f"{names} have no parameter in common that each of them determines; nothing can be compared."
     if not fit.success:

@@ -2,7 +2,7 @@
 
 References
 ----------
-R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), sections 9.11 and 11.3, for the
+R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 9 and 11, for the
 maximum likelihood cost and its covariance. G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, for the gain that is
 solved for at every point of the grid. W. K. Newey and K. D. West, Econometrica 55 (1987) 703, for dependent lines.
 """
@@ -66,7 +66,8 @@ def fit_frequency_response(
         ``"variance"`` (maximum likelihood for circular normal errors), ``"uniform"`` (absolute errors) or ``"relative"``.
         Default: variances where they exist, else uniform.
     dependent_lines
-        Over how many neighbors the errors of a line reach (overlapping windows of a local method); 0 for independent lines.
+        Over how many neighbors the errors of a line reach, for a response that does not know it itself
+        (`FrequencyResponse.noise_shares`, as local models do); 0 for independent lines.
 
     Returns
     -------
@@ -131,6 +132,7 @@ class _Problem:
     magnitude_only: bool
     weighting: Weighting
     longest_dead_time: float
+    measured: FrequencyResponse
 
     def errors(self, theta: NDArray[np.float64]) -> NDArray[np.complex128] | NDArray[np.float64]:
         fitted = self.form.response(self.omega, theta)
@@ -157,12 +159,34 @@ class _Problem:
     def covariance(self, theta: NDArray[np.float64], dependent_lines: int) -> NDArray[np.float64]:
         slopes, residual = self.jacobian(theta), self.residual(theta)
         bread = slopes.T @ slopes
+        if self.measured.noise_shares is not None:
+            widened = 1.0
+            if self.weighting == "variance":
+                widened = max(self.misfit(theta), 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
+            return sandwich_covariance(bread, widened * self._shared_filling(theta))
         if dependent_lines > 0:
             per_line = (slopes * residual[:, None]).reshape(self.omega.size, -1, theta.size).sum(axis=1)
             return sandwich_covariance(bread, _dependent_filling(per_line, dependent_lines))
         misfit = self.misfit(theta)
         size = max(misfit, 1.0) if self.weighting == "variance" else misfit
         return sandwich_covariance(bread, size**2 * bread)
+
+    def _shared_filling(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance of J^T r from what each independent line of noise has in all values."""
+        shares, lines = self.measured.noise_shares, self.measured.noise_lines
+        assert shares is not None
+        assert lines is not None
+        slopes: NDArray[np.complex128] = self.form.derivatives(self.omega, theta).conj()
+        if self.magnitude_only:
+            # A magnitude reads the part of an error that lies along the fitted value.
+            fitted = self.form.response(self.omega, theta)
+            along = fitted.conj() / np.maximum(np.abs(fitted), np.finfo(np.float64).tiny)
+            slopes = np.real(along[:, None] * slopes.conj()) * along[:, None]
+        scores = (self.weights**2)[:, None, None] * slopes[:, None, :] * shares[:, :, None]
+        first = int(lines.min())
+        gathered = np.zeros((int(lines.max()) - first + 1, theta.size), dtype=np.complex128)
+        np.add.at(gathered, lines - first, scores)
+        return np.asarray(0.5 * np.real(gathered.conj().T @ gathered))
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         low, high = self._reach()
@@ -241,7 +265,9 @@ def _problem(
         weights = 1.0 / np.maximum(size, 1e-9 * float(np.max(size)))
     else:
         weights = np.full(size.size, 1.0 / float(np.max(size)))
-    return _Problem(form, measured.omega, measured.values, weights, magnitude_only, chosen, longest_dead_time)
+    return _Problem(
+        form, measured.omega, measured.values, weights, magnitude_only, chosen, longest_dead_time, measured
+    )
 
 
 def _check_informative(measured: FrequencyResponse, form: TransferForm) -> None:
@@ -297,6 +323,19 @@ def _components(
         return np.asarray(values, dtype=np.float64)
     parts = np.stack([values.real, values.imag], axis=1)
     return np.asarray(parts.reshape(2 * values.shape[0], *values.shape[1:]))
+
+
+def _scattered_weights(freedom: float) -> float:
+    """Return what covariances gain by weights that scatter themselves.
+
+    Lines whose variance was estimated too small weigh too much and claim to be good at once. For a chi-squared variance x of
+    n = 2 freedom degrees the noise of the sum is E[1/x^2], the claim E[1/x], and the misfit sees E[1/x]:
+    ``E[1/x^2] / E[1/x]^2 = (n - 2) / (n - 4)``.
+    """
+    if not np.isfinite(freedom):
+        return 1.0
+    n = max(2.0 * freedom, 5.0)
+    return (n - 2.0) / (n - 4.0)
 
 
 def _dependent_filling(per_line: NDArray[np.float64], reach: int) -> NDArray[np.float64]:

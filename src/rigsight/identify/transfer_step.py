@@ -2,7 +2,7 @@
 
 References
 ----------
-L. Ljung, *System Identification* (Prentice Hall 1999), sections 7.2 and 9.4, for output error and its covariance with colored
+L. Ljung, *System Identification* (Prentice Hall 1999), chapters 7 and 9, for output error and its covariance with colored
 residuals. The window is the thesis's (section 5.2.2: 0.6 A at 180 s, compared from 180 to 184 s, offset removed).
 """
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup, escape
 
-from rigsight.plot import style
+from rigsight.plot import style, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,13 +64,7 @@ def page_figure(figure: Figure, key: str, alt: str, caption: str) -> PageFigure:
 
 
 def _svg(figure: Figure, key: str, alt: str) -> Markup:
-    import matplotlib as mpl
-
-    stream = io.StringIO()
-    with style():
-        mpl.rcParams["svg.hashsalt"] = key
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-    text = stream.getvalue()
+    text = svg_text(figure, key)
     text = _NOISE.sub("", text[text.index("<svg") :])
     text = _NAMESPACES.sub("", text)
     # Ids of matplotlib repeat from figure to figure; in one page they must not.

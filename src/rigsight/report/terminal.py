@@ -39,9 +39,7 @@ class Summary:
         """Yield the lines, in characters that the terminal's encoding has."""
 
         def text(words: str, style: str = "") -> Text:
-            # An escape sequence in somebody's title must not reach the terminal.
-            plain = "".join(c if c.isprintable() else "?" for c in words.replace(TIMES, "x"))
-            return Text(plain.encode(options.encoding, "replace").decode(options.encoding), style)
+            return plain_text(words, options.encoding, style)
 
         diagnosis = self.diagnosis
         yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
@@ -53,6 +51,13 @@ class Summary:
             table.add_row(text(subject, "bold"), text(words))
         yield Padding(table, (0, 0, 0, 2), expand=False)
         yield text(basis_sentence(diagnosis), "dim")
+
+
+def plain_text(words: str, encoding: str, style: str = "") -> Text:
+    """Return words as a terminal with this encoding can show them, each control character as a question mark."""
+    # An escape sequence in somebody's title must not reach the terminal.
+    plain = "".join(c if c.isprintable() else "?" for c in words.replace(TIMES, "x"))
+    return Text(plain.encode(encoding, "replace").decode(encoding), style)
 
 
 def summary(diagnosis: Diagnosis) -> Summary:

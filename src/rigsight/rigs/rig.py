@@ -92,6 +92,14 @@ class Rig:
         """True if an input moves a mass, False if the motion is prescribed."""
         return self.motion.inertia is not None
 
+    @property
+    def downstream_parameters(self) -> frozenset[str]:
+        """Names of the parameters of which the motion knows nothing."""
+        motion = self.motion
+        parts = (motion.stiffness, motion.damping, motion.rest, motion.bias, motion.inertia)
+        own = {symbol.name for part in parts if part is not None for symbol in part.free_symbols}
+        return frozenset(parameter.name for parameter in self.parameters if parameter.name not in own)
+
     def with_unit(self, parameter: Parameter) -> Parameter:
         """Return the parameter with its unit on this rig.
 

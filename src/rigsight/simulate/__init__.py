@@ -7,12 +7,15 @@ from rigsight.simulate.simulation import record_input as record_input
 from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
 from rigsight.simulate.simulation import simulate_sets as simulate_sets
+from rigsight.simulate.state_limits import state_limits as state_limits
 from rigsight.simulate.structure import Structure as Structure
+from rigsight.simulate.structure import carried_over as carried_over
 from rigsight.simulate.structure import compose as compose
 from rigsight.simulate.structure import structure_named as structure_named
 
 __all__ = [
     "Structure",
+    "carried_over",
     "choose_substeps",
     "compose",
     "parameter_vector",
@@ -21,5 +24,6 @@ __all__ = [
     "simulate",
     "simulate_outputs",
     "simulate_sets",
+    "state_limits",
     "structure_named",
 ]

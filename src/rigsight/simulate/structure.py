@@ -100,6 +100,11 @@ class Structure:
         """Return the name that a parameter of one of the effects has in this structure."""
         return _unique_names(self.rig, self.effects)[effect.name, own_name]
 
+    def values_of(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+        """Return an effect's own values by their own names, out of values of this structure."""
+        names = {p.name: self.parameter_name(effect, p.name) for p in effect.parameters}
+        return {own: values[name] for own, name in names.items() if name in values}
+
 
 def compose(rig: Rig, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
     """Put effects into a rig's equations.
@@ -363,6 +368,23 @@ def without_vanished_effects(
     return compose(structure.rig, kept, fixed), {
         renamed.get(name, name): value for name, value in values.items()
     }
+
+
+def carried_over(values: Mapping[str, float], source: Structure, target: Structure) -> dict[str, float]:
+    """Return values of one structure by the names that they have in another, as far as it has them.
+
+    An effect's parameter may be qualified in one and not in the other.
+    """
+    carried = {
+        p.name: values[p.name] for p in (*target.rig.constants, *target.rig.parameters) if p.name in values
+    }
+    for effect in target.effects:
+        if effect in source.effects:
+            for parameter in effect.parameters:
+                name = source.parameter_name(effect, parameter.name)
+                if name in values:
+                    carried[target.parameter_name(effect, parameter.name)] = values[name]
+    return carried
 
 
 def structure_named(

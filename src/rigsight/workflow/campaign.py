@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
 from rigsight.rigs import RIGS, Rig
+from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign_file import CampaignTable, RecordTable, locate, read_campaign_table
 
 NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
@@ -32,8 +34,10 @@ class Campaign:
         The declared rig.
     constants
         All constants of the rig, defaults filled in [SI].
+    modelled
+        Effects that the simulation in question has already.
     parameters
-        The parameters that were given, as they were given [SI]; what is missing is to be identified.
+        The parameters that were given, as they were given [SI]; what is missing of the rig's is to be identified.
     records
         In the order of the file, with distinct names.
     notes
@@ -44,6 +48,7 @@ class Campaign:
     path: Path
     folder: Path
     rig: Rig
+    modelled: tuple[Effect, ...]
     constants: dict[str, float]
     parameters: dict[str, float]
     records: tuple[Record, ...]
@@ -81,7 +86,8 @@ def read_campaign(campaign: str | Path) -> Campaign:
         )
     rig = RIGS[table.rig.model]
     constants = _constants(path, rig, table.rig.constants)
-    parameters = _parameters(path, rig, table.rig.parameters)
+    modelled = _modelled(path, rig, table.rig.effects)
+    parameters = _parameters(path, compose(rig, modelled), table.rig.parameters)
     if all(record.role != "estimation" for record in table.records):
         raise InputError(
             f'{path.name}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
@@ -101,6 +107,7 @@ def read_campaign(campaign: str | Path) -> Campaign:
         path=path,
         folder=path.parent,
         rig=rig,
+        modelled=modelled,
         constants=constants,
         parameters=parameters,
         records=_with_distinct_names(table, records),
@@ -122,8 +129,34 @@ def _constants(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, fl
     return {constant.name: checked[constant.name] for constant in rig.constants}
 
 
-def _parameters(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
-    checked = _checked(path, "rig.parameters", rig, (*rig.parameters, *rig.alternative_parameters), given)
+def _modelled(path: Path, rig: Rig, names: Iterable[str]) -> tuple[Effect, ...]:
+    known = [effect.name for effect in CATALOGUE]
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"{path.name}: rig.effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
+            )
+    modelled = tuple(effect_named(name) for name in names)
+    try:
+        compose(rig, modelled)
+    except InputError as error:
+        raise InputError(f"{path.name}: rig.effects: {error}") from None
+    return modelled
+
+
+def _parameters(path: Path, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
+    rig = structure.rig
+    constants = {constant.name for constant in rig.constants}
+    own = [parameter for parameter in structure.parameters if parameter.name not in constants]
+    checked = _checked(path, "rig.parameters", rig, (*own, *rig.alternative_parameters), given)
+    for parameter in own:
+        if parameter not in rig.parameters and parameter.name not in checked:
+            if parameter.default is None:
+                raise InputError(
+                    f"{path.name}: rig.parameters.{parameter.name}: is missing; the simulation is said to have an effect that "
+                    f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
+                )
+            checked[parameter.name] = parameter.default
     for alternative, determined in DETERMINES.items():
         if alternative in checked and determined in checked:
             raise InputError(

@@ -30,9 +30,10 @@ class ColumnTable(_Table):
 
 
 class RigTable(_Table):
-    """``[rig]``: which rig, its known constants, and the parameters of the simulation in question."""
+    """``[rig]``: which rig, the effects that the simulation in question has, its known constants and its parameters."""
 
     model: str
+    effects: list[str] = []
     constants: dict[str, Number] = {}
     parameters: dict[str, Number] = {}
 

@@ -66,8 +66,8 @@ def run_diagnose(
     if out is not None:
         check_writable(Path(out))
     read = read_campaign(campaign)
-    candidates = [effect for effect in effects if read.rig.offers(effect)]
-    prepare_kernels(structures_to_try(read.rig, candidates), jobs, listener)
+    candidates = [effect for effect in effects if read.rig.offers(effect) and effect not in read.modelled]
+    prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     diagnosis = diagnose(task_of(read), candidates, seed=seed, n_jobs=jobs, progress=stage.finished)
     if out is not None:
@@ -82,7 +82,7 @@ def task_of(campaign: Campaign) -> Task:
     given = dict(campaign.parameters)
     if "delta_0" in given:
         given["c_y"] = creep_factor(given.pop("delta_0"), campaign.constants["r_0"], campaign.constants["b"])
-    return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records)
+    return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records, campaign.modelled)
 
 
 def write_diagnosis(diagnosis: Diagnosis, out: Path, command: str, seed: int) -> tuple[Path, ...]:

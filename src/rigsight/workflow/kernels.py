@@ -35,10 +35,15 @@ def checked_jobs(n_jobs: int | None) -> int:
     return os.cpu_count() or 1
 
 
-def structures_to_try(rig: Rig, effects: Iterable[Effect]) -> list[Structure]:
-    """Return the structures that a diagnosis simulates first: the rig alone, and with each effect that makes sense on it."""
-    offered = [effect for effect in effects if rig.offers(effect)]
-    return [compose(rig), *(compose(rig, (effect,), effect.special_cases) for effect in offered)]
+def structures_to_try(
+    rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
+) -> list[Structure]:
+    """Return the structures that a diagnosis simulates first: as modelled, and with each effect more that makes sense."""
+    offered = [effect for effect in effects if rig.offers(effect) and effect not in modelled]
+    return [
+        compose(rig, modelled),
+        *(compose(rig, (*modelled, effect), effect.special_cases) for effect in offered),
+    ]
 
 
 def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:

@@ -68,15 +68,15 @@ def check_target(file: Path) -> None:
     _check_replaceable(file)
 
 
-def write_together(folder: Path, contents: Mapping[str, str]) -> tuple[Path, ...]:
-    """Write text files into a folder, all of them or none; files of these names are replaced.
+def write_together(folder: Path, contents: Mapping[str, str | bytes]) -> tuple[Path, ...]:
+    """Write files into a folder, all of them or none; files of these names are replaced.
 
     Parameters
     ----------
     folder
         Made, with the folders above it, if it does not exist.
     contents
-        File name -> text.
+        File name -> text, or bytes of a picture.
 
     Returns
     -------
@@ -92,15 +92,15 @@ def write_together(folder: Path, contents: Mapping[str, str]) -> tuple[Path, ...
     fresh: list[Path] = []
     try:
         made = _made(folder)
-        for name, text in contents.items():
+        for name, content in contents.items():
             target = folder / name
             _check_replaceable(target)
             # A link keeps pointing where it does; what it points to is replaced.
             target = target.resolve()
             part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
             parts[part] = target
-            with part.open("x", encoding="utf-8", newline="\n") as file:
-                file.write(text)
+            with part.open("xb") as file:
+                file.write(content.encode("utf-8") if isinstance(content, str) else content)
                 file.flush()
                 os.fsync(file.fileno())
         for part, target in parts.items():

@@ -1,145 +1,35 @@
-"""Which figures show a diagnosis? Shared by the report and by notebooks; every function returns a figure of its own.
-
-Nothing here touches pyplot: figures carry their own canvas, so that they can be drawn in any thread and are freed with
-their last reference.
-"""
+"""Which figures show a diagnosis?"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import wraps
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.plot.drawing import (
+    FLOOR,
+    GIVEN,
+    MEASURED,
+    OTHER,
+    REIDENTIFIED,
+    WITH_EFFECT,
+    in_style,
+    line,
+    new_figure,
+    plain_log_ticks,
+    shown_in,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
-MEASURED = "#5f6770"
-GIVEN = "#d55e00"
-REIDENTIFIED = "#cc79a7"
-WITH_EFFECT = "#0072b2"
-FLOOR = "#1d2126"
-OTHER = "#9aa4ae"
-"""Okabe and Ito's palette: told apart by color-blind readers, and in gray by line style."""
-
-STYLE: dict[Any, Any] = {
-    "font.family": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#8a939c",
-    "axes.labelcolor": "#1d2126",
-    "axes.titlelocation": "left",
-    "axes.titlesize": 9.5,
-    "axes.titleweight": "bold",
-    "xtick.color": "#3b434b",
-    "ytick.color": "#3b434b",
-    "grid.color": "#e3e7ea",
-    "legend.frameon": False,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "lines.solid_joinstyle": "round",
-    "svg.fonttype": "none",
-    # A dollar sign in somebody's signal or effect name is no formula.
-    "text.parse_math": False,
-}
-
-_PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
-_PREFIXED = ("rad", "m", "N", "N m", "A", "V", "Pa", "W", "K")
-_ENVELOPE_BINS = 600
 _DETAIL_PERIODS = 5.0
 _DETAIL_SHARE = 1.0 / 12.0
 _DETAIL_MIN_SAMPLES = 60
-
-
-@contextmanager
-def style() -> Iterator[None]:
-    """Draw and save in the style of these figures, whatever the notebook around it has set."""
-    import matplotlib as mpl
-
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        for name, value in STYLE.items():
-            mpl.rcParams[name] = value
-        yield
-
-
-def _in_style(draw: Callable[P, R]) -> Callable[P, R]:
-    @wraps(draw)
-    def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
-        with style():
-            return draw(*args, **kwargs)
-
-    return drawn
-
-
-@dataclass(frozen=True)
-class DisplayScale:
-    """Factor from SI to what is shown, and the unit shown."""
-
-    factor: float
-    unit: str
-
-
-def display_scale(unit: str, size: float) -> DisplayScale:
-    """Return the scale by which a quantity of typical `size` is shown, e.g. mrad for 0.01 rad.
-
-    Parameters
-    ----------
-    unit
-        SI unit; units that take no prefix (``"m/s"``, ``"1"``) are left alone.
-    size
-        Largest absolute value to be shown.
-    """
-    if unit not in _PREFIXED or not np.isfinite(size) or size <= 0.0:
-        return DisplayScale(1.0, unit)
-    exponent = int(np.clip(3 * np.floor(np.log10(size) / 3.0), -9, 6))
-    # 0.5 m reads better than 500 mm.
-    if -9 <= exponent < 0 and size * 10.0**-exponent >= 200.0:
-        exponent += 3
-    return DisplayScale(10.0**-exponent, _PREFIXES[exponent] + unit)
-
-
-def envelope(
-    t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a shorter line with the same picture: lowest and highest sample of each bin, in their order in time.
-
-    Parameters
-    ----------
-    t, values
-        Shape (n_samples,).
-    n_bins
-        Bins; a line of at most ``2 * n_bins`` samples is returned unchanged.
-
-    Returns
-    -------
-    t, values
-        Shape (at most 2 * n_bins,).
-    """
-    if values.size <= 2 * n_bins:
-        return t, values
-    edges = np.linspace(0, values.size, n_bins + 1).astype(int)
-    keep: list[int] = []
-    for start, stop in pairwise(edges):
-        part = values[start:stop]
-        if not np.any(np.isfinite(part)):
-            keep.append(int(start))
-            continue
-        low, high = int(np.nanargmin(part)), int(np.nanargmax(part))
-        keep += [int(start) + i for i in sorted({low, high})]
-    return t[keep], values[keep]
 
 
 def detail_window(trace: Trace, output: str) -> slice:
@@ -163,7 +53,7 @@ def _largest(residual: NDArray[np.float64], length: int) -> slice:
     return slice(start, start + length)
 
 
-@_in_style
+@in_style
 def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None) -> Figure:
     """Draw the gap of each output as a waterfall: given, taken away by better numbers and by the effect, left over, floor.
 
@@ -177,7 +67,7 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | 
         Panel title by output; default is its name.
     """
     outputs = list(diagnosis.gap)
-    figure = _figure(6.8, 0.45 + 1.75 * max(1, len(outputs)))
+    figure = new_figure(6.8, 0.45 + 1.75 * max(1, len(outputs)))
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
     for ax, output in zip(axes, outputs, strict=False):
         gap = diagnosis.gap[output]
@@ -224,7 +114,7 @@ def _waterfall_step(
     ax.text(high + 0.012 * right, row, text, va="center", fontsize=8.5, color=FLOOR)
 
 
-@_in_style
+@in_style
 def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figure:
     """Draw what each candidate leaves of the validation records, in units of the noise floor on a logarithmic axis.
 
@@ -238,7 +128,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         Candidates drawn, best first.
     """
     candidates = diagnosis.candidates[:limit]
-    figure = _figure(6.8, 0.95 + 0.27 * max(1, len(candidates)))
+    figure = new_figure(6.8, 0.95 + 0.27 * max(1, len(candidates)))
     ax = figure.subplots()
     finite = [c.excess for c in candidates if np.isfinite(c.excess) and c.excess > 0.0]
     left, right = min([1.0, *finite]) / 1.04, max([1.5, *finite])
@@ -258,7 +148,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
                     textcoords="offset points", va="center", fontsize=8.5, color=FLOOR)  # fmt: skip
     ax.set_xscale("log")
     ax.set_xlim(left, right * (right / left) ** 0.12)
-    _plain_log_ticks(ax, left, right)
+    plain_log_ticks(ax, left, right)
     ax.axvline(1.0, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.2)
     ax.set_yticks(range(len(candidates)), list(names[: len(candidates)]))
     ax.set_ylim(max(1, len(candidates)) - 0.45, -0.55)
@@ -269,23 +159,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     return figure
 
 
-def _plain_log_ticks(ax: Axes, left: float, right: float) -> None:
-    """Label decades and, where they are few, numbers between, as people write them; scientific notation beyond 10^4."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
-    decades = range(int(np.floor(np.log10(left))), int(np.ceil(np.log10(right))) + 1)
-    span = np.log10(right / left)
-    multiples = (1, 1.1, 1.2, 1.5, 2, 3, 5) if span < 0.7 else ((1, 2, 5) if span < 2.5 else (1,))
-    ticks = [m * 10.0**d for d in decades for m in multiples]
-    ticks = [tick for tick in ticks if left <= tick <= 1.15 * right]
-    step = max(1, len(ticks) // 8)
-    ticks = ticks[::step]
-    ax.xaxis.set_major_locator(FixedLocator(ticks))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.set_xticks(ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks])
-
-
-@_in_style
+@in_style
 def comparison(
     diagnosis: Diagnosis, trace: Trace, output: str, window: slice | None = None, after_label: str = "after"
 ) -> Figure:
@@ -313,22 +187,22 @@ def comparison(
         for source in (trace.measured, trace.before, trace.after)
     )
     unit = diagnosis.units.get(output, "")
-    factor, unit = _factor(unit, measured)
+    factor, unit = shown_in(unit, measured)
     residuals = (before - measured, after - measured)
-    residual_factor, residual_unit = _factor(diagnosis.units.get(output, ""), *residuals)
+    residual_factor, residual_unit = shown_in(diagnosis.units.get(output, ""), *residuals)
 
     width, height = (3.5 if window else 6.6), 3.9
-    figure = _figure(width, height, layout=None)
+    figure = new_figure(width, height, layout=None)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     # Fixed margins in inches: constrained layout would take most of the time of a report with many records.
     figure.subplots_adjust(
         left=0.66 / width, right=1.0 - 0.14 / width, bottom=0.46 / height, top=1.0 - 0.34 / height, hspace=0.1
     )
-    _line(top, t, measured * factor, MEASURED, "measured", linewidth=2.6, alpha=0.55)
-    _line(top, t, before * factor, GIVEN, "given simulation", linewidth=1.0, linestyle=(0, (5, 1.6)))
-    _line(top, t, after * factor, WITH_EFFECT, after_label, linewidth=1.0)
-    _line(bottom, t, residuals[0] * residual_factor, GIVEN, linewidth=0.8)
-    _line(bottom, t, residuals[1] * residual_factor, WITH_EFFECT, linewidth=0.8)
+    line(top, t, measured * factor, MEASURED, "measured", linewidth=2.6, alpha=0.55)
+    line(top, t, before * factor, GIVEN, "given simulation", linewidth=1.0, linestyle=(0, (5, 1.6)))
+    line(top, t, after * factor, WITH_EFFECT, after_label, linewidth=1.0)
+    line(bottom, t, residuals[0] * residual_factor, GIVEN, linewidth=0.8)
+    line(bottom, t, residuals[1] * residual_factor, WITH_EFFECT, linewidth=0.8)
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), None)
     if floor is not None and np.isfinite(floor):
         bottom.axhspan(
@@ -352,30 +226,3 @@ def _mark_detail(ax: Axes, trace: Trace, window: slice) -> None:
     ax.axvspan(
         trace.t[window.start], trace.t[window.stop - 1], ymin=0.0, ymax=0.025, color=FLOOR, linewidth=0
     )
-
-
-def _line(
-    ax: Axes,
-    t: NDArray[np.float64],
-    values: NDArray[np.float64],
-    color: str,
-    label: str | None = None,
-    **style: Any,
-) -> None:
-    finite = np.where(np.isfinite(values), values, np.nan)
-    ax.plot(*envelope(t, finite), color=color, label=label, **style)
-
-
-def _factor(unit: str, *series: NDArray[np.float64]) -> tuple[float, str]:
-    peaks = [float(np.max(np.abs(s[np.isfinite(s)]), initial=0.0)) for s in series]
-    scale = display_scale(unit, max(peaks))
-    return scale.factor, scale.unit
-
-
-def _figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout=layout)
-    FigureCanvasAgg(figure)
-    return figure

@@ -1,0 +1,107 @@
+"""Do the parameters that records show by themselves change with the amplitude, beyond their intervals?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from rigsight.identify.identification import RecordIdentification
+
+_CHANCE = 1e-3
+"""Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
+_SAME_AMPLITUDE = 0.01
+
+
+def amplitude_dependence(
+    records: Sequence[RecordIdentification], units: Mapping[str, str], input_unit: str
+) -> tuple[str, tuple[str, ...]]:
+    """Say in a sentence whether parameters change with the amplitude, and name those that do.
+
+    Records of one kind are compared where their amplitudes differ: a step and a sweep also differ in frequency content. Offsets
+    do not take part; they may differ from record to record without any nonlinearity.
+
+    Parameters
+    ----------
+    records
+        What each record shows.
+    units
+        Unit by parameter.
+    input_unit
+        Unit of the amplitudes.
+    """
+    compared = _comparable(records)
+    if len(compared) < 2:
+        return (
+            "The records have one amplitude, so they cannot tell whether the parameters change with it. Record another one.",
+            (),
+        )
+    names = [
+        name
+        for path in zip(*(r.paths for _, group in compared for r in group), strict=True)
+        for name in _shared_names([p.physical.names if p.physical else () for p in path])
+    ]
+    span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {input_unit}".rstrip()
+    if not names:
+        return f"No parameter was found at all amplitudes {span}; nothing can be compared.", ()
+    changing, told = [], []
+    for name in names:
+        means = [_mean([record.estimates[name] for record in group]) for _, group in compared]
+        if not all(np.isfinite(error) for _, error in means) or _chance(means) >= _CHANCE / len(names):
+            continue
+        changing.append(name)
+        low, high = means[0][0], means[-1][0]
+        values = [value for value, _ in means]
+        if min(low, high) > min(values) or max(low, high) < max(values):
+            told.append(f"{name} moves between {min(values):.3g} and {max(values):.3g} {units.get(name, '')}")
+        else:
+            verb = "falls" if high < low else "rises"
+            told.append(f"{name} {verb} from {low:.3g} to {high:.3g} {units.get(name, '')}")
+    if not changing:
+        return (
+            f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval.",
+            (),
+        )
+    return (
+        f"With amplitudes {span}, {'; '.join(text.strip() for text in told)}: beyond their intervals, the sign of a nonlinear "
+        "effect. 'rigsight diagnose' looks for it."
+    ), tuple(changing)
+
+
+def _comparable(
+    records: Sequence[RecordIdentification],
+) -> list[tuple[float, list[RecordIdentification]]]:
+    """Return amplitudes in increasing order with their records, of the kind of records that has most amplitudes."""
+    best: list[tuple[float, list[RecordIdentification]]] = []
+    for kind in dict.fromkeys(r.record.kind for r in records):
+        groups: list[tuple[float, list[RecordIdentification]]] = []
+        own = [r for r in records if r.record.kind == kind and r.motion.physical is not None]
+        for found in sorted(own, key=lambda r: r.amplitude):
+            if groups and found.amplitude <= (1.0 + _SAME_AMPLITUDE) * groups[-1][0]:
+                groups[-1][1].append(found)
+            else:
+                groups.append((found.amplitude, [found]))
+        if len(groups) > len(best):
+            best = groups
+    return best
+
+
+def _shared_names(names: Sequence[Sequence[str]]) -> list[str]:
+    return [name for name in names[0] if all(name in other for other in names)]
+
+
+def _mean(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the mean weighted by inverse variances, with its standard error."""
+    values, errors = np.array(estimates).T
+    if not np.all(np.isfinite(errors) & (errors > 0.0)):
+        return float(np.mean(values)), float("inf")
+    weights = errors**-2
+    return float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
+
+
+def _chance(means: Sequence[tuple[float, float]]) -> float:
+    """Return the probability of a scatter as large if the value is the same everywhere."""
+    values, errors = np.array(means).T
+    middle = _mean(means)[0]
+    return float(chi2.sf(np.sum(((values - middle) / errors) ** 2), values.size - 1))

@@ -1,0 +1,289 @@
+"""What do hysteresis parameters mean? Saturation, the pair that shapes the loop, and energy per cycle, with intervals.
+
+Intervals come from draws of the parameters' covariance: saturation and pair are anything but linear in the parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.effects.effect import Effect, SumAndDifference
+from rigsight.errors import InputError
+from rigsight.identify.coordinates import Coordinates
+from rigsight.identify.fit_result import FitResult
+from rigsight.records.record import Record
+from rigsight.rigs import ELEMENT
+from rigsight.simulate import Structure, compose, simulate_sets
+from rigsight.simulate.input_hold import hold_motion
+
+LEVEL = 0.95
+"""Confidence level of the intervals."""
+_DRAWS = 400
+_REDRAWS = 20
+_CYCLES = 4
+_SAMPLES_PER_CYCLE = 512
+_SUBSTEPS = 2
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A number that follows from parameters.
+
+    Attributes
+    ----------
+    name, unit
+        What it is.
+    value
+        At the fitted parameters; infinite where it has no bound.
+    lower, upper
+        Interval of confidence `LEVEL`; -inf to inf where the parameters are undetermined.
+    """
+
+    name: str
+    unit: str
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class LoopArea:
+    """Energy per cycle [force times displacement] at one amplitude of the spring's deflection."""
+
+    amplitude: float
+    energy: Derived
+
+
+@dataclass(frozen=True)
+class DerivedQuantities:
+    """What hysteresis parameters mean.
+
+    Attributes
+    ----------
+    pairs
+        Sum and difference of each pair that the effects search so, in this order.
+    saturation
+        z_max = (A / (beta + gamma))^(1/n) of a Bouc-Wen spring, None for effects without it.
+    saturation_in_words
+        What the sign of beta + gamma says about the saturation; empty without a Bouc-Wen spring.
+    loop_areas
+        Energy per cycle at each amplitude.
+    """
+
+    pairs: tuple[Derived, ...]
+    saturation: Derived | None
+    saturation_in_words: str
+    loop_areas: tuple[LoopArea, ...]
+
+
+def derived_quantities(
+    fit: FitResult,
+    amplitudes: Sequence[float],
+    scales: Mapping[str, float],
+    rng: np.random.Generator,
+    n_draws: int = _DRAWS,
+) -> DerivedQuantities:
+    """Derive pairs, saturation and loop areas from a fit.
+
+    Parameters
+    ----------
+    fit
+        With values and covariance.
+    amplitudes
+        Deflections at which loop areas are wished for, as those seen in records (`record_amplitudes`).
+    scales
+        Size of each base quantity, as in the fit.
+    rng
+        Draws the parameters.
+    n_draws
+        Number of draws.
+    """
+    structure = fit.structure
+    draws = parameter_draws(fit, scales, rng, n_draws)
+    determined = _determined(fit)
+    known = dict(structure.fixed)
+
+    def of(name: str) -> NDArray[np.float64]:
+        if name in structure.names:
+            return np.asarray(draws[structure.names.index(name)])
+        return np.full(draws.shape[1], known[name])
+
+    units = {p.name: p.unit for p in structure.parameters}
+    pairs: list[Derived] = []
+    saturation, words = None, ""
+    for effect, pair in _pairs(structure):
+        first, second = (structure.parameter_name(effect, name) for name in (pair.first, pair.second))
+        unit = units.get(first, "")
+        pairs += [
+            _derived(f"{first} + {second}", unit, of(first) + of(second), determined),
+            _derived(f"{first} - {second}", unit, of(first) - of(second), determined),
+        ]
+        if pair.exponent is not None:
+            scale, exponent = (of(structure.parameter_name(effect, name)) for name in ("A", pair.exponent))
+            reached = _saturation(scale, of(first) + of(second), exponent)
+            saturation = _derived("z_max", structure.rig.units["x"], reached, determined)
+            words = _in_words(saturation, f"{first} + {second}")
+    hysteretic = any(effect.spring is not None for effect in structure.effects)
+    areas = tuple(
+        LoopArea(
+            a,
+            _derived(
+                f"energy per cycle at {a:.3g}",
+                _energy_unit(structure),
+                loop_area(structure, draws, a),
+                determined,
+            ),
+        )
+        for a in (amplitudes if hysteretic else ())
+    )
+    return DerivedQuantities(tuple(pairs), saturation, words, areas)
+
+
+def parameter_draws(
+    fit: FitResult, scales: Mapping[str, float], rng: np.random.Generator, n_draws: int
+) -> NDArray[np.float64]:
+    """Return the fitted parameters and draws of their covariance, shape (n_parameters, 1 + n_draws).
+
+    The first column is the fit itself. Draws are made in search coordinates, in which a loop is nearly linear, and those
+    outside the admissible range (an exponent below 1) are drawn again; undetermined parameters stay where they are.
+    """
+    structure = fit.structure
+    center = np.array([fit.values[name] for name in structure.names])
+    draws = np.repeat(center[:, None], 1 + n_draws, axis=1)
+    if not fit.free:
+        return draws
+    coordinates = Coordinates.of(structure, fit.free, fit.values, scales)
+    theta = coordinates.from_values(fit.values)
+    known = np.where(np.isfinite(fit.covariance), fit.covariance, 0.0)
+    back = np.linalg.pinv(coordinates.jacobian(theta) / _sizes(known)[:, None])
+    covariance = back @ (known / np.outer(_sizes(known), _sizes(known))) @ back.T
+    # Coordinates differ by orders of magnitude: the root is taken of the correlation.
+    size = _sizes(covariance)
+    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    root = size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+    inside: list[NDArray[np.float64]] = []
+    for _ in range(_REDRAWS):
+        drawn = theta + rng.standard_normal((n_draws, theta.size)) @ root.T
+        admitted = np.all((drawn >= coordinates.lower) & (drawn <= coordinates.upper), axis=1)
+        inside += list(drawn[admitted])
+        if len(inside) >= n_draws:
+            break
+    else:
+        inside += list(np.clip(drawn, coordinates.lower, coordinates.upper))
+    draws[:, 1:] = np.array([coordinates.to_parameters(each) for each in inside[:n_draws]]).T
+    return draws
+
+
+def _sizes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    size = np.sqrt(np.diag(covariance))
+    return np.asarray(np.where(size == 0.0, 1.0, size))
+
+
+def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) -> NDArray[np.float64]:
+    """Return the energy per cycle of the spring for parameter sets of shape (n_parameters, n_sets), shape (n_sets,).
+
+    The effects that change the spring (its deflection or its torque) are put on a bench that moves them slowly and
+    sinusoidally; the last of four cycles counts. Damping and friction beside the spring are left out.
+
+    Raises
+    ------
+    InputError
+        If no effect changes the spring, or the amplitude is not positive.
+    """
+    effects = [e for e in structure.effects if e.spring is not None or e.deflection is not None]
+    if not any(effect.spring is not None for effect in effects):
+        raise InputError(
+            f"No hysteresis of the spring among the effects ({', '.join(structure.effect_names) or 'none'}): there is no loop."
+        )
+    if not 0.0 < amplitude < np.inf:
+        raise InputError(f"The amplitude of a loop must be positive, got {amplitude:g}.")
+    bench = compose(ELEMENT, effects)
+    known = dict(structure.fixed)
+    values = np.zeros((len(bench.names), p.shape[1]))
+    stiffness = structure.rig.motion.stiffness.name
+    values[bench.names.index("k")] = p[structure.names.index(stiffness)]
+    for effect in effects:
+        for parameter in effect.parameters:
+            name = structure.parameter_name(effect, parameter.name)
+            row = bench.names.index(bench.parameter_name(effect, parameter.name))
+            values[row] = known[name] if name in known else p[structure.names.index(name)]
+    # One radian per second: the laws are rate-independent, and what is not has no area of its own.
+    phase = 2.0 * np.pi * np.arange(_CYCLES * _SAMPLES_PER_CYCLE + 1) / _SAMPLES_PER_CYCLE
+    dt = 2.0 * np.pi / _SAMPLES_PER_CYCLE
+    velocity = amplitude * np.cos(phase)
+    held = hold_motion(amplitude * np.sin(phase), velocity, dt)
+    rest = np.zeros((len(bench.states), p.shape[1]))
+    force = simulate_sets(bench, held, values, rest, phase.size, _SUBSTEPS)[:, 0]
+    last = slice(-_SAMPLES_PER_CYCLE, None)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(velocity[last] @ force[last] * dt)
+
+
+def record_amplitudes(
+    structure: Structure, records: Sequence[Record], values: Mapping[str, float]
+) -> tuple[float, ...]:
+    """Return the deflection of the spring that each record reaches, increasing."""
+    rig = structure.rig
+    name = rig.outputs[0].name if rig.is_driven else rig.inputs[0].name
+    rest = float(rig.motion.rest.subs({s: values[s.name] for s in rig.motion.rest.free_symbols}))
+    return tuple(sorted({float(np.max(np.abs(record[name] - rest))) for record in records}))
+
+
+def _determined(fit: FitResult) -> bool:
+    """Return True if the records determine the spring and its effects; of other parameters no loop depends."""
+    structure = fit.structure
+    own = {s.name for s in structure.rig.motion.stiffness.free_symbols}
+    own |= {
+        structure.parameter_name(effect, p.name) for effect in structure.effects for p in effect.parameters
+    }
+    return all(np.isfinite(error) for name, error in fit.standard_errors.items() if name in own)
+
+
+def _pairs(structure: Structure) -> list[tuple[Effect, SumAndDifference]]:
+    return [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
+
+
+def _saturation(
+    scale: NDArray[np.float64], total: NDArray[np.float64], exponent: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    bounded = total > 0.0
+    return np.where(bounded, (scale / np.where(bounded, total, 1.0)) ** (1.0 / exponent), np.inf)
+
+
+def _in_words(saturation: Derived, total: str) -> str:
+    if not np.isfinite(saturation.value):
+        return f"{total} is not positive: z grows without bound, and the spring never saturates."
+    if not np.isfinite(saturation.upper):
+        return (
+            f"The records do not tell {total} from zero: z may saturate from {saturation.lower:.3g} {saturation.unit} on, or "
+            "never. A larger amplitude would tell."
+        )
+    return (
+        f"z saturates at {saturation.value:.3g} {saturation.unit} ({saturation.lower:.3g} to {saturation.upper:.3g} with "
+        f"{LEVEL:.0%} confidence)."
+    )
+
+
+def _derived(name: str, unit: str, samples: NDArray[np.float64], determined: bool) -> Derived:
+    """Take the value from the first sample and the interval from the others."""
+    if not determined:
+        return Derived(name, unit, float(samples[0]), -np.inf, np.inf)
+    usable = samples[1:][~np.isnan(samples[1:])]
+    if usable.size == 0:
+        return Derived(name, unit, float(samples[0]), -np.inf, np.inf)
+    # Ordered draws, not interpolated ones: between a number and infinity there is nothing.
+    low, high = np.quantile(usable, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0], method="inverted_cdf")
+    return Derived(name, unit, float(samples[0]), float(low), float(high))
+
+
+def _energy_unit(structure: Structure) -> str:
+    units = structure.rig.units
+    return (
+        "J"
+        if (units["force"], units["x"]) in {("N m", "rad"), ("N", "m")}
+        else f"{units['force']} {units['x']}"
+    )

@@ -1,0 +1,194 @@
+"""Where in the whole range of its parameters does a model fit? Differential evolution with all sets side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, differential_evolution
+from scipy.stats import qmc
+
+from rigsight.errors import InputError
+from rigsight.identify.coordinates import Coordinates
+
+_APART = 0.1
+"""Distance in the unit cube from which two ends of a search count as different places."""
+
+_EVENLY = 0.1
+"""Characteristic units up to which a range is spaced evenly."""
+_UNUSABLE = 1e100
+"""Cost of a set that cannot be simulated; its square is still a number."""
+
+Cost = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class SearchBox:
+    """Maps the unit cube to search coordinates.
+
+    Ranges in characteristic units are spaced by their inverse hyperbolic sine: evenly up to a tenth of a unit, by decades
+    beyond.
+
+    Attributes
+    ----------
+    lower, upper
+        Range of each coordinate, shape (n_free,).
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+    @classmethod
+    def around(cls, coordinates: Coordinates, center: NDArray[np.float64], spread: float) -> SearchBox:
+        """Take the declared range where a parameter has one; the others lie around `center`.
+
+        Parameters
+        ----------
+        coordinates
+            Of the free parameters.
+        center
+            Coordinates of a start, shape (n_free,).
+        spread
+            Factor to either side of a positive parameter without a declared range; others move by as many of their size.
+        """
+        structure = coordinates.structure
+        of_rig = {p.name for p in structure.rig.parameters}
+        lower, upper = coordinates.lower.copy(), coordinates.upper.copy()
+        for i, name in enumerate(coordinates.free):
+            if name not in of_rig:
+                continue
+            reach = np.log(spread) if coordinates.logarithmic[i] else spread * max(1.0, abs(center[i]))
+            lower[i], upper[i] = max(lower[i], center[i] - reach), min(upper[i], center[i] + reach)
+        return cls(lower, upper)
+
+    def coordinates(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the search coordinates of places in the unit cube, both of shape (..., n_free)."""
+        low, high = np.arcsinh(self.lower / _EVENLY), np.arcsinh(self.upper / _EVENLY)
+        return np.asarray(_EVENLY * np.sinh(low + places * (high - low)))
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Ends of a global search, best first.
+
+    Attributes
+    ----------
+    coordinates
+        Shape (n_ends, n_free).
+    costs
+        Shape (n_ends,).
+    n_evaluations
+        Parameter sets simulated.
+    """
+
+    coordinates: NDArray[np.float64]
+    costs: NDArray[np.float64]
+    n_evaluations: int
+
+    @property
+    def usable(self) -> NDArray[np.float64]:
+        """Coordinates of the ends that can be simulated.
+
+        Raises
+        ------
+        InputError
+            If there are none.
+        """
+        usable = self.coordinates[self.costs < _UNUSABLE]
+        if usable.size == 0:
+            raise InputError(
+                "No parameter set of the searched range can be simulated. Give start values nearer to the rig, or a smaller "
+                "spread."
+            )
+        return usable
+
+
+def search(
+    cost: Cost,
+    box: SearchBox,
+    rng: np.random.Generator,
+    *,
+    n_generations: int = 100,
+    n_sets: int = 96,
+    n_ends: int = 8,
+    progress: Callable[[int], None] | None = None,
+) -> Found:
+    """Look for the lowest cost over the whole box.
+
+    Parameters
+    ----------
+    cost
+        Cost of coordinates of shape (n_sets, n_free), shape (n_sets,); not finite where a set cannot be simulated.
+    box
+        Range to search.
+    rng
+        Random numbers.
+    n_generations
+        Most generations.
+    n_sets
+        Sets per generation; the first ones are Sobol points.
+    n_ends
+        Most different ends to return.
+    progress
+        Called with the number of finished generations.
+    """
+    n_free = box.lower.size
+    seen: list[NDArray[np.float64]] = []
+    paid: list[NDArray[np.float64]] = []
+
+    def of_places(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        sets = np.atleast_2d(places.T)
+        costs = cost(box.coordinates(sets))
+        usable = np.where(np.isfinite(costs), np.minimum(costs, _UNUSABLE), _UNUSABLE)
+        seen.append(sets)
+        paid.append(usable)
+        return usable
+
+    generation = 0
+
+    def told(*_: object) -> None:
+        nonlocal generation
+        generation += 1
+        if progress is not None:
+            progress(generation)
+
+    # scipy's stubs do not know that a vectorized cost returns one value per column.
+    vectorized: Any = of_places
+    differential_evolution(
+        vectorized,
+        Bounds(np.zeros(n_free), np.ones(n_free)),
+        strategy="currenttobest1bin",
+        init=_sobol(n_sets, n_free, rng),
+        maxiter=n_generations,
+        tol=1e-4,
+        mutation=(0.4, 0.9),
+        recombination=0.9,
+        rng=rng,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        callback=told,
+    )
+    # The population ends in one basin, which the costs of a coarse simulation may mistake; others were seen on the way.
+    places, costs = np.concatenate(seen), np.concatenate(paid)
+    kept = _different(places, costs, n_ends)
+    return Found(box.coordinates(places[kept]), costs[kept], costs.size)
+
+
+def _sobol(n_sets: int, n_free: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    sampler = qmc.Sobol(n_free, rng=rng)
+    return np.asarray(sampler.random_base2(int(np.ceil(np.log2(n_sets)))))[:n_sets]
+
+
+def _different(places: NDArray[np.float64], costs: NDArray[np.float64], most: int) -> list[int]:
+    """Return the best places that lie apart from each other, best first."""
+    kept: list[int] = []
+    for i in np.argsort(costs):
+        if all(np.max(np.abs(places[i] - places[j])) > _APART for j in kept):
+            kept.append(int(i))
+        if len(kept) == most:
+            break
+    return kept

@@ -1,0 +1,339 @@
+"""What does one estimation record show by itself: transfer functions, physical parameters, offsets, and what it cannot tell?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigsight.errors import InputError
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify.axis_parameters import axis_parameters, springless_parameters
+from rigsight.identify.conicity import ConicityEstimate, estimate_conicity
+from rigsight.identify.identification import PathIdentification, RecordIdentification
+from rigsight.identify.physical import PhysicalEstimates, lateral_parameters, offsets, yaw_parameters
+from rigsight.identify.record_response import Method, RecordResponse, record_response
+from rigsight.identify.transfer_fit import TransferFit
+from rigsight.identify.transfer_form import Order
+from rigsight.identify.transfer_function import fit_frequency_response
+from rigsight.identify.transfer_step import fit_step
+from rigsight.records.record import Hold, Record
+from rigsight.rigs import Rig
+
+_SURE = 0.1
+"""Relative standard error of a line from which it is no evidence of a peak."""
+_PEAK = 1.1
+"""Height over the lowest lines from which a largest magnitude counts as a resonance."""
+_LOWEST = 10
+_POORLY_KNOWN = 0.5
+"""Relative standard error from which a parameter is not determined."""
+MISFIT = 3.0
+"""Residuals in units of the noise from which a form is not the whole of the rig."""
+_SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How records are to be read.
+
+    Attributes
+    ----------
+    method
+        Estimator of the frequency responses.
+    resolution
+        Width wished for [rad/s]; None takes what each record gives.
+    """
+
+    method: Method = "local_rational"
+    resolution: float | None = None
+
+
+def identify_record(
+    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, wishes: Wishes
+) -> RecordIdentification:
+    """Identify what one record shows.
+
+    Parameters
+    ----------
+    record
+        An estimation record.
+    rig
+        Its rig. The parameters of an element follow from its motion over time, so only its dynamic stiffness is found here.
+    constants
+        The rig's constants by name.
+    no_spring
+        True for an axis without a spring: it is identified from its velocity.
+    wishes
+        How to read it.
+
+    Raises
+    ------
+    InputError
+        If the record is too short for the resolution wished for. Whatever else a record cannot tell is told in the result.
+    """
+    amplitude = record.amplitude if record.amplitude is not None else input_peak(record, rig)
+    if not rig.is_driven:
+        return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, wishes),))
+    forward = _driven_forward(record, constants.get("gain", 1.0))
+    motion, seen = _motion(forward, rig, constants, no_spring, wishes)
+    paths, warnings = [motion], _resolution_warning(motion, seen, record)
+    if rig.downstream:
+        paths.append(_lateral(record, constants, wishes, motion))
+    warnings = [*(f"{p.source} -> {p.response}: {p.problem}" for p in paths if p.problem), *warnings]
+    return RecordIdentification(
+        record=record,
+        amplitude=amplitude,
+        paths=tuple(paths),
+        offsets=None if no_spring else _offsets(forward, rig, paths),
+        conicity=_conicity(paths[1:], constants),
+        resonance=None if no_spring else _resonance(motion),
+        warnings=tuple(warnings),
+    )
+
+
+def input_peak(record: Record, rig: Rig) -> float:
+    """Return the largest deviation of the input from its median, in its unit."""
+    samples = record[rig.inputs[0].name]
+    return float(np.max(np.abs(samples - np.median(samples))))
+
+
+def _driven_forward(record: Record, gain: float) -> Record:
+    """Turn the input of an axis whose drive counts backward: transfer functions stand for positive gains."""
+    return record if gain > 0.0 else record.with_signals(u=-record["u"])
+
+
+def _motion(
+    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, wishes: Wishes
+) -> tuple[PathIdentification, RecordResponse | None]:
+    source, response = rig.inputs[0].name, rig.outputs[0].name
+
+    def physical(fit: TransferFit) -> PhysicalEstimates:
+        if rig.downstream:
+            return yaw_parameters(fit, constants)
+        gain = abs(constants["gain"])
+        return springless_parameters(fit, gain) if no_spring else axis_parameters(fit, gain)
+
+    order: Order = "pt1" if no_spring else "pt2"
+    path = PathIdentification(source, response)
+    seen = None
+    try:
+        if record.kind == "step":
+            fit = _step_fit(record, source, response, order, no_spring)
+        else:
+            seen = record_response(
+                record, source, response, order, wishes.method, wishes.resolution, record.hold
+            )
+            path = replace(path, measured=seen.response, coherence=seen.coherence)
+            fit = _fit(_velocity(seen.response) if no_spring else seen.response, order, seen, wishes)
+        return _judged(path, fit, physical), seen
+    except InputError as error:
+        if wishes.resolution is not None and "too short for a resolution" in str(error):
+            raise
+        return replace(path, problem=str(error)), seen
+
+
+def _lateral(
+    record: Record, constants: Mapping[str, float], wishes: Wishes, motion: PathIdentification
+) -> PathIdentification:
+    path = PathIdentification("psi", "y")
+    if "y" not in record:
+        return replace(
+            path, problem="the record has no y, so l_0, c_y and y_off cannot be identified from it."
+        )
+    band = None
+    if motion.measured is not None:
+        # Where psi itself drowns, its noise would pass for a source.
+        band = (float(motion.measured.omega[0]), float(motion.measured.omega[-1]))
+    # psi is measured: it is smooth between its samples, whatever the current does.
+    smooth: Hold = "band_limited"
+    try:
+        if record.kind == "step":
+            fit = fit_step(_from_rest(record, motion.fit), "psi", "y", "pt1")
+        else:
+            seen = record_response(record, "psi", "y", "pt1", wishes.method, wishes.resolution, smooth, band)
+            path = replace(path, measured=seen.response, coherence=seen.coherence)
+            fit = _fit(seen.response, "pt1", seen, wishes)
+        return _judged(path, fit, lambda found: lateral_parameters(found, constants))
+    except InputError as error:
+        return replace(path, problem=str(error))
+
+
+def _dynamic_stiffness(record: Record, rig: Rig, wishes: Wishes) -> PathIdentification:
+    path = PathIdentification(rig.inputs[0].name, rig.outputs[0].name)
+    if record.kind == "step":
+        return path
+    try:
+        method: Method = "local_rational" if wishes.method == "thesis" else wishes.method
+        seen = record_response(
+            record, path.source, path.response, "pt2", method, wishes.resolution, "band_limited"
+        )
+    except InputError as error:
+        if wishes.resolution is not None and "too short for a resolution" in str(error):
+            raise
+        return replace(path, problem=str(error))
+    return replace(path, measured=seen.response, coherence=seen.coherence)
+
+
+def _fit(response: FrequencyResponse, order: Order, seen: RecordResponse, wishes: Wishes) -> TransferFit:
+    """Fit with standard errors that count independent values, not lines."""
+    # The thesis reads magnitudes only (section 4.4): its phases are rescaled.
+    fit = fit_frequency_response(response, order, magnitude_only=wishes.method == "thesis")
+    factor = 1.0 if response.noise_shares is not None else seen.lines_per_value
+    if fit.misfit > MISFIT:
+        fit, factor = _fit_of_part(response, order, fit.misfit), seen.lines_per_value
+    errors = {name: math.sqrt(factor) * error for name, error in fit.standard_errors.items()}
+    return replace(fit, standard_errors=errors, covariance=factor * fit.covariance)
+
+
+def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> TransferFit:
+    """Fit a form that is not the whole of the rig: every line may err by the same share of its magnitude.
+
+    With the variances of the noise alone, the few lines that happen to be most certain would decide, wherever they lie.
+    """
+    assert response.variance is not None
+    for share in _SHARES:
+        variance = response.variance + (share * response.magnitude) ** 2
+        fit = fit_frequency_response(
+            replace(response, variance=variance, noise_shares=None, noise_lines=None), order
+        )
+        if fit.misfit <= 1.0:
+            break
+    note = (
+        f"The residuals are {misfit:.0f} times what the noise explains: this form is not the whole of the rig. An error of "
+        f"{100.0 * share:.0f} % of the magnitude was allowed for at every line."
+    )
+    return replace(fit, misfit=misfit, message=f"{fit.message} {note}")
+
+
+def _step_fit(record: Record, source: str, response: str, order: Order, no_spring: bool) -> TransferFit:
+    if not no_spring:
+        return fit_step(record, source, response, order)
+    moved = record.with_signals(**{response: np.gradient(record[response], record.dt)})
+    moved = replace(moved, units={**moved.units, response: f"{moved.units.get(response, '1')}/s"})
+    return fit_step(moved, source, response, order)
+
+
+def _from_rest(record: Record, motion: TransferFit | None) -> Record:
+    """Let psi begin where the fitted motion rests: the noise of one sample would count as a step of the source."""
+    record = replace(record, hold="foh")
+    if motion is None:
+        return record
+    psi = record["psi"].copy()
+    psi[0] = motion.values["offset"]
+    return record.with_signals(psi=psi)
+
+
+def _velocity(response: FrequencyResponse) -> FrequencyResponse:
+    variance, shares = response.variance, response.noise_shares
+    return replace(
+        response,
+        values=1j * response.omega * response.values,
+        response=f"{response.response}'",
+        unit=f"{response.unit}/s",
+        variance=None if variance is None else response.omega**2 * variance,
+        noise_shares=None if shares is None else 1j * response.omega[:, None] * shares,
+    )
+
+
+def _judged(
+    path: PathIdentification, fit: TransferFit, physical: Callable[[TransferFit], PhysicalEstimates]
+) -> PathIdentification:
+    """Keep a fit that can be used; of one that cannot, only the reason."""
+    of_velocity = fit.response != path.response
+    if not fit.success and not of_velocity:
+        return replace(path, problem=fit.message)
+    # The break frequency of a velocity is often too low to be seen; mass and damping show in the slope all the same.
+    found = physical(fit)
+    errors = found.standard_errors
+    poor = [name for name in found.names if not errors[name] < _POORLY_KNOWN * abs(found.values[name])]
+    if len(poor) > 1 or (poor and fit.form.order == "pt1"):
+        # A damping near zero alone is a result; the others are positive by nature.
+        return replace(path, problem=f"the record does not determine {', '.join(poor)}.")
+    return replace(path, fit=fit, physical=found)
+
+
+def _resolution_warning(motion: PathIdentification, seen: RecordResponse | None, record: Record) -> list[str]:
+    if motion.fit is None or seen is None or "zeta" not in motion.fit.values:
+        return []
+    omega_0, zeta = motion.fit.values["omega_b"], motion.fit.values["zeta"]
+    width = 2.0 * zeta * omega_0
+    if zeta >= 0.5 or width >= seen.narrowest:
+        return []
+    longer = record.n_samples * record.dt * seen.narrowest / width
+    return [
+        f"{motion.source} -> {motion.response}: the peak at {omega_0:.3g} rad/s is {width:.2g} rad/s wide (half power), and this "
+        f"record follows peaks from {seen.narrowest:.2g} rad/s on. Damping and height of the peak are doubtful; record at least "
+        f"{longer:.3g} s."
+    ]
+
+
+def _offsets(record: Record, rig: Rig, paths: list[PathIdentification]) -> PhysicalEstimates | None:
+    motion = paths[0]
+    if motion.fit is None:
+        return None
+    lateral = paths[1] if len(paths) > 1 and paths[1].physical is not None else None
+    rest = next(symbol.name for symbol in rig.motion.rest.free_symbols)
+    gain = motion.fit.values["gain"]
+    if record.kind == "step":
+        return _step_offsets(record, rest, motion.fit, lateral)
+    if lateral is not None and lateral.physical is not None:
+        known = lateral.physical
+        return offsets(record, known.values["l_0"], known.standard_errors["l_0"], gain)
+    # Without y, only the first of the two offsets has a meaning.
+    alone = offsets(
+        record.with_signals(psi=record[motion.response], y=np.zeros(record.n_samples)), 0.0, 0.0, gain
+    )
+    return PhysicalEstimates(
+        (rest,),
+        {rest: alone.values["psi_off"]},
+        alone.covariance[:1, :1],
+        "mean of the record less the drive's",
+    )
+
+
+def _step_offsets(
+    record: Record, rest: str, fit: TransferFit, lateral: PathIdentification | None
+) -> PhysicalEstimates:
+    """Return the offsets of a step from the responses at rest before it, by (2.26) and (2.27)."""
+    first = float(record[fit.source][0])
+    at_rest = fit.values["offset"]
+    slope = np.array([1.0, -first])
+    variance = float(slope @ fit.covariance_of("offset", "gain") @ slope)
+    names, values, covariance = [rest], {rest: at_rest - first * fit.values["gain"]}, np.array([[variance]])
+    if lateral is not None and lateral.fit is not None and lateral.physical is not None:
+        l_0, l_0_error = lateral.physical.values["l_0"], lateral.physical.standard_errors["l_0"]
+        names.append("y_off")
+        values["y_off"] = lateral.fit.values["offset"] - 2.0 * l_0 * at_rest
+        own = fit.standard_errors["offset"]
+        error = math.hypot(lateral.fit.standard_errors["offset"], 2.0 * l_0 * own, 2.0 * at_rest * l_0_error)
+        shared = -2.0 * l_0 * own**2
+        covariance = np.array([[variance, shared], [shared, error**2]])
+    return PhysicalEstimates(tuple(names), values, covariance, "rest before the step, (2.26) and (2.27)")
+
+
+def _conicity(lateral: list[PathIdentification], constants: Mapping[str, float]) -> ConicityEstimate | None:
+    if not lateral or lateral[0].physical is None:
+        return None
+    found = lateral[0].physical
+    return estimate_conicity(
+        found.values["c_y"], found.standard_errors["c_y"], constants["r_0"], constants["b"]
+    )
+
+
+def _resonance(motion: PathIdentification) -> float | None:
+    """Return where the measured magnitude is largest, if that is a peak."""
+    measured = motion.measured
+    if measured is None:
+        return None
+    sure = np.ones(measured.omega.size, dtype=np.bool_)
+    if measured.variance is not None:
+        sure = np.sqrt(measured.variance) < _SURE * measured.magnitude
+    if np.count_nonzero(sure) < 2 * _LOWEST:
+        return None
+    seen = measured.at(sure)
+    top = int(np.argmax(seen.magnitude))
+    if top in (0, seen.omega.size - 1) or seen.magnitude[top] < _PEAK * np.median(seen.magnitude[:_LOWEST]):
+        return None
+    return float(seen.omega[top])

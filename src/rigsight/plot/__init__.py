@@ -1,0 +1,37 @@
+"""How figures are drawn that the report, the commands and notebooks share; every function returns a figure of its own."""
+
+from rigsight.plot.amplitude_dependence import AmplitudePanel as AmplitudePanel
+from rigsight.plot.amplitude_dependence import AmplitudePoint as AmplitudePoint
+from rigsight.plot.amplitude_dependence import amplitude_dependence as amplitude_dependence
+from rigsight.plot.diagnosis import comparison as comparison
+from rigsight.plot.diagnosis import detail_window as detail_window
+from rigsight.plot.diagnosis import gap_budget as gap_budget
+from rigsight.plot.diagnosis import ranking as ranking
+from rigsight.plot.drawing import DisplayScale as DisplayScale
+from rigsight.plot.drawing import display_scale as display_scale
+from rigsight.plot.drawing import envelope as envelope
+from rigsight.plot.drawing import style as style
+from rigsight.plot.drawing import svg_text as svg_text
+from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
+from rigsight.plot.frequency_responses import Panel as Panel
+from rigsight.plot.frequency_responses import bode as bode
+from rigsight.plot.frequency_responses import overlaid_responses as overlaid_responses
+
+__all__ = [
+    "AmplitudePanel",
+    "AmplitudePoint",
+    "DisplayScale",
+    "FittedCurve",
+    "Panel",
+    "amplitude_dependence",
+    "bode",
+    "comparison",
+    "detail_window",
+    "display_scale",
+    "envelope",
+    "gap_budget",
+    "overlaid_responses",
+    "ranking",
+    "style",
+    "svg_text",
+]

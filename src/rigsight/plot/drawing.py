@@ -1,0 +1,197 @@
+"""How is every figure drawn: its style, its colors, the units shown, lines of many samples.
+
+Nothing here touches pyplot: figures carry their own canvas, so that they can be drawn in any thread and are freed with
+their last reference.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import wraps
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+MEASURED = "#5f6770"
+GIVEN = "#d55e00"
+REIDENTIFIED = "#cc79a7"
+WITH_EFFECT = "#0072b2"
+FLOOR = "#1d2126"
+OTHER = "#9aa4ae"
+"""Okabe and Ito's palette: told apart by color-blind readers, and in gray by line style."""
+
+STYLE: dict[Any, Any] = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#8a939c",
+    "axes.labelcolor": "#1d2126",
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "xtick.color": "#3b434b",
+    "ytick.color": "#3b434b",
+    "grid.color": "#e3e7ea",
+    "legend.frameon": False,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "lines.solid_joinstyle": "round",
+    "svg.fonttype": "none",
+    # A dollar sign in somebody's signal or effect name is no formula.
+    "text.parse_math": False,
+}
+
+_PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
+_PREFIXED = ("rad", "m", "N", "N m", "A", "V", "Pa", "W", "K")
+_ENVELOPE_BINS = 600
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Draw and save in the style of these figures, whatever the notebook around it has set."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        for name, value in STYLE.items():
+            mpl.rcParams[name] = value
+        yield
+
+
+def in_style(draw: Callable[P, R]) -> Callable[P, R]:
+    """Let a function draw in the style of these figures."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
+        with style():
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+@dataclass(frozen=True)
+class DisplayScale:
+    """Factor from SI to what is shown, and the unit shown."""
+
+    factor: float
+    unit: str
+
+
+def display_scale(unit: str, size: float) -> DisplayScale:
+    """Return the scale by which a quantity of typical `size` is shown, e.g. mrad for 0.01 rad.
+
+    Parameters
+    ----------
+    unit
+        SI unit; units that take no prefix (``"m/s"``, ``"1"``) are left alone.
+    size
+        Largest absolute value to be shown.
+    """
+    if unit not in _PREFIXED or not np.isfinite(size) or size <= 0.0:
+        return DisplayScale(1.0, unit)
+    exponent = int(np.clip(3 * np.floor(np.log10(size) / 3.0), -9, 6))
+    # 0.5 m reads better than 500 mm.
+    if -9 <= exponent < 0 and size * 10.0**-exponent >= 200.0:
+        exponent += 3
+    return DisplayScale(10.0**-exponent, _PREFIXES[exponent] + unit)
+
+
+def envelope(
+    t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a shorter line with the same picture: lowest and highest sample of each bin, in their order in time.
+
+    Parameters
+    ----------
+    t, values
+        Shape (n_samples,).
+    n_bins
+        Bins; a line of at most ``2 * n_bins`` samples is returned unchanged.
+
+    Returns
+    -------
+    t, values
+        Shape (at most 2 * n_bins,).
+    """
+    if values.size <= 2 * n_bins:
+        return t, values
+    edges = np.linspace(0, values.size, n_bins + 1).astype(int)
+    keep: list[int] = []
+    for start, stop in pairwise(edges):
+        part = values[start:stop]
+        if not np.any(np.isfinite(part)):
+            keep.append(int(start))
+            continue
+        low, high = int(np.nanargmin(part)), int(np.nanargmax(part))
+        keep += [int(start) + i for i in sorted({low, high})]
+    return t[keep], values[keep]
+
+
+def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
+    """Label decades and, where they are few, numbers between, as people write them; scientific notation beyond 10^4."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    decades = range(int(np.floor(np.log10(left))), int(np.ceil(np.log10(right))) + 1)
+    span = np.log10(right / left)
+    multiples = (1, 1.1, 1.2, 1.5, 2, 3, 5) if span < 0.7 else ((1, 2, 5) if span < 2.5 else (1,))
+    ticks = [m * 10.0**d for d in decades for m in multiples]
+    ticks = [tick for tick in ticks if left <= tick <= 1.15 * right]
+    step = max(1, len(ticks) // 8)
+    ticks = ticks[::step]
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xticks(ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks])
+
+
+def line(
+    ax: Axes,
+    t: NDArray[np.float64],
+    values: NDArray[np.float64],
+    color: str,
+    label: str | None = None,
+    **style: Any,
+) -> None:
+    """Draw a line over time with all its peaks; where it is not finite, there is a gap."""
+    finite = np.where(np.isfinite(values), values, np.nan)
+    ax.plot(*envelope(t, finite), color=color, label=label, **style)
+
+
+def shown_in(unit: str, *series: NDArray[np.float64]) -> tuple[float, str]:
+    """Return factor and unit in which all of these series are shown."""
+    peaks = [float(np.max(np.abs(s[np.isfinite(s)]), initial=0.0)) for s in series]
+    scale = display_scale(unit, max(peaks))
+    return scale.factor, scale.unit
+
+
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """Return an empty figure of this size [inch] with a canvas of its own."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def svg_text(figure: Figure, key: str) -> str:
+    """Return a figure as SVG, the same text for the same figure; `key` makes its ids."""
+    import matplotlib as mpl
+
+    stream = io.StringIO()
+    with style():
+        mpl.rcParams["svg.hashsalt"] = key
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    return stream.getvalue()

@@ -1,0 +1,231 @@
+"""Which figures show frequency responses: measured against fitted, and of several amplitudes over each other?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.frequency import FrequencyResponse
+from rigsight.plot.drawing import FLOOR, MEASURED, WITH_EFFECT, in_style, new_figure, plain_log_ticks
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_TWO_SIDED = 1.96
+"""Standard deviations of a 95 % interval."""
+_MOST_LINES = 800
+_FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
+"""Viridis, its yellow darkened for white paper: in order also in gray, and for color-blind readers."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCurve:
+    """A fitted frequency response.
+
+    Attributes
+    ----------
+    omega
+        Angular frequencies [rad/s], shape (n,).
+    values
+        Complex response, shape (n,).
+    std
+        ``sqrt(E |error|^2)``, shape (n,).
+    label
+        What it is called.
+    """
+
+    omega: NDArray[np.float64]
+    values: NDArray[np.complex128]
+    std: NDArray[np.float64]
+    label: str
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One signal path of a Bode plot.
+
+    Attributes
+    ----------
+    title
+        Which path.
+    measured
+        The frequency response.
+    fitted
+        The fit, None where there is none.
+    label
+        Name in a plot of several, e.g. the amplitude.
+    """
+
+    title: str
+    measured: FrequencyResponse
+    fitted: FittedCurve | None = None
+    label: str = ""
+
+
+@in_style
+def bode(panels: Sequence[Panel]) -> Figure:
+    """Draw measured against fitted as magnitude and phase, one column per path, with 95 % bands.
+
+    Parameters
+    ----------
+    panels
+        One or two paths of a record.
+    """
+    figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 4.9)
+    axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
+    for column, whole in enumerate(panels):
+        panel = replace(whole, measured=_thinned(whole.measured))
+        top, bottom = axes[0, column], axes[1, column]
+        _magnitude(top, panel)
+        _phase(bottom, panel)
+        top.set_title(panel.title)
+        top.set_ylabel(f"magnitude [dB re 1 {panel.measured.unit}]")
+        bottom.set_ylabel("phase [deg]")
+        bottom.set_xlabel("angular frequency [rad/s]")
+        _log_axis(bottom, [panel])
+        for ax in (top, bottom):
+            ax.grid()
+            ax.set_axisbelow(True)
+        rises = panel.measured.magnitude[-1] > panel.measured.magnitude[0]
+        top.legend(loc="upper left" if rises else "lower left", fontsize=8.5)
+    figure.align_ylabels(axes)
+    return figure
+
+
+@in_style
+def overlaid_responses(columns: Sequence[Sequence[Panel]]) -> Figure:
+    """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color.
+
+    Parameters
+    ----------
+    columns
+        One sequence of panels per path, in the order of the amplitudes; their titles name the path, their labels the record.
+    """
+    figure = new_figure(4.6 * len(columns) + (1.4 if len(columns) == 1 else 0.0), 4.0)
+    axes = figure.subplots(1, len(columns), squeeze=False)[0]
+    labels = list(dict.fromkeys(panel.label for panels in columns for panel in panels))
+    colors = dict(zip(labels, _colors(len(labels)), strict=True))
+    for ax, panels in zip(axes, columns, strict=True):
+        values = []
+        for panel in panels:
+            color = colors[panel.label]
+            ax.plot(
+                panel.measured.omega,
+                panel.measured.magnitude_db,
+                color=color,
+                linewidth=1.1,
+                alpha=0.7,
+                label=panel.label,
+            )
+            values.append(panel.measured.magnitude_db)
+            if panel.fitted is not None:
+                ax.plot(
+                    panel.fitted.omega,
+                    _decibel(np.abs(panel.fitted.values)),
+                    color=color,
+                    linewidth=1.4,
+                    linestyle=(0, (4, 2)),
+                )
+        _limit(ax, np.concatenate(values))
+        _log_axis(ax, panels)
+        ax.set_title(panels[0].title)
+        ax.set_ylabel(f"magnitude [dB re 1 {panels[0].measured.unit}]")
+        ax.set_xlabel("angular frequency [rad/s]")
+        ax.grid()
+    axes[0].plot([], [], color=FLOOR, linewidth=1.4, linestyle=(0, (4, 2)), label="fitted")
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper left", ncols=min(len(names), 6), fontsize=8.5)
+    return figure
+
+
+def _thinned(measured: FrequencyResponse) -> FrequencyResponse:
+    """Return about as many lines as the eye can tell apart on a logarithmic axis."""
+    if measured.omega.size <= _MOST_LINES:
+        return measured
+    wished = np.geomspace(measured.omega[0], measured.omega[-1], _MOST_LINES)
+    kept = np.zeros(measured.omega.size, dtype=np.bool_)
+    kept[np.minimum(np.searchsorted(measured.omega, wished), measured.omega.size - 1)] = True
+    return measured.at(kept)
+
+
+def _colors(count: int) -> list[str]:
+    from matplotlib.colors import LinearSegmentedColormap, to_hex
+
+    scale = LinearSegmentedColormap.from_list("amplitudes", _FACES)
+    return [to_hex(scale(i / max(count - 1, 1))) for i in range(count)]
+
+
+def _decibel(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(20.0 * np.log10(np.maximum(values, 1e-300)))
+
+
+def _magnitude(ax: Axes, panel: Panel) -> None:
+    measured = panel.measured
+    size = measured.magnitude
+    shown = measured.magnitude_db
+    if measured.variance is not None:
+        # A component of the complex error has half of its variance.
+        reach = _TWO_SIDED * np.sqrt(0.5 * measured.variance)
+        ax.fill_between(
+            measured.omega, _decibel(size - reach), _decibel(size + reach), color=MEASURED, alpha=0.25, linewidth=0
+        )  # fmt: skip
+    ax.plot(
+        measured.omega, shown, color=MEASURED, linestyle="none", marker=".", markersize=3.5, label=_measured_label(measured)
+    )  # fmt: skip
+    values = [shown]
+    if panel.fitted is not None:
+        fitted = panel.fitted
+        size, reach = np.abs(fitted.values), _TWO_SIDED * np.sqrt(0.5) * fitted.std
+        ax.fill_between(
+            fitted.omega, _decibel(size - reach), _decibel(size + reach), color=WITH_EFFECT, alpha=0.3, linewidth=0
+        )  # fmt: skip
+        ax.plot(fitted.omega, _decibel(size), color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
+        values.append(_decibel(size))
+    _limit(ax, np.concatenate(values))
+
+
+def _measured_label(measured: FrequencyResponse) -> str:
+    return "measured, 95 % band" if measured.variance is not None else "measured"
+
+
+def _phase(ax: Axes, panel: Panel) -> None:
+    from matplotlib.ticker import MultipleLocator
+
+    measured = panel.measured
+    phase = np.degrees(np.unwrap(np.angle(measured.values)))
+    if panel.fitted is not None:
+        fitted = panel.fitted
+        own = np.degrees(np.unwrap(np.angle(fitted.values)))
+        # The branch of each line is the one next to the fit: a noisy line cannot turn all that follow by 360 degrees.
+        near = np.interp(measured.omega, fitted.omega, own)
+        phase = near + (np.degrees(np.angle(measured.values)) - near + 180.0) % 360.0 - 180.0
+        reach = np.degrees(_TWO_SIDED * np.sqrt(0.5) * fitted.std / np.abs(fitted.values))
+        ax.fill_between(fitted.omega, own - reach, own + reach, color=WITH_EFFECT, alpha=0.3, linewidth=0)
+        ax.plot(fitted.omega, own, color=WITH_EFFECT, linewidth=1.3, zorder=3)
+    if measured.variance is not None:
+        reach = np.degrees(_TWO_SIDED * np.sqrt(0.5 * measured.variance) / measured.magnitude)
+        ax.fill_between(measured.omega, phase - reach, phase + reach, color=MEASURED, alpha=0.25, linewidth=0)
+    ax.plot(measured.omega, phase, color=MEASURED, linestyle="none", marker=".", markersize=3.5)
+    low, high = np.percentile(phase, [1.0, 99.0])
+    ax.set_ylim(45.0 * np.floor(low / 45.0) - 10.0, 45.0 * np.ceil(high / 45.0) + 10.0)
+    ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
+
+
+def _limit(ax: Axes, values: NDArray[np.float64]) -> None:
+    """Let a few wild lines, or a band that reaches zero, not press the rest of the curve flat."""
+    low, high = np.percentile(values[np.isfinite(values)], [0.5, 100.0])
+    margin = 0.08 * max(high - low, 3.0)
+    ax.set_ylim(low - margin, high + margin)
+
+
+def _log_axis(ax: Axes, panels: Sequence[Panel]) -> None:
+    left = min(float(panel.measured.omega[0]) for panel in panels)
+    right = max(float(panel.measured.omega[-1]) for panel in panels)
+    ax.set_xscale("log")
+    ax.set_xlim(left, right)
+    plain_log_ticks(ax, left, right)

@@ -1,0 +1,132 @@
+"""An identification for a terminal: a table over amplitudes, the joint set, the scores, and what must be known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from rigsight.diagnose.result import Estimate
+from rigsight.identify.identification import Identification, RecordIdentification, RecordScore
+from rigsight.report.quantities import estimate_text, gap_percent, written
+from rigsight.report.terminal import plain_text
+
+_MOST_WARNINGS = 12
+_WORSE = 1.05
+"""Ratio from which a record's own fit is worth naming beside the joint one."""
+_NAME_WIDTH, _RECORD_WIDTH = 22, 20
+
+
+@dataclass(frozen=True)
+class IdentificationSummary:
+    """A rich renderable of an identification."""
+
+    identification: Identification
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the lines, in characters that the terminal's encoding has."""
+
+        def text(words: str, style: str = "") -> Text:
+            return plain_text(words, options.encoding, style)
+
+        found = self.identification
+        yield text(f"Identified: {found.title}", "bold green")
+        yield from _amplitude_tables(found, text, options.max_width)
+        yield text(found.amplitude_statement, "bold yellow" if found.changing else "")
+        yield text("")
+        yield text("One set for all estimation records", "bold")
+        yield text(found.joint.statement)
+        table = Table.grid(padding=(0, 2))
+        for subject, words in _joint_rows(found):
+            table.add_row(text(subject, "bold"), text(words))
+        yield Padding(table, (0, 0, 0, 2), expand=False)
+        if found.warnings:
+            yield text("")
+            yield text("Worth knowing", "bold yellow")
+            for warning in found.warnings[:_MOST_WARNINGS]:
+                yield text(f"- {warning}")
+            if len(found.warnings) > _MOST_WARNINGS:
+                yield text(
+                    f"- and {len(found.warnings) - _MOST_WARNINGS} more in identification.json.", "dim"
+                )
+
+
+def identification_summary(identification: Identification) -> IdentificationSummary:
+    """Return the identification as a rich renderable.
+
+    Parameters
+    ----------
+    identification
+        The result.
+    """
+    return IdentificationSummary(identification)
+
+
+def _amplitude_tables(found: Identification, text: Callable[..., Text], width: int) -> Iterator[Table]:
+    """Yield a column per record in the order of amplitudes, in as many tables as the terminal's width asks for."""
+    records = sorted(found.records, key=lambda r: r.amplitude)
+    names = dict.fromkeys(name for record in records for name in record.estimates)
+    at_once = max(1, (width - _NAME_WIDTH) // _RECORD_WIDTH)
+    for first in range(0, len(records), at_once):
+        part = records[first : first + at_once]
+        table = Table(box=None, padding=(0, 1), pad_edge=False, header_style="bold")
+        table.add_column(text("record"))
+        for record in part:
+            table.add_column(text(record.record.name), justify="right", overflow="fold")
+        unit = found.units.get(part[0].motion.source, "")
+        table.add_row(text(f"amplitude{_in_brackets(unit)}"), *(text(f"{r.amplitude:.4g}") for r in part))
+        for name in names:
+            head = text(f"{name}{_in_brackets(found.units.get(name, ''))}")
+            table.add_row(head, *(text(_cell(record, name)) for record in part))
+        if any(record.resonance is not None for record in records):
+            seen = ("-" if r.resonance is None else f"{r.resonance:.3g}" for r in part)
+            table.add_row(text("resonance [rad/s]"), *map(text, seen))
+        yield table
+
+
+def _in_brackets(unit: str) -> str:
+    return f" [{unit}]" if unit not in ("", "1") else ""
+
+
+def _cell(record: RecordIdentification, name: str) -> str:
+    if name not in record.estimates:
+        return "-"
+    value, std = record.estimates[name]
+    if not math.isfinite(std):
+        return f"{value:.3g}"
+    number = written(value, std)
+    power = f"e{number.exponent:+d}" if number.exponent else ""
+    return f"({number.value} +/- {number.std}){power}" if power else f"{number.value} +/- {number.std}"
+
+
+def _joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
+    fit = found.joint.fit.fit
+    for name in found.joint.names:
+        yield (
+            name,
+            estimate_text(Estimate(fit.values[name], fit.standard_errors[name], found.units.get(name, ""))),
+        )
+    if found.joint.pooled is not None:
+        errors = found.joint.pooled.standard_errors
+        for name, value in found.joint.pooled.values.items():
+            estimate = Estimate(value, errors[name], found.units.get(name, ""))
+            yield name, f"{estimate_text(estimate)}, mean of the records' own"
+    if found.joint.conicity is not None:
+        yield "delta_0", found.joint.conicity.statement
+    for score in found.joint.scores:
+        yield score.record, f"{score.role}, NRMSE {_score_text(score)}"
+
+
+def _score_text(score: RecordScore) -> str:
+    joint = ", ".join(f"{name} {gap_percent(value)}" for name, value in score.nrmse.items())
+    alone = ", ".join(
+        f"{name} {gap_percent(own)}"
+        for name, own in score.own_nrmse.items()
+        if score.nrmse.get(name, own) > _WORSE * own
+    )
+    return f"{joint} (by itself {alone})" if alone else joint

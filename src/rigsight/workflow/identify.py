@@ -1,0 +1,185 @@
+"""What `rigsight identify` does: a campaign -> `identification.json`, `model.json` and Bode plots, together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+from joblib import Parallel, delayed
+
+from rigsight.errors import InputError, check_option
+from rigsight.identify.amplitude_dependence import amplitude_dependence
+from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
+from rigsight.identify.physical import PhysicalEstimates
+from rigsight.identify.record_identification import Wishes, identify_record
+from rigsight.identify.record_response import METHODS, Method
+from rigsight.simulate import compose
+from rigsight.simulate.model import Model
+from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.identification_figures import identification_figures
+from rigsight.workflow.identification_joint import identify_jointly
+from rigsight.workflow.identification_json import identification_json
+from rigsight.workflow.identification_warnings import (
+    beyond_identified_amplitudes,
+    campaign_warnings,
+    out_of_band,
+)
+from rigsight.workflow.kernels import checked_jobs, prepare_kernels
+from rigsight.workflow.model_file import MODEL_FILE
+from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.results import check_writable, json_text, write_together
+
+IDENTIFICATION_FILE = "identification.json"
+IDENTIFYING = "Identifying"
+_STEPS_AFTER_RECORDS = 2
+
+
+def run_identify(
+    campaign: str | Path,
+    out: str | Path | None = None,
+    *,
+    method: str = "local_rational",
+    resolution: float | None = None,
+    n_jobs: int | None = None,
+    listener: Listener = silent,
+) -> Identification:
+    """Identify the linear rig behind the estimation records of a campaign.
+
+    Parameters
+    ----------
+    campaign
+        The toml file or its folder.
+    out
+        Folder for ``identification.json``, ``model.json`` and the figures; None writes nothing.
+    method
+        Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
+    resolution
+        Width in frequency wished for [rad/s]; None takes what each record gives.
+    n_jobs
+        Records identified at the same time; None for one per processor.
+    listener
+        Told of every finished step.
+
+    Raises
+    ------
+    InputError
+        If the campaign cannot be used, a record is too short for the resolution wished for, no record shows the motion, or the
+        results cannot be written; nothing is written then.
+    """
+    check_option("The method", method, METHODS)
+    if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
+        raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
+    jobs = checked_jobs(n_jobs)
+    if out is not None:
+        check_writable(Path(out))
+    read = read_campaign(campaign)
+    prepare_kernels([compose(read.rig)], jobs, listener)
+    identification = identify_campaign(read, Wishes(cast("Method", method), resolution), jobs, listener)
+    if out is not None:
+        write_identification(identification, Path(out))
+    return identification
+
+
+def identify_campaign(
+    campaign: Campaign, wishes: Wishes, n_jobs: int = 1, listener: Listener = silent
+) -> Identification:
+    """Identify each estimation record, then all of them together, and score the validation records.
+
+    Parameters
+    ----------
+    campaign
+        A campaign that was read.
+    wishes
+        How its records are to be read.
+    n_jobs
+        Records identified at the same time.
+    listener
+        Told of every finished step.
+
+    Raises
+    ------
+    InputError
+        If a record is too short for the resolution wished for, or no record shows the motion.
+    """
+    no_spring = campaign.parameters.get("k") == 0.0
+    stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
+    # Threads: the work is linear algebra, which lets others run.
+    found = []
+    parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+    for record in parallel(
+        delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, wishes)
+        for record in campaign.estimation
+    ):
+        found.append(record)
+        stage.finished(record.record.name)
+    joint = identify_jointly(campaign, found, no_spring)
+    stage.finished("one set for all records")
+    if not campaign.rig.is_driven:
+        found = [_over_time(record, joint) for record in found]
+    found = [out_of_band(record, campaign, joint) for record in found]
+    units = _units(campaign)
+    statement, changing = amplitude_dependence(found, units, units.get(campaign.rig.inputs[0].name, ""))
+    model = Model.of(joint.fit.fit.structure, joint.fit.fit.values, campaign.estimation[0].hold).to_json()
+    identification = Identification(
+        title=campaign.title,
+        rig=campaign.rig.name,
+        method=wishes.method,
+        units=units,
+        records=tuple(found),
+        amplitude_statement=statement,
+        changing=changing,
+        joint=joint,
+        model=model,
+        warnings=(
+            *campaign_warnings(campaign, found, joint, no_spring),
+            *beyond_identified_amplitudes(campaign, joint),
+        ),
+    )
+    stage.finished("amplitudes")
+    return identification
+
+
+def write_identification(identification: Identification, out: Path) -> tuple[Path, ...]:
+    """Write all results of an identification into a folder, all or none.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    figures = identification_figures(identification)
+    captions = {file: what for file, (what, _) in figures.items()}
+    return write_together(
+        out,
+        {
+            IDENTIFICATION_FILE: json_text(identification_json(identification, captions)),
+            MODEL_FILE: json_text(identification.model),
+            **{file: svg for file, (_, svg) in figures.items()},
+        },
+    )
+
+
+def _units(campaign: Campaign) -> dict[str, str]:
+    rig = campaign.rig
+    units = {p.name: p.unit for p in compose(rig).parameters}
+    return units | {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
+
+
+def _over_time(found: RecordIdentification, joint: JointIdentification) -> RecordIdentification:
+    """Give an element's record the parameters of the fit of this record alone, over time."""
+    own: Sequence[PhysicalEstimates] = [
+        PhysicalEstimates(
+            kind.fit.free,
+            {name: kind.fit.values[name] for name in kind.fit.free},
+            kind.fit.covariance,
+            "force = k x + d x' + force_off, fitted over time",
+        )
+        for kind in joint.fit.kinds
+        if kind.kind == found.record.name and math.isfinite(kind.fit.cost)
+    ]
+    if not own:
+        return found
+    return replace(found, paths=(replace(found.motion, physical=own[0]), *found.paths[1:]))

@@ -1,0 +1,65 @@
+"""Whether parameters change with the amplitude is decided by their intervals, and said in one sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigsight.identify.amplitude_dependence import amplitude_dependence
+from rigsight.identify.identification import PathIdentification, RecordIdentification
+from rigsight.identify.physical import PhysicalEstimates
+from rigsight.records import Kind, Record
+
+UNITS = {"k": "N/m", "d": "N s/m"}
+
+
+def found(
+    amplitude: float, k: float, d: float, kind: Kind = "sweep", error: float = 0.01
+) -> RecordIdentification:
+    record = Record(f"{kind}_{amplitude}", 0.01, {"u": np.arange(5.0)}, {}, kind=kind)
+    values = {"k": k, "d": d}
+    covariance = np.diag(np.square([error * k, error * d]))
+    physical = PhysicalEstimates(("k", "d"), values, covariance, "by hand")
+    return RecordIdentification(record, amplitude, (PathIdentification("u", "x", physical=physical),))
+
+
+def test_a_change_beyond_the_intervals_is_told_with_its_direction() -> None:
+    records = [found(1.0, 80.0, 2.0), found(0.25, 800.0, 2.01), found(0.5, 400.0, 1.99)]
+    statement, changing = amplitude_dependence(records, UNITS, "A")
+    assert changing == ("k",)
+    assert "from 0.25 to 1 A" in statement
+    assert "k falls from 800 to 80 N/m" in statement
+    assert "rigsight diagnose" in statement
+
+
+def test_a_change_that_turns_back_is_no_fall() -> None:
+    statement, _ = amplitude_dependence(
+        [found(1.0, 80.0, 2.0), found(2.0, 160.0, 2.0), found(3.0, 90.0, 2.0)], UNITS, "A"
+    )
+    assert "k moves between 80 and 160 N/m" in statement
+
+
+def test_scatter_inside_the_intervals_is_no_change() -> None:
+    statement, changing = amplitude_dependence([found(1.0, 80.0, 2.0), found(2.0, 81.0, 1.98)], UNITS, "A")
+    assert changing == ()
+    assert statement.startswith("No parameter changes")
+
+
+def test_a_step_is_not_compared_with_a_sweep() -> None:
+    statement, changing = amplitude_dependence(
+        [found(1.0, 80.0, 2.0), found(2.0, 160.0, 2.0, "step")], UNITS, "A"
+    )
+    assert changing == ()
+    assert "one amplitude" in statement
+
+
+def test_false_alarms_are_rare() -> None:
+    rng = np.random.default_rng(5)
+    alarms = 0
+    for _ in range(300):
+        scatter = 1.0 + 0.01 * rng.normal(size=(4, 2))
+        records = [
+            found(a, 80.0 * f, 2.0 * g) for a, (f, g) in zip((1.0, 2.0, 3.0, 4.0), scatter, strict=True)
+        ]
+        alarms += bool(amplitude_dependence(records, UNITS, "A")[1])
+    # One in a thousand is allowed for; three of 300 has a probability below 0.004 then.
+    assert alarms <= 2

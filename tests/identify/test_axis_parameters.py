@@ -1,0 +1,47 @@
+"""Mass, damping and stiffness come back from the transfer functions that they make, with their errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify import fit_frequency_response
+from rigsight.identify.axis_parameters import axis_parameters, springless_parameters
+
+OMEGA = np.geomspace(0.5, 100.0, 300)
+GAIN, M, D, K = 3.0, 2.0, 5.0, 800.0
+
+
+def measured(values: np.ndarray, seed: int, share: float = 0.01) -> FrequencyResponse:
+    size = share * np.abs(values)
+    rng = np.random.default_rng(seed)
+    error = size * (rng.normal(size=values.size) + 1j * rng.normal(size=values.size)) / np.sqrt(2.0)
+    return FrequencyResponse(OMEGA, values + error, "u", "x", "m/N", variance=size**2)
+
+
+def test_an_axis_returns_its_numbers_with_honest_errors() -> None:
+    truth = GAIN / (K - M * OMEGA**2 + 1j * D * OMEGA)
+    deviations = []
+    for seed in range(40):
+        found = axis_parameters(fit_frequency_response(measured(truth, seed), "pt2"), GAIN)
+        errors = found.standard_errors
+        deviations.append([(found.values[n] - v) / errors[n] for n, v in (("m", M), ("d", D), ("k", K))])
+    assert np.sqrt(np.mean(np.square(deviations))) == pytest.approx(1.0, abs=0.25)
+
+
+def test_an_axis_without_a_spring_returns_its_numbers_with_honest_errors() -> None:
+    truth = GAIN / (D + 1j * M * OMEGA)
+    deviations = []
+    for seed in range(40):
+        found = springless_parameters(fit_frequency_response(measured(truth, seed), "pt1"), GAIN)
+        errors = found.standard_errors
+        deviations.append([(found.values[n] - v) / errors[n] for n, v in (("m", M), ("d", D))])
+    assert np.sqrt(np.mean(np.square(deviations))) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_drive_that_counts_backward_is_told() -> None:
+    truth = -GAIN / (K - M * OMEGA**2 + 1j * D * OMEGA)
+    with pytest.raises(InputError, match="positive gain"):
+        axis_parameters(fit_frequency_response(measured(truth, 1), "pt2"), GAIN)

@@ -1,0 +1,110 @@
+"""Hysteresis parameters come back from noisy records of several amplitudes, from no start at all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.effects import effect_named
+from rigsight.errors import InputError
+from rigsight.excitation import log_sweep
+from rigsight.identify.hysteresis import Calibration, calibrate_to_records, loop_area
+from rigsight.records import Record
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs.published import published_sets
+from rigsight.simulate import Structure, compose, parameter_vector, simulate
+
+NOISE = 2e-5
+CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
+LATERAL = {"l_0": 0.25, "c_y": 0.98}
+BOUC_WEN = effect_named("bouc_wen_hysteresis")
+SETS = {name: published_sets()[f"hysteresis_{name}"].values() for name in "rbp"}
+SETS["made_up"] = {
+    **SETS["r"], "J_z": 0.58, "k_d": 0.5, "k_c": 700.0, "a": 0.09, "beta": 2660.0, "gamma": -660.0
+}  # fmt: skip
+
+
+def sweeps(values: dict[str, float], rng: np.random.Generator, structure: Structure) -> list[Record]:
+    t = 5e-3 * np.arange(5000)
+    records = []
+    for amplitude in (0.25, 0.5, 1.0):
+        u = log_sweep(t, amplitude, 0.7, 90.0)
+        record = Record(f"sweep {amplitude} A", 5e-3, {"u": u}, {"u": "A", "psi": "rad"}, kind="sweep")
+        psi = simulate(structure, values, record)["psi"]
+        records.append(record.with_signals(psi=psi + NOISE * rng.standard_normal(t.size)))
+    return records
+
+
+def with_unit_scale(values: dict[str, float]) -> dict[str, float]:
+    """Return what records determine: A is redundant, z -> z / A changes no motion."""
+    scaled = values["k_c"] * (1.0 - values["a"]) * values["A"]
+    power = values["A"] ** (values["n"] - 1.0)
+    return {
+        "J_z": values["J_z"],
+        "k_d": values["k_d"],
+        "far": values["k_c"] * values["a"],
+        "near": values["k_c"] * values["a"] + scaled,
+        "sum": (values["beta"] + values["gamma"]) * power,
+        "difference": (values["beta"] - values["gamma"]) * power,
+    }
+
+
+def calibrated(values: dict[str, float], n: float | None, seed: int) -> tuple[Calibration, list[Record]]:
+    rng = np.random.default_rng(seed)
+    structure = compose(RUNNING_GEAR, [BOUC_WEN], {} if n is None else {"n": n})
+    records = sweeps(values, rng, structure)
+    found = calibrate_to_records(
+        structure, records, CONSTANTS, rng, start=LATERAL, output_noise={"psi": NOISE}
+    )
+    return found, records
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_sets_of_the_thesis_come_back(name: str) -> None:
+    found, _ = calibrated(SETS[name], 1.0, seed=3)
+    assert found.fit.weighted_rms == pytest.approx(1.0, abs=0.02)
+    truth, values = with_unit_scale(SETS[name]), with_unit_scale({**found.values, "n": 1.0})
+    assert values["J_z"] == pytest.approx(truth["J_z"], rel=2e-3)
+    assert values["k_d"] == pytest.approx(truth["k_d"], rel=1e-2, abs=0.01)
+    assert values["near"] == pytest.approx(truth["near"], rel=1e-2)
+    assert values["far"] == pytest.approx(truth["far"], rel=1e-2, abs=0.3)
+    assert values["difference"] == pytest.approx(truth["difference"], rel=0.05)
+    assert values["sum"] == pytest.approx(truth["sum"], rel=0.03, abs=0.002 * truth["difference"])
+
+
+def test_saturation_and_loop_areas_are_near_their_intervals() -> None:
+    found, records = calibrated(SETS["made_up"], 1.0, seed=5)
+    saturation = found.derived.saturation
+    assert saturation is not None
+    # 95 % intervals miss in one case of twenty: two widths miss in one of ten thousand.
+    width = saturation.upper - saturation.lower
+    assert saturation.lower - 0.5 * width < 1.0 / 2000.0 < saturation.upper + 0.5 * width
+    assert saturation.upper - saturation.lower < 0.05 * saturation.value
+    structure = found.fit.structure
+    truth = parameter_vector(structure, SETS["made_up"])[:, None]
+    assert len(found.derived.loop_areas) == len(records)
+    for area in found.derived.loop_areas:
+        assert area.energy.value == pytest.approx(loop_area(structure, truth, area.amplitude)[0], rel=0.01)
+
+
+def test_an_exponent_that_is_no_whole_number_comes_back() -> None:
+    truth = {**SETS["made_up"], "n": 1.5, "beta": 5320.0, "gamma": -1320.0}
+    found, _ = calibrated(truth, None, seed=2)
+    assert found.fit.weighted_rms == pytest.approx(1.0, abs=0.02)
+    assert found.values["n"] == pytest.approx(1.5, abs=0.03)
+    assert abs(found.values["n"] - 1.5) < 4.0 * found.standard_errors["n"]
+    saturation = found.derived.saturation
+    assert saturation is not None
+    assert saturation.value == pytest.approx(4000.0 ** (-1.0 / 1.5), rel=0.02)
+
+
+def test_what_cannot_be_calibrated_is_explained() -> None:
+    rng = np.random.default_rng(0)
+    structure = compose(RUNNING_GEAR, [BOUC_WEN], {"n": 1.0})
+    with pytest.raises(InputError, match="at least one record"):
+        calibrate_to_records(structure, [], CONSTANTS, rng)
+    records = sweeps(SETS["r"], rng, structure)[:1]
+    with pytest.raises(InputError, match="Did you mean 'beta'"):
+        calibrate_to_records(structure, records, CONSTANTS, rng, start=LATERAL, free=["bta"])
+    with pytest.raises(InputError, match="at least one free parameter"):
+        calibrate_to_records(structure, records, CONSTANTS, rng, start=LATERAL, free=[])

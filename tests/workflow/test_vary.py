@@ -1,0 +1,129 @@
+"""The effect of parameters on the frequency response, as the thesis describes it in section 6.3."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from rigsight.cli import app
+from rigsight.errors import InputError
+from rigsight.workflow.progress import Step
+from rigsight.workflow.vary import run_vary, table_text
+
+
+def test_a_larger_share_of_the_spring_without_memory_breaks_later_and_gives_less_static_gain() -> None:
+    """Figure 6.5: "increasing a leads to a shift of the break frequency to a larger angular frequency ... and a smaller
+    static gain"."""
+    (variation,) = run_vary("hysteresis_r", ["a"], low=0.35, high=0.7, steps=3)
+    features = [variant.features for variant in variation.variants]
+    assert [variant.value for variant in variation.variants] == pytest.approx([0.35, 0.525, 0.7])
+    breaks = [row["break_frequency"] for row in features]
+    gains = [row["static_gain"] for row in features]
+    assert breaks == sorted(breaks)
+    assert gains == sorted(gains, reverse=True)
+
+
+def test_a_smaller_beta_removes_the_peak_and_a_larger_one_raises_it() -> None:
+    """Figure 6.4: decreasing beta leads to a later break frequency, a smaller static gain and no resonance peak."""
+    (variation,) = run_vary("hysteresis_r", ["beta"], steps=3, band=(1.0, 75.0))
+    low, base, high = (variant.features for variant in variation.variants)
+    assert variation.variants[1].value == pytest.approx(7362.0)
+    assert high["peak_magnitude"] > 1.2 * base["peak_magnitude"] > 12.0 * low["peak_magnitude"]
+    assert high["break_frequency"] < base["break_frequency"] < 0.5 * low["break_frequency"]
+    assert low["static_gain"] < 0.2 * base["static_gain"]
+
+
+def test_a_linear_model_shows_its_closed_form(write_model: Callable[..., Path]) -> None:
+    def linear(content: dict[str, Any]) -> None:
+        content.update(effects=[], effect_parameters={}, units={})
+
+    (variation,) = run_vary(write_model(linear), ["k"], low=200.0, high=800.0, steps=2, band=(2.0, 60.0))
+    for variant in variation.variants:
+        assert variant.features["break_frequency"] == pytest.approx(math.sqrt(variant.value / 2.0), rel=0.02)
+        assert variant.features["static_gain"] == pytest.approx(1.0 / (variant.value - 8.0), rel=0.05)
+
+
+def test_the_command_writes_pictures_and_numbers(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [
+        "vary",
+        "hysteresis_r",
+        "--parameter",
+        "k_d",
+        "--parameter",
+        "n",
+        "--steps",
+        "2",
+        "--out",
+        str(out),
+    ]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in out.iterdir()} == {
+        "vary.json", "vary_k_d.svg", "vary_k_d.png", "vary_n.svg", "vary_n.png"
+    }  # fmt: skip
+    assert (out / "vary_n.png").read_bytes().startswith(b"\x89PNG")
+    assert "k_d = 4 N m s/rad" in (out / "vary_k_d.svg").read_text(encoding="utf-8")
+    content = json.loads((out / "vary.json").read_text())
+    damping, exponent = content["parameters"]
+    assert (damping["unit"], damping["base"]) == ("N m s/rad", 2.0)
+    assert [row["value"] for row in damping["values"]] == pytest.approx([1.0, 4.0])
+    # Half the exponent is below its bound of 1.
+    assert [row["value"] for row in exponent["values"]] == pytest.approx([1.0, 2.0])
+    assert len(damping["values"][0]["magnitude"]) == len(content["omega"])
+    assert "break [rad/s]" in result.output
+
+
+def test_one_parameter_has_a_picture_of_the_plain_name_and_progress_is_told(tmp_path: Path) -> None:
+    steps: list[Step] = []
+    (variation,) = run_vary("identified", ["k_c"], tmp_path, steps=2, listener=steps.append)
+    assert {path.name for path in tmp_path.iterdir()} == {"vary.json", "vary.svg", "vary.png"}
+    sweeping = [step for step in steps if step.stage == "Sweeping"]
+    assert (sweeping[-1].done, sweeping[-1].total) == (2, 2)
+    assert "k_c [N m/rad]" in table_text(variation)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"model": "hysteresis_q"}, "Did you mean 'hysteresis_"),
+        ({"model": "nowhere/model.json"}, "does not exist"),
+        ({"parameters": ["bta"]}, "Did you mean 'beta'"),
+        ({"parameters": []}, "Name a parameter"),
+        ({"parameters": ["beta", "a"], "low": 1.0}, "belong to one parameter"),
+        ({"parameters": ["a"], "high": 1.5}, r"--to.*\[0, 1\]"),
+        ({"low": 5.0, "high": 5.0}, "only one value"),
+        ({"steps": 1}, "--steps"),
+        ({"amplitude": 0.0}, "--amplitude"),
+        ({"band": (5.0, 1.0)}, "0 < lowest < highest"),
+        ({"model": "nominal", "parameters": ["psi_off"]}, "give --from and --to"),
+    ],
+)
+def test_bad_input_is_explained(options: dict[str, Any], message: str, tmp_path: Path) -> None:
+    given = {"model": "hysteresis_r", "parameters": ["beta"], **options}
+    with pytest.raises(InputError, match=message):
+        run_vary(**given, out=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_models_that_cannot_be_swept_are_refused(tmp_path: Path, write_model: Callable[..., Path]) -> None:
+    def element(content: dict[str, Any]) -> None:
+        content.update(rig="element", constants={}, parameters={"d": 1.0, "k": 5.0, "force_off": 0.0})
+        content.update(effects=[], effect_parameters={}, units={})
+
+    def without_spring(content: dict[str, Any]) -> None:
+        content["parameters"]["k"] = 0.0
+        content.update(effects=[], effect_parameters={}, units={})
+
+    with pytest.raises(InputError, match="prescribes the motion"):
+        run_vary(write_model(element), ["k"])
+    with pytest.raises(InputError, match="--lowest and --highest"):
+        run_vary(write_model(without_spring), ["d"])
+    result = CliRunner().invoke(app, ["vary", "identified", "--parameter", "k_c", "--lowest", "1"])
+    assert result.exit_code == 2
