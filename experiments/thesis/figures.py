@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from calibration import OMEGA, band_response, bouc_wen_of_peak_and_break, fitted_to_both, joint_linear
+from calibration import (
+    band_response,
+    bouc_wen_of_peak_and_break,
+    bouc_wen_with_lag,
+    fitted_to_both,
+    joint_linear,
+)
 from matplotlib.figure import Figure
-from measuring import OURS, THESIS
+from measuring import CUTS, OURS, PAIRS, THESIS, simulated_pair
 from parameter_tables import values_by_amplitude
 from rich.table import Table
 from virtual_rig import (
@@ -17,12 +23,14 @@ from virtual_rig import (
     STEP_START,
     VIRTUAL_RIG,
     measured,
+    other_sweep,
     published_model,
     simulated,
     thesis_step,
     thesis_sweep,
 )
 
+from rigsight.frequency import FrequencyResponse
 from rigsight.plot import Panel, overlaid_responses, style
 from rigsight.plot.drawing import plain_log_ticks
 from rigsight.records import Record
@@ -36,11 +44,21 @@ PARAMETERS = {"k_d": "N m s/rad", "k_c": "N m/rad", "J_z": "kg m2", "psi_off": "
 def draw_all(out: Path) -> Table:
     """Draw all figures into a folder and list them."""
     out.mkdir(parents=True, exist_ok=True)
+    linear, hysteretic = ("nominal", "reference", "identified"), ("identified", "hysteresis_r")
+    fitted = ("hysteresis_r", "hysteresis_p", "hysteresis_b")
     drawn = {
+        "figure_5_1": ("linear sweeps over other ranges", other_sweeps_figure()),
+        "figure_5_2": ("u to y, identified set", sets_figure(("identified",), "u", "y")),
+        "figure_5_3": ("u to psi, linear sets", sets_figure(linear, "u", "psi")),
+        "figure_5_4": ("psi to y, linear sets", sets_figure(linear, "psi", "y")),
         "figure_5_5": ("step of 0.6 A", step_figure()),
         "figure_5_6_5_7": ("responses at all amplitudes", amplitude_figure()),
         "figure_5_8_5_9": ("parameters over amplitude", parameter_figure()),
         "figure_6_6": ("sets R, P, B and ours against the 1 A sweep", bouc_wen_figure()),
+        "figure_6_2": ("u to psi, without and with set R", sets_figure(hysteretic, "u", "psi")),
+        "figure_6_3": ("psi to y, without and with set R", sets_figure(hysteretic, "psi", "y")),
+        "figure_6_7": ("psi to y, sets R, P and B", sets_figure(fitted, "psi", "y")),
+        "figure_6_8": ("psi and y over time, sets R, P and B", over_time_figure()),
     }
     table = Table("figure", "shows", "file")
     for name, (shows, figure) in drawn.items():
@@ -109,27 +127,87 @@ def parameter_figure() -> Figure:
 
 
 def bouc_wen_figure() -> Figure:
-    """Figure 6.6: magnitude and phase at 1 A."""
+    """Figure 6.6: magnitude and phase at 1 A over the frequencies of the calibration."""
     models = {f"set {key}": published_model(f"hysteresis_{key.lower()}") for key in "RPB"}
-    models["ours"] = bouc_wen_of_peak_and_break()
-    curves = {
-        "virtual rig": band_response(None, 1.0),
-        **{k: band_response(m, 1.0) for k, m in models.items()},
-    }
+    models |= {"ours": bouc_wen_of_peak_and_break(), "ours, with an actuator lag": bouc_wen_with_lag()}
+    return bode_of(
+        band_response(None, 1.0), {name: band_response(model, 1.0) for name, model in models.items()}
+    )
+
+
+def sets_figure(names: Sequence[str], source: str, response: str) -> Figure:
+    """Figures 5.2 to 5.4, 6.2, 6.3 and 6.7: published sets against the 1 A sweep of the virtual rig."""
+    seen = OURS.response(measured(thesis_sweep(1.0)), source, response).band(0.1, CUTS[response])
+    curves = {}
+    for name in names:
+        record = simulated(*published_model(name), thesis_sweep(1.0))
+        curves[name] = simulated_pair(OURS, record, source, response).band(0.1, CUTS[response])
+    return bode_of(seen, curves)
+
+
+def bode_of(seen: FrequencyResponse, curves: Mapping[str, FrequencyResponse]) -> Figure:
+    """Draw a measured response and those of models."""
     with style():
         figure = Figure(figsize=(6.4, 5.6), layout="constrained")
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-        for (name, curve), color in zip(curves.items(), ("black", *COLORS), strict=False):
-            line = "." if name == "virtual rig" else "-"
-            top.semilogx(OMEGA, curve.magnitude_db, line, color=color, label=name)
-            bottom.semilogx(OMEGA, np.degrees(curve.phase), line, color=color)
-        top.set_ylabel("magnitude [dB re 1 rad/A]")
+        top.semilogx(seen.omega, seen.magnitude_db, ".", markersize=4, color="black", label="virtual rig")
+        bottom.semilogx(seen.omega, np.degrees(seen.phase), ".", markersize=4, color="black")
+        for (name, curve), color in zip(curves.items(), COLORS, strict=False):
+            top.semilogx(curve.omega, curve.magnitude_db, color=color, label=name)
+            bottom.semilogx(curve.omega, np.degrees(curve.phase), color=color)
+        top.set_ylabel(f"magnitude [dB re 1 {seen.unit}]")
         bottom.set_ylabel("phase [deg]")
         bottom.set_xlabel("angular frequency [rad/s]")
         top.legend(loc="lower left")
-        plain_log_ticks(bottom, OMEGA[0], OMEGA[-1])
+        plain_log_ticks(bottom, float(seen.omega[0]), float(seen.omega[-1]))
         for ax in (top, bottom):
             ax.grid()
+    return figure
+
+
+def other_sweeps_figure() -> Figure:
+    """Figure 5.1: magnitudes of linear sweeps over other ranges, by the method of the thesis, and the identified set."""
+    with style():
+        figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+        for ax, (source, response) in zip(figure.subplots(1, 2), PAIRS, strict=True):
+            for (start, stop), color in zip(((0.63, 63.0), (1e-3, 126.0)), COLORS, strict=False):
+                commanded = other_sweep(1.0, start, stop)
+                found = THESIS.response(measured(commanded), source, response)
+                found = found.band(max(start, 0.3), min(stop, CUTS[response]))
+                ax.semilogx(found.omega, found.magnitude_db, color=color, linewidth=0.8, label=commanded.name)
+            own = simulated(*published_model("identified"), thesis_sweep(1.0))
+            curve = simulated_pair(OURS, own, source, response).band(0.3, CUTS[response])
+            ax.semilogx(curve.omega, curve.magnitude_db, color="black", label="identified (published)")
+            ax.set_title(f"{source} to {response}")
+            ax.set_ylabel(f"magnitude [dB re 1 {curve.unit}]")
+            ax.set_xlabel("angular frequency [rad/s]")
+            ax.legend(loc="lower left")
+            plain_log_ticks(ax, 0.3, CUTS[response])
+            ax.grid()
+    return figure
+
+
+def over_time_figure() -> Figure:
+    """Figure 6.8: psi and y of the 1 A sweep over time."""
+    record = measured(thesis_sweep(1.0))
+    shown = (record.t > 100.0) & (record.t < 112.0)
+    with style():
+        figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+        for ax, (name, unit) in zip(
+            figure.subplots(2, 1, sharex=True), (("psi", "mrad"), ("y", "mm")), strict=True
+        ):
+            ax.plot(
+                record.t[shown], 1e3 * record[name][shown], color="black", linewidth=1.6, label="virtual rig"
+            )
+            for key, color in zip("RPB", COLORS, strict=False):
+                own = simulated(*published_model(f"hysteresis_{key.lower()}"), thesis_sweep(1.0))
+                ax.plot(
+                    record.t[shown], 1e3 * own[name][shown], color=color, linewidth=0.9, label=f"set {key}"
+                )
+            ax.set_ylabel(f"{name} [{unit}]")
+            ax.grid()
+        ax.set_xlabel("time [s]")
+        ax.legend(loc="upper right", ncols=4)
     return figure
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from fit_tables import DT, GROWTH
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
@@ -20,13 +21,10 @@ from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, simulate
 
-DT = 0.005
-"""Sample time of the thesis's rig [s]."""
 AMPLITUDES = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes of Figure 5.6 [A]; Table 5.2 has the first four."""
-GROWTH = float(np.log(640.0 / 1e-3)) / 150.0
-"""Rate of the sweep of section 4.2 [e-folds per second]."""
 SWEEP_START = 1e-3
+"""Angular frequency at the begin of the sweep of section 4.2 [rad/s]."""
 SWEEP_TIME = 149.5
 """The thesis sweeps to 640 rad/s, above the Nyquist frequency of 628 rad/s; here the sweep ends half a second earlier."""
 STEP_START, STEP_TIME, STEP_AMPLITUDE = 180.0, 200.0, 0.6
@@ -88,7 +86,7 @@ def thesis_step(amplitude: float = STEP_AMPLITUDE) -> Record:
 def measured(commanded: Record, seed: int = SEED) -> Record:
     """Return what the virtual rig answers, with sensor noise and torque disturbance.
 
-    The seed and the record's name and amplitude make the noise, so that a record is the same in whichever table it occurs.
+    The seed and the record's name make the noise, so that a record is the same in whichever table it occurs.
     """
     rng = np.random.default_rng([seed, *commanded.name.encode()])
     n = commanded.n_samples

@@ -75,6 +75,7 @@ def record_response(
     resolution: float | None = None,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
+    keep_doubtful: bool = False,
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -95,6 +96,8 @@ def record_response(
         How the source goes on between its samples, see `rigsight.frequency.hold_response`.
     band
         Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
+    keep_doubtful
+        Keep lines of a local method that do not stand out of their uncertainty: in a simulation there is no noise to drown in.
 
     Raises
     ------
@@ -120,7 +123,8 @@ def record_response(
             periodic, source, response, bandwidth=bandwidth, transient=periodic is record, hold=hold
         )
         width, shared = line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
-        found = _clear(found, lines)
+        if not keep_doubtful:
+            found = _clear(found, lines)
     if note:
         found = replace(found, method=f"{found.method}, {note}")
     if band is not None:

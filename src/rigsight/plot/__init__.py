@@ -16,13 +16,23 @@ from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
 from rigsight.plot.frequency_responses import Panel as Panel
 from rigsight.plot.frequency_responses import bode as bode
 from rigsight.plot.frequency_responses import overlaid_responses as overlaid_responses
+from rigsight.plot.model_comparison import ErrorPanel as ErrorPanel
+from rigsight.plot.model_comparison import ResponsesPanel as ResponsesPanel
+from rigsight.plot.model_comparison import StepPanel as StepPanel
+from rigsight.plot.model_comparison import model_errors as model_errors
+from rigsight.plot.model_comparison import model_responses as model_responses
+from rigsight.plot.model_comparison import model_steps as model_steps
+from rigsight.plot.model_comparison import model_styles as model_styles
 
 __all__ = [
     "AmplitudePanel",
     "AmplitudePoint",
     "DisplayScale",
+    "ErrorPanel",
     "FittedCurve",
     "Panel",
+    "ResponsesPanel",
+    "StepPanel",
     "amplitude_dependence",
     "bode",
     "comparison",
@@ -30,6 +40,10 @@ __all__ = [
     "display_scale",
     "envelope",
     "gap_budget",
+    "model_errors",
+    "model_responses",
+    "model_steps",
+    "model_styles",
     "overlaid_responses",
     "ranking",
     "style",

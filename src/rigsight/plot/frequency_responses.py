@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TWO_SIDED = 1.96
+TWO_SIDED = 1.96
 """Standard deviations of a 95 % interval."""
 _MOST_LINES = 800
 _FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
@@ -79,7 +79,7 @@ def bode(panels: Sequence[Panel]) -> Figure:
     figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 4.9)
     axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
     for column, whole in enumerate(panels):
-        panel = replace(whole, measured=_thinned(whole.measured))
+        panel = replace(whole, measured=thinned(whole.measured))
         top, bottom = axes[0, column], axes[1, column]
         _magnitude(top, panel)
         _phase(bottom, panel)
@@ -87,7 +87,7 @@ def bode(panels: Sequence[Panel]) -> Figure:
         top.set_ylabel(f"magnitude [dB re 1 {panel.measured.unit}]")
         bottom.set_ylabel("phase [deg]")
         bottom.set_xlabel("angular frequency [rad/s]")
-        _log_axis(bottom, [panel])
+        log_axis(bottom, [panel.measured])
         for ax in (top, bottom):
             ax.grid()
             ax.set_axisbelow(True)
@@ -126,13 +126,13 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]]) -> Figure:
             if panel.fitted is not None:
                 ax.plot(
                     panel.fitted.omega,
-                    _decibel(np.abs(panel.fitted.values)),
+                    decibel(np.abs(panel.fitted.values)),
                     color=color,
                     linewidth=1.4,
                     linestyle=(0, (4, 2)),
                 )
-        _limit(ax, np.concatenate(values))
-        _log_axis(ax, panels)
+        limit(ax, np.concatenate(values))
+        log_axis(ax, [panel.measured for panel in panels])
         ax.set_title(panels[0].title)
         ax.set_ylabel(f"magnitude [dB re 1 {panels[0].measured.unit}]")
         ax.set_xlabel("angular frequency [rad/s]")
@@ -143,7 +143,7 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]]) -> Figure:
     return figure
 
 
-def _thinned(measured: FrequencyResponse) -> FrequencyResponse:
+def thinned(measured: FrequencyResponse) -> FrequencyResponse:
     """Return about as many lines as the eye can tell apart on a logarithmic axis."""
     if measured.omega.size <= _MOST_LINES:
         return measured
@@ -160,7 +160,8 @@ def _colors(count: int) -> list[str]:
     return [to_hex(scale(i / max(count - 1, 1))) for i in range(count)]
 
 
-def _decibel(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def decibel(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return magnitudes in dB of one unit; zero is far below any axis."""
     return np.asarray(20.0 * np.log10(np.maximum(values, 1e-300)))
 
 
@@ -170,26 +171,27 @@ def _magnitude(ax: Axes, panel: Panel) -> None:
     shown = measured.magnitude_db
     if measured.variance is not None:
         # A component of the complex error has half of its variance.
-        reach = _TWO_SIDED * np.sqrt(0.5 * measured.variance)
+        reach = TWO_SIDED * np.sqrt(0.5 * measured.variance)
         ax.fill_between(
-            measured.omega, _decibel(size - reach), _decibel(size + reach), color=MEASURED, alpha=0.25, linewidth=0
+            measured.omega, decibel(size - reach), decibel(size + reach), color=MEASURED, alpha=0.25, linewidth=0
         )  # fmt: skip
     ax.plot(
-        measured.omega, shown, color=MEASURED, linestyle="none", marker=".", markersize=3.5, label=_measured_label(measured)
+        measured.omega, shown, color=MEASURED, linestyle="none", marker=".", markersize=3.5, label=measured_label(measured)
     )  # fmt: skip
     values = [shown]
     if panel.fitted is not None:
         fitted = panel.fitted
-        size, reach = np.abs(fitted.values), _TWO_SIDED * np.sqrt(0.5) * fitted.std
+        size, reach = np.abs(fitted.values), TWO_SIDED * np.sqrt(0.5) * fitted.std
         ax.fill_between(
-            fitted.omega, _decibel(size - reach), _decibel(size + reach), color=WITH_EFFECT, alpha=0.3, linewidth=0
+            fitted.omega, decibel(size - reach), decibel(size + reach), color=WITH_EFFECT, alpha=0.3, linewidth=0
         )  # fmt: skip
-        ax.plot(fitted.omega, _decibel(size), color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
-        values.append(_decibel(size))
-    _limit(ax, np.concatenate(values))
+        ax.plot(fitted.omega, decibel(size), color=WITH_EFFECT, linewidth=1.3, label=fitted.label)
+        values.append(decibel(size))
+    limit(ax, np.concatenate(values))
 
 
-def _measured_label(measured: FrequencyResponse) -> str:
+def measured_label(measured: FrequencyResponse) -> str:
+    """Return the legend's entry of a measured response, with its band where it has one."""
     return "measured, 95 % band" if measured.variance is not None else "measured"
 
 
@@ -204,11 +206,11 @@ def _phase(ax: Axes, panel: Panel) -> None:
         # The branch of each line is the one next to the fit: a noisy line cannot turn all that follow by 360 degrees.
         near = np.interp(measured.omega, fitted.omega, own)
         phase = near + (np.degrees(np.angle(measured.values)) - near + 180.0) % 360.0 - 180.0
-        reach = np.degrees(_TWO_SIDED * np.sqrt(0.5) * fitted.std / np.abs(fitted.values))
+        reach = np.degrees(TWO_SIDED * np.sqrt(0.5) * fitted.std / np.abs(fitted.values))
         ax.fill_between(fitted.omega, own - reach, own + reach, color=WITH_EFFECT, alpha=0.3, linewidth=0)
         ax.plot(fitted.omega, own, color=WITH_EFFECT, linewidth=1.3, zorder=3)
     if measured.variance is not None:
-        reach = np.degrees(_TWO_SIDED * np.sqrt(0.5 * measured.variance) / measured.magnitude)
+        reach = np.degrees(TWO_SIDED * np.sqrt(0.5 * measured.variance) / measured.magnitude)
         ax.fill_between(measured.omega, phase - reach, phase + reach, color=MEASURED, alpha=0.25, linewidth=0)
     ax.plot(measured.omega, phase, color=MEASURED, linestyle="none", marker=".", markersize=3.5)
     low, high = np.percentile(phase, [1.0, 99.0])
@@ -216,16 +218,17 @@ def _phase(ax: Axes, panel: Panel) -> None:
     ax.yaxis.set_major_locator(MultipleLocator(45.0 if high - low < 300.0 else 90.0))
 
 
-def _limit(ax: Axes, values: NDArray[np.float64]) -> None:
+def limit(ax: Axes, values: NDArray[np.float64]) -> None:
     """Let a few wild lines, or a band that reaches zero, not press the rest of the curve flat."""
     low, high = np.percentile(values[np.isfinite(values)], [0.5, 100.0])
     margin = 0.08 * max(high - low, 3.0)
     ax.set_ylim(low - margin, high + margin)
 
 
-def _log_axis(ax: Axes, panels: Sequence[Panel]) -> None:
-    left = min(float(panel.measured.omega[0]) for panel in panels)
-    right = max(float(panel.measured.omega[-1]) for panel in panels)
+def log_axis(ax: Axes, responses: Sequence[FrequencyResponse]) -> None:
+    """Let the frequency axis span these responses."""
+    left = min(float(response.omega[0]) for response in responses)
+    right = max(float(response.omega[-1]) for response in responses)
     ax.set_xscale("log")
     ax.set_xlim(left, right)
     plain_log_ticks(ax, left, right)

@@ -12,7 +12,8 @@ from rigsight.effects import CATALOGUE, effect_named
 from rigsight.errors import InputError, nearest
 from rigsight.records import Hold
 from rigsight.rigs import RIGS
-from rigsight.simulate import Structure, compose
+from rigsight.rigs.published import published_sets
+from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
 
 MODEL_FILE = "model.json"
@@ -54,6 +55,32 @@ def read_model(model: str | Path) -> Model:
     table = _checked_table(path, _data(path))
     structure = _structure(path, table)
     return Model(structure, _values(path, structure, table), table.hold)
+
+
+def named_model(model: str | Path) -> Model:
+    """Read a model, or take a published set.
+
+    Parameters
+    ----------
+    model
+        A ``model.json``, the folder that holds one, or the name of a published set.
+
+    Raises
+    ------
+    InputError
+        As `read_model`, or listing the published sets where it is none of these.
+    """
+    if Path(model).exists() or str(model).endswith(".json"):
+        return read_model(model)
+    sets = published_sets()
+    if str(model) not in sets:
+        raise InputError(
+            f"'{model}' is neither a {MODEL_FILE}, nor a folder that holds one, nor a published set.{nearest(str(model), sets)} "
+            f"Published sets: {', '.join(sets)}."
+        )
+    found = sets[str(model)]
+    structure = structure_named(found.rig, [effect_named(name) for name in found.effects])
+    return Model(structure, {name: found.values()[name] for name in structure.names}, "foh")
 
 
 def _locate(model: Path) -> Path:

@@ -11,20 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.effects import effect_named
-from rigsight.errors import InputError, SimulationError, check_in_range, check_option, nearest
+from rigsight.errors import InputError, SimulationError, check_in_range, check_option
 from rigsight.excitation import log_sweep
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_break_frequency, peak
 from rigsight.parameters import Parameter
 from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
-from rigsight.rigs.published import published_sets
-from rigsight.simulate import parameter_vector, rest_state, simulate, structure_named
+from rigsight.simulate import parameter_vector, rest_state, simulate
 from rigsight.simulate.input_hold import hold_input
 from rigsight.simulate.model import Model
 from rigsight.workflow.kernels import prepare_kernels
-from rigsight.workflow.model_file import MODEL_FILE, read_model
+from rigsight.workflow.model_file import named_model
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -115,7 +113,7 @@ def run_vary(
     """
     if out is not None:
         check_writable(Path(out))
-    read = _model(model)
+    read = named_model(model)
     if not read.structure.rig.is_driven:
         raise InputError(
             f"'vary' sweeps a rig whose input moves a mass, and {model} is of the rig '{read.structure.rig.name}', which "
@@ -173,20 +171,6 @@ def _plain(value: float) -> str:
     if 1e-3 <= abs(value) < 1e6:
         return np.format_float_positional(value, precision=4, fractional=False, trim="-")
     return f"{value:.4g}"
-
-
-def _model(model: str | Path) -> Model:
-    if Path(model).exists() or str(model).endswith(".json"):
-        return read_model(model)
-    sets = published_sets()
-    if str(model) not in sets:
-        raise InputError(
-            f"'{model}' is neither a {MODEL_FILE}, nor a folder that holds one, nor a published set.{nearest(str(model), sets)} "
-            f"Published sets: {', '.join(sets)}."
-        )
-    found = sets[str(model)]
-    structure = structure_named(found.rig, [effect_named(name) for name in found.effects])
-    return Model(structure, {name: found.values()[name] for name in structure.names}, "foh")
 
 
 def _named(model: Model, name: str) -> Parameter:

@@ -1,0 +1,39 @@
+"""How well many models do on many records: responses, steps and free runs, each beside its noise floor."""
+
+from rigsight.compare.comparison import Comparison as Comparison
+from rigsight.compare.comparison import Competitor as Competitor
+from rigsight.compare.comparison import Failure as Failure
+from rigsight.compare.comparison import Floor as Floor
+from rigsight.compare.comparison import RecordComparison as RecordComparison
+from rigsight.compare.comparison import Yardstick as Yardstick
+from rigsight.compare.comparison import compare_on_record as compare_on_record
+from rigsight.compare.response_error import ResponseError as ResponseError
+from rigsight.compare.response_error import SignalPath as SignalPath
+from rigsight.compare.response_error import response_error as response_error
+from rigsight.compare.response_error import response_floor as response_floor
+from rigsight.compare.response_error import signal_paths as signal_paths
+from rigsight.compare.score import QUANTITIES as QUANTITIES
+from rigsight.compare.score import Column as Column
+from rigsight.compare.score import Score as Score
+from rigsight.compare.step_error import StepWindow as StepWindow
+from rigsight.compare.step_error import step_window as step_window
+
+__all__ = [
+    "QUANTITIES",
+    "Column",
+    "Comparison",
+    "Competitor",
+    "Failure",
+    "Floor",
+    "RecordComparison",
+    "ResponseError",
+    "Score",
+    "SignalPath",
+    "StepWindow",
+    "Yardstick",
+    "compare_on_record",
+    "response_error",
+    "response_floor",
+    "signal_paths",
+    "step_window",
+]

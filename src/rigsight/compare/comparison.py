@@ -1,0 +1,354 @@
+"""How well do many models do on many records, and which does best?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.compare.free_run import free_run
+from rigsight.compare.response_error import (
+    SignalPath,
+    measured_responses,
+    response_error,
+    response_floor,
+    signal_paths,
+    simulated_response,
+    without_shares,
+)
+from rigsight.compare.score import QUANTITIES, Column, Score
+from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window
+from rigsight.errors import InputError, SimulationError
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify.record_response import Method
+from rigsight.metrics import rms
+from rigsight.records import Record
+from rigsight.rigs import Rig
+from rigsight.simulate.model import Model
+
+_EQUAL = 1e-9
+"""Relative difference below which two errors are the same."""
+_FEWER = 0.95
+"""Share of the measured lines below which a simulated response is said to have fewer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Competitor:
+    """A model with the name it is compared under, and where it came from."""
+
+    name: str
+    model: Model
+    source: str
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Standard deviation of what no model can explain in an output, how it was found, and whether it is only a lower bound."""
+
+    output: str
+    unit: str
+    std: float
+    method: str
+    lower_bound: bool = False
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What could not be compared, and why; `column` is None where the model could not be simulated at all."""
+
+    model: str
+    record: str
+    reason: str
+    column: Column | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RecordComparison:
+    """All models on one record.
+
+    Attributes
+    ----------
+    record
+        The measured record.
+    measured
+        Path -> measured frequency response.
+    simulated
+        Model -> path -> response of its simulation.
+    step
+        Where a step is compared, None for other records.
+    moved
+        Output -> model -> samples inside the step window, offset removed, shape (n_inside,).
+    scores, failures
+        What was found, and what was not.
+    notes
+        What is to be known about the record here.
+    """
+
+    record: Record
+    measured: dict[str, FrequencyResponse]
+    simulated: dict[str, dict[str, FrequencyResponse]] = field(default_factory=dict)
+    step: StepWindow | None = None
+    moved: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
+    scores: tuple[Score, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Models x records.
+
+    Attributes
+    ----------
+    title, rig
+        Of the campaign.
+    method
+        Estimator of the frequency responses, measured and simulated.
+    step_seconds
+        Length of the step windows [s].
+    window_length
+        Length of the windows of free run [s], None where records are run as a whole.
+    competitors
+        The models in the order they were named.
+    records
+        One comparison per record, in the order of the campaign.
+    floors
+        Noise floor of each output.
+    notes
+        What is to be known about the whole.
+    """
+
+    title: str
+    rig: str
+    method: Method
+    step_seconds: float
+    window_length: float | None
+    competitors: tuple[Competitor, ...]
+    records: tuple[RecordComparison, ...]
+    floors: tuple[Floor, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def scores(self) -> tuple[Score, ...]:
+        """All scores, record by record."""
+        return tuple(score for record in self.records for score in record.scores)
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """All failures, record by record."""
+        return tuple(failure for record in self.records for failure in record.failures)
+
+    def columns(self, record: str | None = None) -> tuple[Column, ...]:
+        """Return what was compared on a record (or on any), path by path and output by output."""
+        found = dict.fromkeys(s.column for s in self.scores if record is None or s.record == record)
+        kinds = list(QUANTITIES)
+        signals = list(dict.fromkeys(column.signal for column in found))
+        is_path = {signal: " -> " in signal for signal in signals}
+        return tuple(
+            sorted(
+                found, key=lambda c: (not is_path[c.signal], signals.index(c.signal), kinds.index(c.quantity))
+            )
+        )
+
+    def table(self, record: str) -> dict[str, dict[Column, float]]:
+        """Return model -> column -> error on one record; what could not be found is left out."""
+        rows: dict[str, dict[Column, float]] = {c.name: {} for c in self.competitors}
+        for score in self.scores:
+            if score.record == record:
+                rows[score.model][score.column] = score.value
+        return rows
+
+    def overall(self) -> dict[str, dict[Column, float]]:
+        """Return model -> column -> root mean square of the error over all records that show it.
+
+        A model that failed on one of these records has no entry: its mean over the others would flatter it.
+        """
+        shown = {column: {s.record for s in self.scores if s.column == column} for column in self.columns()}
+        rows: dict[str, dict[Column, float]] = {}
+        for competitor in self.competitors:
+            own = [score for score in self.scores if score.model == competitor.name]
+            rows[competitor.name] = {
+                column: rms(np.array([s.value for s in own if s.column == column]))
+                for column, records in shown.items()
+                if {s.record for s in own if s.column == column} == records
+            }
+        return rows
+
+    def floor(self, column: Column, record: str | None = None) -> float | None:
+        """Return the noise floor of a column on a record, or its root mean square over all that show it; None if unknown."""
+        known = {
+            s.record: s.noise_floor
+            for s in self.scores
+            if s.column == column and (record is None or s.record == record)
+        }
+        values = [value for value in known.values() if value is not None]
+        return rms(np.array(values)) if values and len(values) == len(known) else None
+
+
+def best(rows: Mapping[str, Mapping[Column, float]], column: Column) -> frozenset[str]:
+    """Return the models with the smallest error of a column; several where they tie."""
+    values = {
+        model: row[column] for model, row in rows.items() if column in row and math.isfinite(row[column])
+    }
+    if not values:
+        return frozenset()
+    smallest = min(values.values())
+    return frozenset(model for model, value in values.items() if value <= smallest * (1.0 + _EQUAL))
+
+
+@dataclass(frozen=True)
+class Yardstick:
+    """What all models are measured by.
+
+    Attributes
+    ----------
+    rig
+        The rig.
+    floors
+        Noise floor of each output that was measured. They belong to the records, not to the models, and are handed in.
+    method
+        Estimator of frequency responses.
+    step_seconds
+        Length of the step window [s].
+    """
+
+    rig: Rig
+    floors: tuple[Floor, ...]
+    method: Method = "local_rational"
+    step_seconds: float = DEFAULT_SECONDS
+
+
+def compare_on_record(
+    competitors: Sequence[Competitor], record: Record, windows: Sequence[Record], yardstick: Yardstick
+) -> RecordComparison:
+    """Score all models on one record.
+
+    Parameters
+    ----------
+    competitors
+        Models of the same rig.
+    record
+        A measured record.
+    windows
+        Its parts with their own initial states in free run; the record alone where it is run as a whole.
+    yardstick
+        How errors are counted.
+
+    Notes
+    -----
+    A model that cannot be simulated on the record, or whose response cannot be read, becomes a `Failure`; the others go on.
+    """
+    paths = signal_paths(yardstick.rig)
+    measured, problems = measured_responses(record, paths, yardstick.method)
+    notes = [f"No frequency response: {problem}" for problem in problems]
+    step = None
+    if record.kind == "step":
+        try:
+            step = step_window(record, yardstick.rig.inputs[0].name, yardstick.step_seconds)
+        except InputError as error:
+            notes.append(str(error))
+    trials = [_trial(c, record, windows, yardstick, paths, measured, step) for c in competitors]
+    moved: dict[str, dict[str, NDArray[np.float64]]] = {}
+    for trial in trials:
+        for output, samples in trial.moved.items():
+            moved.setdefault(output, {})[trial.model] = samples
+    return RecordComparison(
+        record=record,
+        measured={name: without_shares(response) for name, response in measured.items()},
+        simulated={trial.model: trial.responses for trial in trials},
+        step=step,
+        moved=moved,
+        scores=tuple(score for trial in trials for score in trial.scores),
+        failures=tuple(failure for trial in trials for failure in trial.failures),
+        notes=(*notes, *(note for trial in trials for note in trial.notes)),
+    )
+
+
+@dataclass(eq=False)
+class _Trial:
+    """One model on one record."""
+
+    model: str
+    record: str
+    scores: list[Score] = field(default_factory=list)
+    responses: dict[str, FrequencyResponse] = field(default_factory=dict)
+    moved: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    failures: list[Failure] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, column: Column, value: float, noise_floor: float | None, n_values: int) -> None:
+        """Keep one score, or say that it is no number."""
+        if math.isfinite(value):
+            self.scores.append(Score(self.model, self.record, column, value, noise_floor, n_values))
+        else:
+            self.failures.append(Failure(self.model, self.record, "The error is not finite.", column))
+
+
+def _trial(
+    competitor: Competitor,
+    record: Record,
+    windows: Sequence[Record],
+    yardstick: Yardstick,
+    paths: Iterable[SignalPath],
+    measured: Mapping[str, FrequencyResponse],
+    step: StepWindow | None,
+) -> _Trial:
+    trial = _Trial(competitor.name, record.name)
+    stds = {floor.output: floor.std for floor in yardstick.floors}
+    try:
+        run = free_run(competitor.model, record, windows, stds)
+    except SimulationError as error:
+        trial.failures.append(Failure(competitor.name, record.name, str(error)))
+        return trial
+    if not run.estimated:
+        trial.notes.append(
+            f"{competitor.name}: the initial state was guessed, not estimated: the model is too stiff for a fit."
+        )
+    for path in paths:
+        if path.name in measured:
+            _score_response(trial, run.simulated, path, measured[path.name], yardstick.method)
+    for floor in yardstick.floors:
+        if floor.output not in record:
+            continue
+        spread = float(np.std(record[floor.output]))
+        column = Column("free_run_nrmse", floor.output, "1")
+        own = floor.std / spread if spread > 0.0 else None
+        trial.add(column, run.nrmse[floor.output], own, record.n_samples)
+        if step is not None:
+            simulated = run.simulated[floor.output]
+            trial.moved[floor.output] = step.moved(simulated)
+            left = step.error(record[floor.output], simulated)
+            n_inside = step.inside.stop - step.inside.start
+            trial.add(Column("step_rmse", floor.output, floor.unit), left, step.floor(floor.std), n_inside)
+    return trial
+
+
+def _score_response(
+    trial: _Trial, simulated: Record, path: SignalPath, measured: FrequencyResponse, method: Method
+) -> None:
+    columns = (
+        Column("magnitude_rmse", path.name, measured.unit),
+        Column("phase_rmse", path.name, "rad"),
+        Column("magnitude_db", path.name, "dB"),
+    )
+    try:
+        own = simulated_response(simulated, path, method, measured)
+        error = response_error(measured, own)
+    except InputError as problem:
+        trial.failures += [Failure(trial.model, trial.record, str(problem), column) for column in columns]
+        return
+    trial.responses[path.name] = without_shares(own)
+    floor = response_floor(measured)
+    floors = (None, None, None) if floor is None else (floor.magnitude, floor.phase, floor.decibel)
+    for column, value, least in zip(
+        columns, (error.magnitude, error.phase, error.decibel), floors, strict=True
+    ):
+        trial.add(column, value, least, error.n_lines)
+    if error.n_lines < _FEWER * measured.omega.size:
+        trial.notes.append(
+            f"{trial.model}: {path.name} is compared at {error.n_lines} of {measured.omega.size} lines; at the others the "
+            "simulation has no source to divide by."
+        )

@@ -1,0 +1,81 @@
+"""What does a model predict for a record's input, from the state in which the record begins?
+
+The initial state is estimated: nothing but the states at the first sample is fitted to the measured outputs (to those of
+every window, where a rig drifts). A record cut out of a longer measurement does not begin at rest, and a memory of
+hysteresis cannot be measured; what is left over is the model's own. Offsets of the model (psi_off, y_off) stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigsight.errors import SimulationError
+from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.metrics import nrmse
+from rigsight.records import Record
+from rigsight.simulate import simulate
+from rigsight.simulate.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRun:
+    """A model on a record.
+
+    Attributes
+    ----------
+    simulated
+        The whole record with simulated outputs, from the estimated first state.
+    estimated
+        True if the initial states were fitted; False where the fixed steps of a fit cannot follow the model, so that the states
+        are those guessed from the first samples.
+    nrmse
+        Output -> RMS(measured - simulated) / RMS(measured - mean), over all windows, each from its own state.
+    """
+
+    simulated: Record
+    estimated: bool
+    nrmse: dict[str, float]
+
+
+def free_run(
+    model: Model, record: Record, windows: Sequence[Record], output_noise: Mapping[str, float]
+) -> FreeRun:
+    """Simulate a record and score it.
+
+    Parameters
+    ----------
+    model
+        The model; the record's hold is used.
+    record
+        A measured record.
+    windows
+        Its parts with their own initial states; the record itself where it is run as a whole.
+    output_noise
+        Standard deviation of each output's noise, by which the outputs are weighed when states are estimated.
+
+    Raises
+    ------
+    SimulationError
+        If the motion leaves the range of numbers or the model is too stiff.
+    """
+    structure, rig = model.structure, model.structure.rig
+    scales = characteristic_scales(rig, windows, model.values)
+    found = GreyBoxFit(structure, windows, scales, output_noise).fit(model.values, [], finish=False)
+    runs = [
+        simulate(structure, model.values, window, state)
+        for window, state in zip(windows, found.initial_states, strict=True)
+    ]
+    whole = (
+        runs[0] if len(windows) == 1 else simulate(structure, model.values, record, found.initial_states[0])
+    )
+    errors = {}
+    for signal in rig.outputs:
+        if signal.name in record:
+            measured, simulated = (np.concatenate([r[signal.name] for r in part]) for part in (windows, runs))
+            if not np.all(np.isfinite(simulated)):
+                raise SimulationError(f"The simulated {signal.name} leaves the range of numbers.")
+            errors[signal.name] = nrmse(measured - simulated, measured)
+    return FreeRun(whole, bool(np.isfinite(found.cost)), errors)

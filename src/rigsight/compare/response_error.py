@@ -1,0 +1,191 @@
+"""How far is a simulated frequency response from a measured one, and how far would noise alone move it?
+
+The error is the thesis's (5.1), ``sqrt(mean(|measured - simulated|^2))`` over the lines, of the magnitude [unit of the response]
+and of the phase [rad]. Lines are equally spaced in frequency, so the upper decades weigh most; the error in dB counts a
+small magnitude as much as a large one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify.record_response import Method, record_response
+from rigsight.identify.transfer_form import Order
+from rigsight.metrics import rms
+from rigsight.records import Record
+from rigsight.records.record import Hold
+from rigsight.rigs import Rig
+
+_CUTS = {"psi": 80.0, "y": 30.0}
+"""Where the thesis cuts u -> psi and psi -> y (sections 4.3 and 4.5) [rad/s], by response."""
+_PER_NEPER = 20.0 / math.log(10.0)
+
+
+@dataclass(frozen=True)
+class SignalPath:
+    """A source and the signal that answers it.
+
+    Attributes
+    ----------
+    source, response
+        Names of the signals.
+    order
+        What the response is believed to be; only the thesis's pipeline reads it.
+    upper_cut
+        Angular frequency beyond which lines are not compared [rad/s].
+    is_commanded
+        True if the source is the input of the rig, whose hold the record knows; False if it was measured.
+    """
+
+    source: str
+    response: str
+    order: Order
+    upper_cut: float
+    is_commanded: bool
+
+    @property
+    def name(self) -> str:
+        """``"u -> psi"``."""
+        return f"{self.source} -> {self.response}"
+
+
+@dataclass(frozen=True)
+class ResponseError:
+    """Errors of one path.
+
+    Attributes
+    ----------
+    magnitude
+        RMSE of the magnitude in the unit of the response.
+    phase
+        RMSE of the phase [rad].
+    decibel
+        RMS of the ratio of the magnitudes [dB].
+    n_lines
+        Lines that both have.
+    """
+
+    magnitude: float
+    phase: float
+    decibel: float
+    n_lines: int
+
+
+def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
+    """Return the paths of a rig: input to first output, and that to each output behind it.
+
+    The cuts are those of the thesis on a running gear, none on other rigs.
+    """
+    cuts = _CUTS if rig.downstream else {}
+    source, first, *behind = (rig.inputs[0].name, *(signal.name for signal in rig.outputs))
+    return (
+        SignalPath(source, first, "pt2", cuts.get(first, math.inf), rig.is_driven),
+        *(SignalPath(first, name, "pt1", cuts.get(name, math.inf), False) for name in behind),
+    )
+
+
+def measured_responses(
+    record: Record, paths: tuple[SignalPath, ...], method: Method
+) -> tuple[dict[str, FrequencyResponse], list[str]]:
+    """Return the response of each path by its name, at the lines that stand out of their noise, and what is in the way.
+
+    Parameters
+    ----------
+    record
+        A measured record; a step, or one that lacks the response, has none.
+    paths
+        Paths of its rig; a path behind the first is read where the first stands out, since its source drowns elsewhere.
+    method
+        Estimator.
+    """
+    found: dict[str, FrequencyResponse] = {}
+    problems: list[str] = []
+    if record.kind == "step":
+        return found, problems
+    for path in paths:
+        if path.response not in record:
+            continue
+        first = found.get(paths[0].name)
+        if first is None and path is not paths[0]:
+            continue
+        band = (0.0 if first is None else float(first.omega[0]), path.upper_cut)
+        if first is not None:
+            band = (band[0], min(band[1], float(first.omega[-1])))
+        try:
+            found[path.name] = _response(record, path, method, keep_doubtful=False).band(*band)
+        except InputError as error:
+            problems.append(f"{path.name}: {error}")
+    return found, problems
+
+
+def simulated_response(
+    simulated: Record, path: SignalPath, method: Method, measured: FrequencyResponse
+) -> FrequencyResponse:
+    """Return the response of a simulated record by the estimator of the measured one, at the lines of that.
+
+    Raises
+    ------
+    InputError
+        If the simulation does not excite any of these lines, or the estimator cannot read it.
+    """
+    whole = _response(simulated, path, method, keep_doubtful=True)
+    return whole.at(_among(whole.omega, measured.omega), "of those measured")
+
+
+def _response(record: Record, path: SignalPath, method: Method, *, keep_doubtful: bool) -> FrequencyResponse:
+    # A measured source is smooth between its samples, whatever the input does.
+    hold: Hold = record.hold if path.is_commanded else "band_limited"
+    return record_response(
+        record, path.source, path.response, path.order, method, hold=hold, keep_doubtful=keep_doubtful
+    ).response
+
+
+def _among(omega: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which frequencies are lines of the other response; both come from records of the same length."""
+    nearest = wanted[np.clip(np.searchsorted(wanted, omega), 1, wanted.size - 1) - np.array([[1], [0]])]
+    return np.asarray(np.min(np.abs(nearest - omega), axis=0) <= 1e-6 * omega)
+
+
+def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) -> ResponseError:
+    """Return the errors over the lines that both have.
+
+    The phases of the thesis's method are compared as they are, unwrapped and rescaled; those of other methods by the
+    shorter way round, so that a turn that noise made does not count.
+
+    Raises
+    ------
+    InputError
+        If they have no line in common.
+    """
+    one = measured.at(_among(measured.omega, simulated.omega), "in common with the simulation")
+    other = simulated.at(_among(simulated.omega, measured.omega), "in common with the measurement")
+    rescaled = measured.method.startswith("thesis")
+    phase = one.phase - other.phase if rescaled else np.angle(other.values * np.conj(one.values))
+    with np.errstate(divide="ignore"):
+        ratio = _PER_NEPER * np.log(other.magnitude / one.magnitude)
+    return ResponseError(rms(one.magnitude - other.magnitude), rms(phase), rms(ratio), one.omega.size)
+
+
+def response_floor(measured: FrequencyResponse) -> ResponseError | None:
+    """Return what the uncertainty of the measured response alone makes of each error, None where it is not known.
+
+    The variance of a line is what no smooth linear response explains: noise, and in a sweep of a nonlinear rig some of its
+    distortion, which a model that has the nonlinearity repeats. Such a model can come below this floor.
+    """
+    if measured.variance is None:
+        return None
+    # Half of the variance of a complex value lies along it, half across.
+    along = np.sqrt(0.5 * measured.variance)
+    relative = rms(along / measured.magnitude)
+    return ResponseError(rms(along), relative, _PER_NEPER * relative, measured.omega.size)
+
+
+def without_shares(response: FrequencyResponse) -> FrequencyResponse:
+    """Return a response without what ties its lines: tens of megabytes that no error or picture reads."""
+    return replace(response, noise_shares=None, noise_lines=None)

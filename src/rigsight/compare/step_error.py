@@ -1,0 +1,82 @@
+"""How far is a simulated step from a measured one in the seconds in which it matters?
+
+The thesis (section 5.2.2) compares 180 to 184 s of a step of 0.6 A at 180 s, offsets before the step removed. Here: the first
+four seconds from the step (or another length), each signal less its mean over up to five seconds before it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.metrics import rms
+from rigsight.records import Record
+
+DEFAULT_SECONDS = 4.0
+_BEFORE = 5.0
+"""Longest stretch before the step whose mean is the offset [s]."""
+_LEAST_BEFORE = 2
+_JUMP = 0.5
+"""Share of the largest change between samples that counts as the step."""
+
+
+@dataclass(frozen=True)
+class StepWindow:
+    """Where a step is compared.
+
+    Attributes
+    ----------
+    before, inside
+        Samples of which the offset is the mean, and samples that are compared.
+    """
+
+    before: slice
+    inside: slice
+
+    def moved(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the samples inside less the mean before, shape (n_inside,)."""
+        return np.asarray(samples[self.inside] - np.mean(samples[self.before]))
+
+    def error(self, measured: NDArray[np.float64], simulated: NDArray[np.float64]) -> float:
+        """Return the RMSE of two signals of shape (n_samples,), offsets removed."""
+        return rms(self.moved(measured) - self.moved(simulated))
+
+    def floor(self, std: float) -> float:
+        """Return the RMSE that white noise of this standard deviation makes, that of the removed mean included."""
+        return std * math.sqrt(1.0 + 1.0 / (self.before.stop - self.before.start))
+
+
+def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -> StepWindow:
+    """Return where the first step of a record is compared.
+
+    Parameters
+    ----------
+    record
+        A record whose input steps.
+    source
+        Name of the input.
+    seconds
+        Length from the step [s]; a record that ends before is compared up to its end.
+
+    Raises
+    ------
+    InputError
+        If the input does not change, or nothing was recorded before the step.
+    """
+    change = np.abs(np.diff(record[source]))
+    largest = float(change.max(initial=0.0))
+    if largest == 0.0:
+        raise InputError(f"Record '{record.name}': the input '{source}' is constant, so there is no step.")
+    start = int(np.argmax(change >= _JUMP * largest)) + 1
+    first = max(0, start - round(_BEFORE / record.dt))
+    if start - first < _LEAST_BEFORE:
+        raise InputError(
+            f"Record '{record.name}': the step comes {start * record.dt:.3g} s after the first sample, so the offset before it "
+            "is not known. Record some time at rest before the step."
+        )
+    stop = min(record.n_samples, start + round(seconds / record.dt) + 1)
+    return StepWindow(slice(first, start), slice(start, stop))

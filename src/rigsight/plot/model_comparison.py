@@ -1,0 +1,245 @@
+"""Which figures compare many models: their responses and steps over the measured ones, and their errors side by side?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.frequency import FrequencyResponse
+from rigsight.plot.drawing import FLOOR, MEASURED, OTHER, in_style, new_figure, shown_in
+from rigsight.plot.frequency_responses import (
+    TWO_SIDED,
+    decibel,
+    limit,
+    log_axis,
+    measured_label,
+    thinned,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#000000")
+"""Okabe and Ito's palette, its yellow darkened for white paper."""
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.2, 1, 1.2)))
+
+
+@dataclass(frozen=True, eq=False)
+class ResponsesPanel:
+    """One signal path: measured, and as each model has it.
+
+    Attributes
+    ----------
+    title
+        Which path.
+    measured
+        The measured response.
+    simulated
+        Model -> its response at lines of the measured one.
+    """
+
+    title: str
+    measured: FrequencyResponse
+    simulated: Mapping[str, FrequencyResponse]
+
+
+@dataclass(frozen=True, eq=False)
+class StepPanel:
+    """One output after a step, offsets removed.
+
+    Attributes
+    ----------
+    title, unit
+        Which output.
+    t
+        Time from the step [s], shape (n_samples,).
+    measured
+        Shape (n_samples,).
+    simulated
+        Model -> shape (n_samples,).
+    """
+
+    title: str
+    unit: str
+    t: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    simulated: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class ErrorPanel:
+    """One column of a comparison.
+
+    Attributes
+    ----------
+    title
+        What was compared, with the unit.
+    overall
+        Model -> root mean square over records; a model without one is said to lack it.
+    single
+        Model -> error on each record.
+    floor
+        Noise floor over all records, None if unknown.
+    """
+
+    title: str
+    overall: Mapping[str, float]
+    single: Mapping[str, Sequence[float]]
+    floor: float | None
+
+
+def model_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return color and dashes of each model: the same in every figure that is given the same names."""
+    return {
+        name: {"color": _COLORS[i % len(_COLORS)], "linestyle": _DASHES[i // len(_COLORS) % len(_DASHES)]}
+        for i, name in enumerate(names)
+    }
+
+
+@in_style
+def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
+    """Draw magnitude above phase, one column per path: measured as points with its 95 % band, each model as a line.
+
+    Parameters
+    ----------
+    panels
+        Paths of one record.
+    styles
+        Line style by model, see `model_styles`.
+    """
+    figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 5.4)
+    axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
+    for column, panel in enumerate(panels):
+        top, bottom = axes[:, column]
+        measured = thinned(panel.measured)
+        reach = None if measured.variance is None else TWO_SIDED * np.sqrt(0.5 * measured.variance)
+        phase = np.degrees(measured.phase)
+        _measured(top, measured.omega, measured.magnitude_db, measured_label(measured))
+        _measured(bottom, measured.omega, phase, None)
+        if reach is not None:
+            size, turn = measured.magnitude, np.degrees(reach / measured.magnitude)
+            band = {"color": MEASURED, "alpha": 0.25, "linewidth": 0}
+            top.fill_between(measured.omega, decibel(size - reach), decibel(size + reach), **band)
+            bottom.fill_between(measured.omega, phase - turn, phase + turn, **band)
+        shown = [measured.magnitude_db]
+        for name, response in panel.simulated.items():
+            curve = thinned(response)
+            top.plot(curve.omega, curve.magnitude_db, label=name, linewidth=1.3, **styles[name])
+            near = np.interp(curve.omega, measured.omega, phase)
+            # The branch next to the measured phase: a turn of 360 degrees is no difference.
+            own = near + (np.degrees(curve.phase) - near + 180.0) % 360.0 - 180.0
+            bottom.plot(curve.omega, own, linewidth=1.3, **styles[name])
+            shown.append(curve.magnitude_db)
+        limit(top, np.concatenate(shown))
+        low, high = np.percentile(phase, [1.0, 99.0])
+        bottom.set_ylim(45.0 * np.floor(low / 45.0) - 20.0, 45.0 * np.ceil(high / 45.0) + 20.0)
+        log_axis(bottom, [measured])
+        top.set_title(panel.title)
+        top.set_ylabel(f"magnitude [dB re 1 {measured.unit}]")
+        bottom.set_ylabel("phase [deg]")
+        bottom.set_xlabel("angular frequency [rad/s]")
+        for ax in (top, bottom):
+            ax.grid()
+            ax.set_axisbelow(True)
+    _legend(figure, list(axes[0]))
+    figure.align_ylabels(axes)
+    return figure
+
+
+@in_style
+def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, Any]]) -> Figure:
+    """Draw each output after a step, offsets removed: measured as a wide gray line, each model over it.
+
+    Parameters
+    ----------
+    panels
+        Outputs of one record.
+    styles
+        Line style by model, see `model_styles`.
+    """
+    figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 3.6)
+    axes = figure.subplots(1, len(panels), squeeze=False)
+    for ax, panel in zip(axes[0], panels, strict=True):
+        factor, unit = shown_in(panel.unit, panel.measured)
+        ax.plot(panel.t, factor * panel.measured, color=MEASURED, linewidth=3.0, alpha=0.55, label="measured")
+        for name, samples in panel.simulated.items():
+            ax.plot(panel.t, factor * samples, label=name, linewidth=1.2, **styles[name])
+        low, high = factor * float(panel.measured.min()), factor * float(panel.measured.max())
+        # A model that is far off leaves the picture rather than press the others flat.
+        ax.set_ylim(low - 0.7 * (high - low), high + 0.7 * (high - low))
+        ax.set_xlim(float(panel.t[0]), float(panel.t[-1]))
+        ax.set_title(panel.title)
+        ax.set_xlabel("time from the step [s]")
+        ax.set_ylabel(f"change of {panel.title} [{unit}]")
+        ax.grid()
+        ax.set_axisbelow(True)
+    _legend(figure, list(axes[0]))
+    return figure
+
+
+@in_style
+def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
+    """Draw the errors of all models as bars on logarithmic axes, each record as a point, the noise floor as a dashed line.
+
+    Parameters
+    ----------
+    panels
+        What was compared.
+    names
+        Models, the first on top.
+    """
+    columns = min(3, len(panels))
+    rows = -(-len(panels) // columns)
+    figure = new_figure(2.0 + 2.9 * columns, rows * (0.9 + 0.24 * len(names)))
+    axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    for ax in axes.flat[len(panels) :]:
+        ax.set_visible(False)
+    for ax, panel in zip(axes.flat, panels, strict=False):
+        values = [v for single in panel.single.values() for v in single if v > 0.0]
+        values += [v for v in (*panel.overall.values(), panel.floor) if v is not None and v > 0.0]
+        left, right = 0.6 * min(values, default=1.0), 1.6 * max(values, default=1.0)
+        least = min((v for v in panel.overall.values()), default=0.0)
+        for row, name in enumerate(names):
+            if name in panel.overall:
+                is_best = panel.overall[name] <= least * (1.0 + 1e-9)
+                ax.barh(
+                    row,
+                    panel.overall[name] - left,
+                    left=left,
+                    height=0.66,
+                    color="#0072b2" if is_best else OTHER,
+                )
+            elif not panel.single.get(name):
+                ax.text(1.05 * left, row, "failed", va="center", fontsize=8, color=MEASURED)
+            points = [value for value in panel.single.get(name, ()) if value > 0.0]
+            ax.plot(points, np.full(len(points), row), ".", color=FLOOR, markersize=3.5, alpha=0.7)
+        if panel.floor is not None:
+            ax.axvline(panel.floor, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.1)
+        ax.set_xscale("log")
+        ax.set_xlim(left, right)
+        ax.set_ylim(len(names) - 0.4, -0.6)
+        ax.set_yticks(range(len(names)), names)
+        ax.tick_params(axis="y", length=0)
+        ax.set_title(panel.title)
+        ax.grid(axis="x")
+        ax.set_axisbelow(True)
+    return figure
+
+
+def _measured(ax: Axes, omega: NDArray[np.float64], values: NDArray[np.float64], label: str | None) -> None:
+    ax.plot(omega, values, color=MEASURED, linestyle="none", marker=".", markersize=4.0, label=label)
+
+
+def _legend(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Name every line once, whichever panel it is in."""
+    entries: dict[str, Any] = {}
+    for ax in axes:
+        handles, labels = ax.get_legend_handles_labels()
+        for handle, label in zip(handles, labels, strict=True):
+            entries.setdefault(label, handle)
+    figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=4, fontsize=8)

@@ -1,0 +1,216 @@
+"""What `rigsight compare` does: models and a campaign -> `comparison.json`, `.csv`, `.html` and figures, together."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from joblib import Parallel, delayed
+
+from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.windows import cut, window_length
+from rigsight.errors import InputError, check_option
+from rigsight.identify.record_response import METHODS, Method
+from rigsight.plot import svg_text
+from rigsight.report import render_comparison
+from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.compare_figures import comparison_figures
+from rigsight.workflow.compare_files import comparison_csv, comparison_json
+from rigsight.workflow.diagnose import versions
+from rigsight.workflow.kernels import checked_jobs, prepare_kernels
+from rigsight.workflow.model_file import MODEL_FILE, named_model
+from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.results import check_writable, json_text, write_together
+
+COMPARISON_FILE, TABLE_FILE, PAGE_FILE = "comparison.json", "comparison.csv", "comparison.html"
+COMPARING = "Comparing"
+
+
+def run_compare(
+    campaign: str | Path,
+    models: Sequence[str | Path],
+    out: str | Path | None = None,
+    *,
+    method: str = "local_rational",
+    step_seconds: float = 4.0,
+    n_jobs: int | None = None,
+    listener: Listener = silent,
+    command: str | None = None,
+) -> Comparison:
+    """Score models on all records of a campaign.
+
+    Parameters
+    ----------
+    campaign
+        The toml file or its folder.
+    models
+        Each a ``model.json``, the folder that holds one, or the name of a published set; ``NAME=MODEL`` gives it a name.
+    out
+        Folder for the results; None writes nothing.
+    method
+        Estimator of all frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
+    step_seconds
+        Seconds from a step in which it is compared; the thesis takes four.
+    n_jobs
+        Records compared at the same time; None for one per processor.
+    listener
+        Told of every finished record.
+    command
+        The command line that the page quotes.
+
+    Raises
+    ------
+    InputError
+        If the campaign or a model cannot be used, a model is of another rig, no model can be simulated on any record, or the
+        results cannot be written; nothing is written then.
+    """
+    check_option("The method", method, METHODS)
+    if not (math.isfinite(step_seconds) and step_seconds > 0.0):
+        raise InputError(f"The step window must last a positive number of seconds, got {step_seconds!r}.")
+    if not models:
+        raise InputError(f"Name at least one model: a {MODEL_FILE}, a folder that holds one, or a published set.")
+    jobs = checked_jobs(n_jobs)
+    if out is not None:
+        check_writable(Path(out))
+    read = read_campaign(campaign)
+    competitors = _competitors(models, read)
+    prepare_kernels(list(dict.fromkeys(c.model.structure for c in competitors)), jobs, listener)
+    comparison = compare_campaign(read, competitors, cast("Method", method), step_seconds, jobs, listener)
+    if not comparison.scores:
+        reasons = "\n".join(f"- {f.model} on '{f.record}': {f.reason}" for f in comparison.failures[:10])
+        raise InputError(f"No model can be compared on any record of {read.path}.\n{reasons}")
+    if out is not None:
+        quoted = shlex.join(["rigsight", "compare", str(campaign), *map(str, models)])
+        write_comparison(comparison, Path(out), command or quoted)
+    return comparison
+
+
+def compare_campaign(
+    campaign: Campaign,
+    competitors: Sequence[Competitor],
+    method: Method = "local_rational",
+    step_seconds: float = 4.0,
+    n_jobs: int = 1,
+    listener: Listener = silent,
+) -> Comparison:
+    """Score models on all records of a campaign that was read.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    competitors
+        Models of its rig.
+    method, step_seconds, n_jobs, listener
+        As in `run_compare`.
+    """
+    rig = campaign.rig
+    floors = tuple(
+        Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound)
+        for floor in noise_floors(rig, campaign.records)
+    )
+    yardstick = Yardstick(rig, floors, method, step_seconds)
+    # One model without a spring, and all are run in windows: the same yardstick for everyone.
+    drifts = any(c.model.values.get("k", math.inf) == 0.0 for c in competitors) and rig.is_driven
+    length = window_length(rig, campaign.records) if drifts else None
+    stage = Stage(COMPARING, len(campaign.records), listener)
+    found = []
+    # Threads: kernels and linear algebra let others run.
+    parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+    for record in parallel(
+        delayed(compare_on_record)(competitors, record, cut([record], length), yardstick)
+        for record in campaign.records
+    ):
+        found.append(record)
+        stage.finished(record.record.name)
+    return Comparison(
+        title=campaign.title,
+        rig=rig.name,
+        method=method,
+        step_seconds=step_seconds,
+        window_length=length,
+        competitors=tuple(competitors),
+        records=tuple(found),
+        floors=floors,
+        notes=tuple(_notes(campaign, competitors)),
+    )
+
+
+def write_comparison(comparison: Comparison, out: Path, command: str) -> tuple[Path, ...]:
+    """Write all results of a comparison into a folder, all or none.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    figures = comparison_figures(comparison)
+    return write_together(
+        out,
+        {
+            COMPARISON_FILE: json_text(comparison_json(comparison, {f.file: f.caption for f in figures})),
+            TABLE_FILE: comparison_csv(comparison),
+            PAGE_FILE: render_comparison(comparison, figures, command=command, versions=versions()),
+            **{figure.file: svg_text(figure.drawing, figure.file) for figure in figures},
+        },
+    )
+
+
+def _competitors(models: Sequence[str | Path], campaign: Campaign) -> list[Competitor]:
+    found: list[Competitor] = []
+    for text in map(str, models):
+        name, source = _name_and_source(text)
+        model = named_model(source)
+        if model.structure.rig.name != campaign.rig.name:
+            raise InputError(
+                f"Model '{text}' is of the rig '{model.structure.rig.name}', the records of {campaign.path.name} are of the rig "
+                f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
+            )
+        found.append(Competitor(_distinct(name, [c.name for c in found]), model, source))
+    return found
+
+
+def _name_and_source(text: str) -> tuple[str, str]:
+    """Return how a model is called and where it is: of ``NAME=MODEL`` both, else the folder of a ``model.json``."""
+    if "=" in text and not Path(text).exists():
+        name, _, source = text.partition("=")
+        if not name.strip() or not source:
+            raise InputError(f"'{text}' cannot be read; write NAME=MODEL, for instance mine=identification.")
+        return name.strip(), source
+    path = Path(text)
+    if path.name == MODEL_FILE:
+        return path.absolute().parent.name or text, text
+    return (path.stem if path.suffix == ".json" else path.absolute().name) or text, text
+
+
+def _distinct(name: str, taken: Sequence[str]) -> str:
+    count, free = 1, name
+    while free in taken:
+        count += 1
+        free = f"{name}_{count}"
+    return free
+
+
+def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
+    notes = []
+    if all(record.kind == "step" for record in campaign.records):
+        notes.append(
+            "No record is a sweep or a multisine, so no frequency responses are compared; steps and free runs are."
+        )
+    if all(record.kind != "step" for record in campaign.records):
+        notes.append("No record is a step, so no step is compared.")
+    for competitor in competitors:
+        other = [
+            f"{name} = {competitor.model.values[name]:g} (campaign: {value:g})"
+            for name, value in campaign.constants.items()
+            if not math.isclose(competitor.model.values[name], value, rel_tol=1e-6)
+        ]
+        if other:
+            notes.append(
+                f"Model '{competitor.name}' has other constants than the campaign: {', '.join(other)}. It is compared as it is."
+            )
+    return notes
