@@ -225,6 +225,63 @@ def identify(
 
 
 @app.command()
+def compare(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
+    ],
+    model: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MODEL...",
+            help="Each a model.json, the folder that holds one, or a published set such as hysteresis_r; NAME=MODEL names it.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "comparison"
+    ),
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="How all frequency responses are estimated: local_rational, local_polynomial, h1 or thesis.",
+        ),
+    ] = "local_rational",
+    step_seconds: Annotated[
+        float, typer.Option(metavar="SECONDS", help="How long a step is compared, from its begin on.")
+    ] = 4.0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Score models on all records: frequency responses, steps and free runs, each beside its noise floor.
+
+    Writes comparison.json, comparison.csv, comparison.html and figures into DIR, all or none.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.workflow.compare import run_compare
+
+        comparison = run_compare(
+            campaign,
+            model,
+            out,
+            method=method,
+            step_seconds=step_seconds,
+            n_jobs=jobs,
+            listener=listener,
+            command=_command_line(),
+        )
+    if not quiet:
+        from rich.console import Console
+
+        from rigsight.report import comparison_summary
+
+        Console(highlight=False).print(comparison_summary(comparison))
+        for line in ("", f"Page:  {out / 'comparison.html'}", f"Table: {out / 'comparison.csv'}"):
+            typer.echo(line)
+
+
+@app.command()
 def simulate(
     model: Annotated[
         Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")

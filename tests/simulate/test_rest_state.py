@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.simulate import parameter_vector, record_input, rest_state, simulate
+from rigsight.effects import effect_named
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate
 
 
 @pytest.mark.parametrize("name", ["R", "B", "P", "stiff"])
@@ -53,3 +55,20 @@ def test_spring_without_end_starts_at_its_offset(axis, axis_values, make_record)
 def test_delayed_input_rests_too(axis_with_delay, axis_values, make_record):
     simulated = simulate(axis_with_delay, {**axis_values, "T_d": 50.0}, make_record(np.full(200, 2.0)))["x"]
     np.testing.assert_allclose(simulated, 0.02, rtol=1e-8)
+
+
+def test_a_chain_of_states_starts_from_exactly_zero(make_record):
+    """The input reaches the memory through four states: far below rounding, no switch may be resolved there."""
+    structure = compose(
+        RUNNING_GEAR,
+        [effect_named("bouc_wen_hysteresis"), effect_named("actuator_lag")],
+        {"n": 1.0, "A": 1.0},
+    )
+    values = {
+        "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.4, "k_c": 470.0, "k_d": 0.08, "l_0": 0.25, "c_y": 0.98,
+        "psi_off": 0.0, "y_off": 0.0, "a": 0.097, "beta": 840.0, "gamma": -29.0, "T_a": 0.038,
+    }  # fmt: skip
+    time = 5e-3 * np.arange(400)
+    psi = simulate(structure, values, make_record(np.sin(5.0 * time)))["psi"]
+    near = simulate(structure, {**values, "psi_off": 1e-9}, make_record(np.sin(5.0 * time)))["psi"] - 1e-9
+    np.testing.assert_allclose(psi, near, atol=1e-6 * np.std(psi))

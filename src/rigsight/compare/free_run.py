@@ -19,6 +19,9 @@ from rigsight.records import Record
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
 
+_TOLERANCE, _EVALUATIONS = 1e-5, 60
+"""Relative change of the squared error at which states are good enough, and limit: hysteresis that does not forget needs many."""
+
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
@@ -63,7 +66,9 @@ def free_run(
     """
     structure, rig = model.structure, model.structure.rig
     scales = characteristic_scales(rig, windows, model.values)
-    found = GreyBoxFit(structure, windows, scales, output_noise).fit(model.values, [], finish=False)
+    found = GreyBoxFit(structure, windows, scales, output_noise).fit(
+        model.values, [], max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False
+    )
     runs = [
         simulate(structure, model.values, window, state)
         for window, state in zip(windows, found.initial_states, strict=True)

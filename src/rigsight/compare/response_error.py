@@ -19,11 +19,14 @@ from rigsight.identify.record_response import Method, record_response
 from rigsight.identify.transfer_form import Order
 from rigsight.metrics import rms
 from rigsight.records import Record
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold
 from rigsight.rigs import Rig
 
 _CUTS = {"psi": 80.0, "y": 30.0}
 """Where the thesis cuts u -> psi and psi -> y (sections 4.3 and 4.5) [rad/s], by response."""
+_LEAST_CLEARNESS = 10.0
+"""Power over variance (10 dB) from which a measured line is compared; a fit asks for more, an error has its floor beside it."""
 _PER_NEPER = 20.0 / math.log(10.0)
 
 
@@ -114,11 +117,16 @@ def measured_responses(
         first = found.get(paths[0].name)
         if first is None and path is not paths[0]:
             continue
+        if is_constant(record[path.source]):
+            problems.append(
+                f"{path.name}: '{path.source}' is constant; without excitation there is no frequency response."
+            )
+            continue
         band = (0.0 if first is None else float(first.omega[0]), path.upper_cut)
         if first is not None:
             band = (band[0], min(band[1], float(first.omega[-1])))
         try:
-            found[path.name] = _response(record, path, method, keep_doubtful=False).band(*band)
+            found[path.name] = _response(record, path, method, _LEAST_CLEARNESS).band(*band)
         except InputError as error:
             problems.append(f"{path.name}: {error}")
     return found, problems
@@ -134,15 +142,15 @@ def simulated_response(
     InputError
         If the simulation does not excite any of these lines, or the estimator cannot read it.
     """
-    whole = _response(simulated, path, method, keep_doubtful=True)
+    whole = _response(simulated, path, method, 0.0)
     return whole.at(_among(whole.omega, measured.omega), "of those measured")
 
 
-def _response(record: Record, path: SignalPath, method: Method, *, keep_doubtful: bool) -> FrequencyResponse:
+def _response(record: Record, path: SignalPath, method: Method, least_clearness: float) -> FrequencyResponse:
     # A measured source is smooth between its samples, whatever the input does.
     hold: Hold = record.hold if path.is_commanded else "band_limited"
     return record_response(
-        record, path.source, path.response, path.order, method, hold=hold, keep_doubtful=keep_doubtful
+        record, path.source, path.response, path.order, method, hold=hold, least_clearness=least_clearness
     ).response
 
 

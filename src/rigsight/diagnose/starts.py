@@ -81,7 +81,11 @@ def _evaluated(
         canonical.drive_size: bench.scales["drive"],
         canonical.x_size: bench.scales["x"],
         canonical.v_size: bench.scales["x"] / bench.scales["time"],
+        canonical.time_size: bench.scales["time"],
     }
+    inertia = bench.rig.motion.inertia
+    if inertia is not None:
+        numbers[canonical.m] = float(inertia.subs({s: values[s.name] for s in inertia.free_symbols}))
     result = {}
     for name, formula in formulas.items():
         own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}

@@ -130,6 +130,7 @@ class Workbench:
             for effect in effects
             if self.rig.offers(effect)
             and effect not in self.modelled
+            and (effect.lateral is None or not self.rig.downstream_parameters <= self.held)
             and (self._has_spring or (effect.spring is None and effect.deflection is None))
         ]
 

@@ -6,16 +6,24 @@ from rigsight.effects.actuator_lag import ACTUATOR_LAG
 from rigsight.effects.asymmetric_stiffness import ASYMMETRIC_STIFFNESS
 from rigsight.effects.backlash import BACKLASH
 from rigsight.effects.bouc_wen_hysteresis import BOUC_WEN_HYSTERESIS
+from rigsight.effects.conicity_variation import CONICITY_VARIATION
 from rigsight.effects.coulomb_friction import COULOMB_FRICTION
+from rigsight.effects.creep_saturation import CREEP_SATURATION
 from rigsight.effects.cubic_stiffness import CUBIC_STIFFNESS
 from rigsight.effects.effect import Effect
 from rigsight.effects.end_stop import END_STOP
+from rigsight.effects.flexible_mode import FLEXIBLE_MODE
 from rigsight.effects.free_play import FREE_PLAY
+from rigsight.effects.gravity_pendulum import GRAVITY_PENDULUM
 from rigsight.effects.input_dead_zone import INPUT_DEAD_ZONE
 from rigsight.effects.input_delay import INPUT_DELAY
 from rigsight.effects.input_saturation import INPUT_SATURATION
 from rigsight.effects.iwan_hysteresis import IWAN_HYSTERESIS
+from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
+from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPING
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
+from rigsight.effects.sensor_delay import SENSOR_DELAY
+from rigsight.effects.sensor_lag import SENSOR_LAG
 from rigsight.effects.stribeck_friction import STRIBECK_FRICTION
 from rigsight.errors import check_option
 
@@ -25,15 +33,23 @@ CATALOGUE: tuple[Effect, ...] = (
     COULOMB_FRICTION,
     STRIBECK_FRICTION,
     QUADRATIC_DAMPING,
+    POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,
+    GRAVITY_PENDULUM,
     END_STOP,
     FREE_PLAY,
     BACKLASH,
     ASYMMETRIC_STIFFNESS,
+    FLEXIBLE_MODE,
     INPUT_DELAY,
     ACTUATOR_LAG,
     INPUT_SATURATION,
     INPUT_DEAD_ZONE,
+    PERIODIC_DISTURBANCE,
+    CREEP_SATURATION,
+    CONICITY_VARIATION,
+    SENSOR_DELAY,
+    SENSOR_LAG,
 )
 
 

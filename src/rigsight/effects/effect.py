@@ -144,6 +144,12 @@ class Effect:
         What leaves the actuator in terms of ``u`` and states.
     delay
         Time by which the input arrives late [s].
+    lateral
+        Rate of the lateral displacement, of ``creepage``, ``creep_gain``, ``lateral_displacement`` and ``lateral_feedback``.
+    measured
+        What the sensor of the displacement shows, of ``reading`` and states.
+    measured_late
+        Time by which that sensor is late [s].
     states
         States added, with their rates.
     searched_as
@@ -168,6 +174,9 @@ class Effect:
     deflection: sp.Expr | None = None
     drive: sp.Expr | None = None
     delay: sp.Expr | None = None
+    lateral: sp.Expr | None = None
+    measured: sp.Expr | None = None
+    measured_late: sp.Expr | None = None
     states: tuple[State, ...] = ()
     searched_as: tuple[SumAndDifference, ...] = ()
     starts: tuple[Start, ...] = ()

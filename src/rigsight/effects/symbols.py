@@ -28,6 +28,16 @@ deflection_rate = sp.Symbol("deflection_rate", real=True)
 """Time derivative of `deflection`."""
 spring_torque = sp.Symbol("spring_torque", real=True)
 """Torque (force) of the spring before the effect, ``k * deflection``."""
+creepage = sp.Symbol("creepage", real=True)
+"""What drives the lateral displacement: ``psi - (y - y_off) / (2 l_0)`` on the running gear."""
+creep_gain = sp.Symbol("creep_gain", positive=True)
+"""Lateral rate per creepage, ``v c_y``."""
+lateral_displacement = sp.Symbol("lateral_displacement", real=True)
+"""Lateral displacement from rest, ``y - y_off``."""
+lateral_feedback = sp.Symbol("lateral_feedback", positive=True)
+"""Creepage that a unit of lateral displacement takes away, ``1 / (2 l_0)``."""
+reading = sp.Symbol("reading", real=True)
+"""What an ideal sensor of the displacement would show."""
 
 x_size = sp.Symbol("x_size", positive=True)
 """Size of the displacement in the records; in start values only."""
@@ -35,6 +45,8 @@ drive_size = sp.Symbol("drive_size", positive=True)
 """Size of the drive's force in the records; in start values only."""
 v_size = sp.Symbol("v_size", positive=True)
 """Size of the velocity in the records; in start values only."""
+time_size = sp.Symbol("time_size", positive=True)
+"""Reciprocal of the angular frequency of the motion [s]; in start values only."""
 
 
 class positive_part(sp.Function):  # type: ignore[misc]  # noqa: N801

@@ -83,7 +83,9 @@ class EffectRegression:
 
     def start(self, effect: Effect) -> dict[str, float] | None:
         """Return values of rig and effect parameters to start from, None where the effect has no signal of its own."""
-        if effect.states or effect.delay is not None or effect.spring is not None:
+        if effect.states or effect.spring is not None:
+            return None
+        if effect.torque is None and effect.deflection is None and effect.drive is None:
             return None
         fitted = [p for p in effect.parameters if p.fitted]
         linear = [p for p in fitted if effect.torque is not None and _is_linear(effect.torque, p)]

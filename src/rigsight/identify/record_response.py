@@ -75,7 +75,7 @@ def record_response(
     resolution: float | None = None,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
-    keep_doubtful: bool = False,
+    least_clearness: float = _CLEAR,
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -96,8 +96,8 @@ def record_response(
         How the source goes on between its samples, see `rigsight.frequency.hold_response`.
     band
         Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
-    keep_doubtful
-        Keep lines of a local method that do not stand out of their uncertainty: in a simulation there is no noise to drown in.
+    least_clearness
+        Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
 
     Raises
     ------
@@ -123,8 +123,7 @@ def record_response(
             periodic, source, response, bandwidth=bandwidth, transient=periodic is record, hold=hold
         )
         width, shared = line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
-        if not keep_doubtful:
-            found = _clear(found, lines)
+        found = _clear(found, lines, least_clearness)
     if note:
         found = replace(found, method=f"{found.method}, {note}")
     if band is not None:
@@ -164,14 +163,14 @@ def _thesis(record: Record, source: str, response: str, order: Order) -> Frequen
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 
-def _clear(found: FrequencyResponse, lines: int) -> FrequencyResponse:
+def _clear(found: FrequencyResponse, lines: int, least: float) -> FrequencyResponse:
     """Keep the lines between the outermost local bands in which most stand clearly out of their uncertainty.
 
     Single lines seem clear by chance, most of all where the begin of a sweep cannot be told from a transient.
     """
     assert found.variance is not None
-    clear = np.abs(found.values) ** 2 > _CLEAR * found.variance
-    if clear.size <= lines:
+    clear = np.abs(found.values) ** 2 > least * found.variance
+    if clear.size <= lines or least == 0.0:
         return found
     share = np.convolve(
         np.pad(clear.astype(np.float64), lines // 2, mode="edge"), np.ones(lines) / lines, "valid"

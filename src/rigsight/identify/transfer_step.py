@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.errors import InputError, check_option
-from rigsight.identify.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.covariance import propagated_covariance
+from rigsight.identify.step_residuals import step_covariance
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.identify.transfer_form import Order, TransferForm
 from rigsight.records.record import Hold, Record
@@ -82,7 +83,9 @@ def fit_step(
     natural, chain = form.natural(best.x[:-1])
     values, chain = np.append(natural, best.x[-1]), np.append(chain, 1.0)
     residual = problem.residual(best.x)
-    covariance = colored_covariance([(residual, problem.slopes(best.x, upper))], best.x.size)
+    shaped = dict(zip(form.names, natural, strict=True))
+    slopes = problem.slopes(best.x, upper)
+    covariance = step_covariance(residual, slopes, problem.dt, shaped["omega_b"], shaped.get("zeta"))
     covariance = propagated_covariance(covariance, np.diag(chain))
     names = (*form.names, "offset")
     errors = np.sqrt(np.diag(covariance))

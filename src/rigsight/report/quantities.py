@@ -5,9 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rigsight.compare import Column
+from rigsight.compare.score import Quantity
 from rigsight.diagnose.result import Estimate
 
 UNDETERMINED = "not determined by these records"
+_QUANTITY_LABELS: dict[Quantity, str] = {
+    "magnitude_rmse": "magnitude [{unit}]",
+    "phase_rmse": "phase [{unit}]",
+    "magnitude_db": "magnitude [dB]",
+    "step_rmse": "step [{unit}]",
+    "free_run_nrmse": "free run, NRMSE",
+}
 
 
 @dataclass(frozen=True)
@@ -62,3 +71,15 @@ def gap_percent(value: float) -> str:
         return "not finite"
     # Above 1000 % the model has left the record, and digits mean nothing.
     return f"{100.0 * value:.3g} %" if value < 10.0 else f"{100.0 * value:.1e} %"
+
+
+def column_label(column: Column) -> str:
+    """Return what a column of a comparison holds, in ASCII: ``"u -> psi, phase [rad]"``."""
+    return f"{column.signal}, {_QUANTITY_LABELS[column.quantity].format(unit=column.unit)}"
+
+
+def error_text(value: float | None, quantity: Quantity) -> str:
+    """Return an error with three digits; an NRMSE in percent; a dash where there is none."""
+    if value is None:
+        return "-"
+    return gap_percent(value) if quantity == "free_run_nrmse" else f"{value:.3g}"

@@ -41,42 +41,51 @@ def render_report(
     seed
         Seed of everything random; None where nothing was.
     """
-    environment = Environment(
+    return (
+        environment()
+        .get_template("report.html.jinja")
+        .render(
+            diagnosis=diagnosis,
+            verdict_name=verdict_name(diagnosis),
+            verdict_sentence=verdict_sentence(diagnosis),
+            ambiguity_sentence=ambiguity_sentence(diagnosis),
+            basis_sentence=basis_sentence(diagnosis),
+            after_label=sentence_case(after_label(diagnosis)),
+            rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
+            effects=sections.effect_summaries(diagnosis),
+            left=[times_floor(excess(diagnosis, stage)) for stage in ("before", "reidentified", "after")],
+            probability=next(
+                (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
+            )
+            if diagnosis.effects
+            else "",
+            budget=sections.budget_figure(diagnosis),
+            budget_rows=sections.budget_rows(diagnosis),
+            ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
+            ranking_rows=sections.ranking_rows(diagnosis),
+            outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
+            parameters=sections.parameter_rows(diagnosis),
+            records=list(sections.record_views(diagnosis)),
+            floors=sections.floor_rows(diagnosis),
+            command=command,
+            versions=versions,
+            seed=seed,
+            made=datetime.now(UTC),
+        )
+    )
+
+
+def environment() -> Environment:
+    """Return what all pages are rendered with."""
+    made = Environment(
         loader=PackageLoader("rigsight.report"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
     )
-    environment.filters |= {"unit": _unit, "number": _number}
-    return environment.get_template("report.html.jinja").render(
-        diagnosis=diagnosis,
-        verdict_name=verdict_name(diagnosis),
-        verdict_sentence=verdict_sentence(diagnosis),
-        ambiguity_sentence=ambiguity_sentence(diagnosis),
-        basis_sentence=basis_sentence(diagnosis),
-        after_label=sentence_case(after_label(diagnosis)),
-        rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
-        effects=sections.effect_summaries(diagnosis),
-        left=[times_floor(excess(diagnosis, stage)) for stage in ("before", "reidentified", "after")],
-        probability=next(
-            (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
-        )
-        if diagnosis.effects
-        else "",
-        budget=sections.budget_figure(diagnosis),
-        budget_rows=sections.budget_rows(diagnosis),
-        ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
-        ranking_rows=sections.ranking_rows(diagnosis),
-        outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
-        parameters=sections.parameter_rows(diagnosis),
-        records=list(sections.record_views(diagnosis)),
-        floors=sections.floor_rows(diagnosis),
-        command=command,
-        versions=versions,
-        seed=seed,
-        made=datetime.now(UTC),
-    )
+    made.filters |= {"unit": _unit, "number": _number}
+    return made
 
 
 def _unit(unit: str) -> Markup:

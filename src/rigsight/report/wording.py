@@ -10,7 +10,7 @@ from rigsight.diagnose.verdict import AT_FLOOR
 
 TIMES = "\u00d7"
 _WITHOUT_EFFECT = "no effect, better numbers"
-_PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck"}
+_PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
 _PLACES = {
     "actuator": "at the actuator",
     "sensor": "at the sensor",

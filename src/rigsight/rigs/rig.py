@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -48,6 +48,31 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Lateral:
+    """The lateral displacement that rolling makes of the motion: ``y' = gain * creepage``.
+
+    Attributes
+    ----------
+    symbol
+        Symbol of the state.
+    displacement
+        The state from its rest.
+    creepage
+        What drives it: the motion less what the displacement itself turns back.
+    gain
+        Rate per creepage.
+    feedback
+        Creepage that a unit of displacement takes away.
+    """
+
+    symbol: sp.Symbol
+    displacement: sp.Expr
+    creepage: sp.Expr
+    gain: sp.Expr
+    feedback: sp.Expr
+
+
+@dataclass(frozen=True)
 class Rig:
     """A rig as a declaration.
 
@@ -67,8 +92,8 @@ class Rig:
         Accepted in a campaign instead of one of `parameters`, see `from_alternative`.
     motion
         The degree of freedom on which dynamics effects act.
-    downstream
-        Further states driven by the motion, with their rates (the lateral displacement).
+    lateral
+        The lateral displacement that the motion drives, if the rig has one.
     units
         Unit of each base quantity: x, force, input, time, and others that its dimensions use.
     dynamics_name
@@ -84,13 +109,18 @@ class Rig:
     motion: Motion
     units: dict[str, str]
     alternative_parameters: tuple[Parameter, ...] = ()
-    downstream: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    lateral: Lateral | None = None
     dynamics_name: str = "dynamics"
 
     @property
     def is_driven(self) -> bool:
         """True if an input moves a mass, False if the motion is prescribed."""
         return self.motion.inertia is not None
+
+    @property
+    def downstream(self) -> dict[sp.Symbol, sp.Expr]:
+        """Further states driven by the motion, with their rates without effects."""
+        return {} if self.lateral is None else {self.lateral.symbol: self.lateral.gain * self.lateral.creepage}
 
     @property
     def downstream_parameters(self) -> frozenset[str]:
@@ -115,7 +145,7 @@ class Rig:
     def offers(self, effect: Effect) -> bool:
         """Return True if the effect makes sense on this rig."""
         if effect.place is Place.LATERAL_DYNAMICS:
-            return bool(self.downstream)
+            return self.lateral is not None
         if self.is_driven:
             return True
         return effect.place is Place.DYNAMICS and not effect.needs_inertia

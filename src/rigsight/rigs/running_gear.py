@@ -1,7 +1,7 @@
 """The 1:5 railway running gear: motor current -> yaw angle (PT2) -> lateral displacement (PT1).
 
 ``J_z psi'' = b k_tau / r_0 u - k_c (psi - psi_off) - k_d psi'``
-``y' = v c_y (psi - psi_off) - v c_y / (2 l_0) (y - y_off - 2 l_0 psi_off)``
+``y' = v c_y (psi - psi_off) - v c_y / (2 l_0) (y - y_off - 2 l_0 psi_off) = v c_y (psi - (y - y_off) / (2 l_0))``
 
 Source: thesis, equations (2.11) to (2.25); the damping term is the one of the state matrix, ``2 D omega_0 psi'``
 (equations 2.17 and 2.18 print omega_0 squared by mistake).
@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from rigsight.errors import InputError
 from rigsight.parameters import Parameter
-from rigsight.rigs.rig import Motion, Rig, Signal
+from rigsight.rigs.rig import Lateral, Motion, Rig, Signal
 
 psi, w, y = sp.symbols("psi w y", real=True)
 speed, r_0, b, k_tau = sp.symbols("v r_0 b k_tau", positive=True)
@@ -80,7 +80,13 @@ RUNNING_GEAR = Rig(
         bias=sp.Integer(0),
         inertia=J_z,
     ),
-    downstream={y: speed * c_y * (psi - psi_off) - speed * c_y / (2 * l_0) * (y - y_off - 2 * l_0 * psi_off)},
+    lateral=Lateral(
+        symbol=y,
+        displacement=y - y_off,
+        creepage=psi - (y - y_off) / (2 * l_0),
+        gain=speed * c_y,
+        feedback=1 / (2 * l_0),
+    ),
     units={"x": "rad", "force": "N m", "input": "A", "time": "s", "length": "m"},
     dynamics_name="yaw_dynamics",
 )

@@ -61,7 +61,7 @@ class _Writer:
             list(self.frozen.switches),
             list(self.frozen.outputs),
             self._padded(self._live(structure)),
-            list(structure.outputs),
+            list(structure.computed_outputs),
             [equation.limit for equation in structure.equations if equation.limit is not None],
         ]
         delay = [structure.delay if structure.delay is not None else sp.Integer(0)]

@@ -50,7 +50,7 @@ class FrozenStructure:
 def freeze(structure: Structure) -> FrozenStructure:
     """Replace every Abs, sign and positive part in a structure's equations by a mode symbol."""
     constant = set(structure.parameter_symbols)
-    expressions = [*(state.limited_rate for state in structure.equations), *structure.outputs]
+    expressions = [*(state.limited_rate for state in structure.equations), *structure.computed_outputs]
     modes: dict[sp.Expr, sp.Symbol] = {}
     while True:
         kink = _innermost_kink(expressions, constant)

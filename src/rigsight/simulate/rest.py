@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.effects import Place
 from rigsight.simulate.input_hold import HeldInput, hold_input
 from rigsight.simulate.kernel_cache import run_kernel
 from rigsight.simulate.structure import Structure
@@ -82,6 +83,11 @@ def _quiet_parameters(
                 name = structure.parameter_name(effect, own_name)
                 if name in structure.names:
                     quiet[structure.names.index(name)] = null
+        if effect.place is Place.DISTURBANCE:
+            for parameter in effect.parameters:
+                name = structure.parameter_name(effect, parameter.name)
+                if name in structure.names:
+                    quiet[structure.names.index(name)] = 0.0
     return quiet
 
 
@@ -100,7 +106,7 @@ def _settled(
     for wait in range(_WAITS):
         before = state.copy()
         held = hold_input(samples, interval, "foh")
-        out = np.zeros((samples.size, len(structure.outputs)))
+        out = np.zeros((samples.size, len(structure.computed_outputs)))
         status = run_kernel(
             structure, "simulate_one", held.coefficients, interval, 1, True, 0.0, p, state, _TOLERANCE, out
         )

@@ -15,6 +15,7 @@ from rigsight.simulate.kernel_cache import run_kernel
 from rigsight.simulate.kernel_source import LANES
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
+from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.structure import Structure, without_vanished_effects
 
 DEFAULT_ACCURACY = 1e-6
@@ -129,7 +130,7 @@ def simulate_outputs(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    out = np.zeros((n_samples, len(structure.outputs)))
+    out = np.zeros((n_samples, len(structure.computed_outputs)))
     status = run_kernel(
         structure,
         "simulate_one",
@@ -146,7 +147,7 @@ def simulate_outputs(
     if status != 0:
         effects = ", ".join(structure.effect_names) or "no effect"
         raise SimulationError(f"Simulation of {structure.rig.name} with {effects}: {_REASONS[status]}.")
-    return out
+    return as_measured(structure, p[:, None], out[:, :, None], held)[:, :, 0]
 
 
 def simulate_sets(
@@ -182,7 +183,7 @@ def simulate_sets(
     n_states = max(1, len(structure.states))
     # The last block is filled up with copies of the last set; what they give is cut off.
     n_padded = -(-n_sets // LANES) * LANES
-    out = np.empty((n_samples, len(structure.outputs), n_padded))
+    out = np.empty((n_samples, len(structure.computed_outputs), n_padded))
     for start in range(0, n_padded, LANES):
         lanes = np.minimum(np.arange(start, start + LANES), n_sets - 1)
         state = np.zeros((n_states, LANES))
@@ -200,7 +201,7 @@ def simulate_sets(
             out,
             start,
         )
-    return out[:, :, :n_sets]
+    return as_measured(structure, p, out[:, :, :n_sets], held)
 
 
 def choose_substeps(

@@ -1,6 +1,6 @@
 """Which equations a rig with a tuple of effects has: states, rates, outputs and delay as symbols.
 
-The signal path is ``input -> delay -> static drive effects -> lags -> drive -> dynamics -> downstream states``.
+The signal path is ``input -> delay -> static drive effects -> lags -> drive -> dynamics -> lateral displacement -> sensors``.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ class Structure:
         The rig's outputs as expressions.
     delay
         Time by which the input arrives late, or None.
+    measured_late
+        Time by which the first output is measured late, or None.
     velocity_index
         Index of the velocity of the moving mass among the states, None where the motion is prescribed.
     """
@@ -69,12 +71,22 @@ class Structure:
     equations: tuple[StateEquation, ...]
     outputs: tuple[sp.Expr, ...]
     delay: sp.Expr | None
+    measured_late: sp.Expr | None
     velocity_index: int | None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Parameter names in order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def computed_outputs(self) -> tuple[sp.Expr, ...]:
+        """The outputs, and behind them the rate of the first where it is measured late: it is interpolated with it."""
+        if self.measured_late is None:
+            return self.outputs
+        reading = self.outputs[0]
+        rate = sum((sp.diff(reading, s.symbol) * s.rate for s in self.equations), start=sp.Integer(0))
+        return (*self.outputs, rate)
 
     @property
     def states(self) -> tuple[sp.Symbol, ...]:
@@ -173,13 +185,15 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
         states = [
             StateEquation(motion.displacement, motion.velocity, "x"),
             StateEquation(motion.velocity, acceleration, "x time^-1"),
-            *(StateEquation(symbol, binder.rig(rate), "length") for symbol, rate in rig.downstream.items()),
+            *_lateral(binder, effects, rig),
             *memories,
             *lags,
         ]
-        outputs = (motion.displacement, *rig.downstream)
+        reading, late, sensors = _sensor(binder, effects, motion.displacement)
+        states += sensors
+        outputs = (reading, *rig.downstream)
     else:
-        states = list(memories)
+        states, late = list(memories), None
         outputs = (resisting + binder.rig(motion.bias),)
     return Structure(
         rig=rig,
@@ -190,6 +204,7 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
         equations=tuple(states),
         outputs=outputs,
         delay=delay,
+        measured_late=late,
         velocity_index=1 if rig.is_driven else None,
     )
 
@@ -331,6 +346,42 @@ def _spring(binder: _Binder, effects: tuple[Effect, ...]) -> tuple[sp.Expr, list
             torque = binder.effect(effect, effect.spring, **signals)
             memories += binder.states(effect, **signals)
     return torque, memories
+
+
+def _lateral(binder: _Binder, effects: tuple[Effect, ...], rig: Rig) -> list[StateEquation]:
+    """Return the lateral displacement that the motion drives, if the rig has one."""
+    if rig.lateral is None:
+        return []
+    signals = {
+        "creepage": binder.rig(rig.lateral.creepage),
+        "creep_gain": binder.rig(rig.lateral.gain),
+        "lateral_displacement": binder.rig(rig.lateral.displacement),
+        "lateral_feedback": binder.rig(rig.lateral.feedback),
+    }
+    linear = signals["creep_gain"] * signals["creepage"]
+    # Each effect gives the whole rate; two of them add up what each takes off the linear one.
+    rate = linear + sum(
+        (binder.effect(e, e.lateral, **signals) - linear for e in effects if e.lateral is not None),
+        start=sp.Integer(0),
+    )
+    return [StateEquation(rig.lateral.symbol, rate, "length")]
+
+
+def _sensor(
+    binder: _Binder, effects: tuple[Effect, ...], displacement: sp.Symbol
+) -> tuple[sp.Expr, sp.Expr | None, list[StateEquation]]:
+    """Chain the sensor effects; returns what is read, by how much it is late, and the sensors' states."""
+    reading: sp.Expr = displacement
+    late: sp.Expr | None = None
+    states: list[StateEquation] = []
+    for effect in effects:
+        if effect.measured is not None:
+            states += binder.states(effect, reading=reading)
+            reading = binder.effect(effect, effect.measured, reading=reading)
+        if effect.measured_late is not None:
+            own = binder.effect(effect, effect.measured_late)
+            late = own if late is None else late + own
+    return reading, late, states
 
 
 def without_vanished_effects(

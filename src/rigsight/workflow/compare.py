@@ -16,9 +16,8 @@ from rigsight.diagnose.windows import cut, window_length
 from rigsight.errors import InputError, check_option
 from rigsight.identify.record_response import METHODS, Method
 from rigsight.plot import svg_text
-from rigsight.report import render_comparison
+from rigsight.report import comparison_figures, render_comparison
 from rigsight.workflow.campaign import Campaign, read_campaign
-from rigsight.workflow.compare_figures import comparison_figures
 from rigsight.workflow.compare_files import comparison_csv, comparison_json
 from rigsight.workflow.diagnose import versions
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
@@ -72,13 +71,16 @@ def run_compare(
     if not (math.isfinite(step_seconds) and step_seconds > 0.0):
         raise InputError(f"The step window must last a positive number of seconds, got {step_seconds!r}.")
     if not models:
-        raise InputError(f"Name at least one model: a {MODEL_FILE}, a folder that holds one, or a published set.")
+        raise InputError(
+            f"Name at least one model: a {MODEL_FILE}, a folder that holds one, or a published set."
+        )
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
     read = read_campaign(campaign)
     competitors = _competitors(models, read)
-    prepare_kernels(list(dict.fromkeys(c.model.structure for c in competitors)), jobs, listener)
+    structures = {c.model.structure.effect_names: c.model.structure for c in competitors}
+    prepare_kernels(list(structures.values()), jobs, listener)
     comparison = compare_campaign(read, competitors, cast("Method", method), step_seconds, jobs, listener)
     if not comparison.scores:
         reasons = "\n".join(f"- {f.model} on '{f.record}': {f.reason}" for f in comparison.failures[:10])

@@ -1,0 +1,99 @@
+"""Which numbers of all comparisons stand in one small table, and what do they say?"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+Errors = dict[tuple[str, str], dict[str, float]]
+"""(signal, quantity) -> record -> error."""
+
+_LABELS = {"identify": "linear", "calibrate": "Bouc-Wen", "discover": "discovered"}
+_SHOWN = {
+    ("u -> psi", "magnitude_db"): ("Magnitude u -> psi: RMS error in dB on sweeps", "sweep", "{:.2f}", 1.0),
+    ("u -> psi", "phase_rmse"): ("Phase u -> psi: RMSE (5.1) in rad on sweeps", "sweep", "{:.2f}", 1.0),
+    ("u -> psi", "magnitude_rmse"): (
+        "Magnitude u -> psi: RMSE (5.1) in 1e-3 rad/A on sweeps",
+        "sweep",
+        "{:.2f}",
+        1e3,
+    ),
+    ("psi", "step_rmse"): ("Step, psi: RMSE in 1e-3 rad over 4 s", "step", "{:.3f}", 1e3),
+    ("psi", "free_run_nrmse"): ("Free run, psi: NRMSE in % on sweeps", "sweep", "{:.0f}", 100.0),
+}
+
+
+def read_errors(out: Path, configs: Mapping[str, float]) -> tuple[dict[str, Errors], Errors]:
+    """Return the errors by model, and the noise floors, from all comparisons that are finished."""
+    models: dict[str, Errors] = {}
+    floors: Errors = {}
+    for config in configs:
+        file = out / config / "compare" / "comparison.csv"
+        if not file.is_file():
+            continue
+        with file.open(encoding="utf-8", newline="") as stream:
+            for row in csv.DictReader(stream):
+                if not row["value"]:
+                    continue
+                label = row["model"]
+                if label in _LABELS:
+                    label = f"{_LABELS[label]}, {config.replace('_', ' ')}"
+                key = (row["signal"], row["quantity"])
+                models.setdefault(label, {}).setdefault(key, {})[row["record"]] = float(row["value"])
+                if row["noise_floor"]:
+                    floors.setdefault(key, {})[row["record"]] = float(row["noise_floor"])
+    return models, floors
+
+
+def summary_text(out: Path, configs: Mapping[str, float]) -> str:
+    """Return the tables as Markdown, best of each column in bold; the truth itself stands below the line."""
+    models, floors = read_errors(out, configs)
+    if not models:
+        return "Nothing was compared.\n"
+    blocks = ["\n".join(_table(models, floors, key)) for key in _SHOWN]
+    return "\n\n".join([*blocks, *_sentences(models)]) + "\n"
+
+
+def _table(models: Mapping[str, Errors], floors: Errors, key: tuple[str, str]) -> Iterator[str]:
+    title, kind, form, factor = _SHOWN[key]
+    records = sorted({r for errors in models.values() for r in errors.get(key, {}) if r.startswith(kind)})
+    heads = [record.removeprefix(f"{kind}_").replace("A", " A") for record in records]
+    yield f"**{title}**\n"
+    yield f"| model | {' | '.join(heads)} |"
+    yield f"|---{'|---:' * len(heads)}|"
+    rivals = [name for name in models if name != "iwan_tables"]
+    best = {
+        r: min((models[n][key][r] for n in rivals if r in models[n].get(key, {})), default=0.0)
+        for r in records
+    }
+    for name in [*rivals, *(n for n in models if n == "iwan_tables")]:
+        errors = models[name].get(key, {})
+        cells = [form.format(factor * errors[r]) if r in errors else "failed" for r in records]
+        bold = [
+            f"**{c}**" if name in rivals and errors.get(r) == best[r] else c
+            for r, c in zip(records, cells, strict=True)
+        ]
+        yield f"| {'iwan_tables (the truth)' if name == 'iwan_tables' else name} | {' | '.join(bold)} |"
+    known = floors.get(key, {})
+    yield f"| noise floor | {' | '.join(form.format(factor * known[r]) if r in known else '-' for r in records)} |"
+
+
+def _sentences(models: Mapping[str, Errors]) -> Iterator[str]:
+    """Say where the joint discovered model is beaten: by the joint linear one, or by a set of the thesis."""
+    joint = next((name for name in ("discovered, joint", "Bouc-Wen, joint") if name in models), None)
+    if joint is None:
+        return
+    for rival in ("linear, joint", "identified", "hysteresis_r", "hysteresis_b", "hysteresis_p"):
+        lost = [
+            f"{_SHOWN[key][0].split(':')[0]} on {record}"
+            for key in _SHOWN
+            for record, error in models[joint].get(key, {}).items()
+            if record.startswith(_SHOWN[key][1])
+            and error >= models.get(rival, {}).get(key, {}).get(record, float("inf"))
+        ]
+        yield (
+            f"- '{joint}' beats '{rival}' everywhere."
+            if not lost
+            else f"- '{rival}' is better than '{joint}' in: {'; '.join(lost)}."
+        )

@@ -1,0 +1,427 @@
+"""The whole discovery: records and a rig -> library, sparse regression, held-out selection, polished equations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.discover.doubts import doubts, warnings_of
+from rigsight.discover.equations import equations
+from rigsight.discover.hysteresis import LOOP, ForceEquation, force_equation
+from rigsight.discover.library import Candidate, candidates, offered_effects, torque_along
+from rigsight.discover.motion import Motion, motion_of
+from rigsight.discover.regression import Projected, alike, inclusion_probabilities
+from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
+from rigsight.discover.selection import STRONG, Bench, Selection, Trial, criterion, select
+from rigsight.discover.weak_form import Rows
+from rigsight.errors import InputError, SimulationError
+from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate.model import Model
+
+Method = Literal["full", "discrepancy"]
+METHODS: tuple[Method, ...] = ("discrepancy", "full")
+_WINDOW = 0.75
+"""Width of a test function in natural periods: long enough to average the noise, short enough to see the motion bend."""
+_LEAST_SAMPLES = 200
+_HELD_BACK = 0.3
+_SAME_COLUMN = 0.999
+_FINAL_EVALUATIONS = 150
+_ENSEMBLE_TERMS = 8
+_MOST_POINTS = 20_000
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be discovered.
+
+    Attributes
+    ----------
+    title
+        For people.
+    rig
+        The rig.
+    constants
+        Every constant of the rig.
+    given
+        Parameters of the rig that were given; the discrepancy form starts from them.
+    records
+        Estimation and validation records, cut into windows where the rig drifts.
+    noise
+        Noise floor of each output.
+    no_spring
+        True for an axis that has none.
+    """
+
+    title: str
+    rig: Rig
+    constants: Mapping[str, float]
+    given: Mapping[str, float]
+    records: tuple[Record, ...]
+    noise: Mapping[str, float]
+    no_spring: bool = False
+
+
+def discover(
+    task: Task,
+    method: Method = "discrepancy",
+    pointwise: bool = False,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Discovery:
+    """Discover the governing equations behind records.
+
+    Parameters
+    ----------
+    task
+        Records and rig.
+    method
+        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term.
+        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed.
+    pointwise
+        Regress sample by sample instead of in the weak form.
+    seed
+        Seed of the ensembles.
+    progress
+        Called with a short text when a stage or support is done.
+
+    Raises
+    ------
+    InputError
+        If there is no estimation record, one is too short, or none moves the rig.
+    SimulationError
+        If the rig's own equations cannot be simulated near the records.
+    """
+    say = progress or (lambda _: None)
+    rng = np.random.default_rng(seed)
+    estimation, held_out, how = _split(task)
+    values = _linear_values(task, estimation)
+    scales = characteristic_scales(task.rig, estimation, values)
+    output = task.rig.outputs[0].name
+    motions = [motion_of(task.rig, record, values, task.noise[output]) for record in estimation]
+    say("motion smoothed")
+    rows = _rows(pointwise, scales["time"], motions)
+    projected = _projected(task, motions, rows)
+    library = _library(task, motions, rows, projected, scales)
+    library, same = _distinct(library, projected)
+    say("library")
+    bench = Bench(
+        rig=task.rig,
+        estimation=tuple(_without_downstream(task.rig, record) for record in estimation),
+        held_out=tuple(_without_downstream(task.rig, record) for record in held_out),
+        values=values,
+        scales=scales,
+        noise=task.noise,
+        held=_held(task),
+        candidates={candidate.name: candidate for candidate in library},
+        projected=projected,
+        own_terms=_own_terms(task, projected) if method == "full" else {},
+    )
+    selection = select(bench, say)
+    if not math.isfinite(selection.best.excess):
+        raise SimulationError(
+            f"The equations of {task.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
+        )
+    chosen = _released(bench, selection, say)
+    final = _polished(task, bench, chosen)
+    say("polished")
+    inclusion = _inclusion(bench, selection, rng)
+    force = _force_equation(bench, final, motions, rows, rng)
+    say("ensembles")
+    found = _Found(estimation, held_out, how, selection, chosen, final, inclusion, force, same, motions)
+    return _assembled(task, method, pointwise, bench, found)
+
+
+def _split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
+    """Return the records to fit, those to score, and in words how the latter were found."""
+    estimation = tuple(r for r in task.records if r.role == "estimation")
+    validation = tuple(r for r in task.records if r.role == "validation")
+    if not estimation:
+        raise InputError('A discovery needs at least one record with role = "estimation".')
+    for record in estimation:
+        if record.n_samples < _LEAST_SAMPLES:
+            raise InputError(
+                f"Record '{record.name}' has {record.n_samples} samples; a discovery needs at least {_LEAST_SAMPLES} in each."
+            )
+    if validation:
+        return estimation, validation, ""
+    if len(estimation) > 1:
+        middle = sorted(estimation, key=lambda r: float(np.std(r[task.rig.inputs[0].name])))[len(estimation) // 2]
+        rest = tuple(record for record in estimation if record is not middle)
+        return rest, (middle,), f"No record is for validation; '{middle.name}' was set aside to choose the terms."
+    cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
+    return (
+        (estimation[0].slice(0, cut),),
+        (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
+        "There is a single record; its last part was set aside to choose the terms, which judges no other amplitude.",
+    )
+
+
+def _linear_values(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
+    known = {"k": 0.0} if task.no_spring else {}
+    return {**task.constants, **linear_start(task.rig, estimation, task.constants, known)}
+
+
+def _held(task: Task) -> frozenset[str]:
+    """Return what no fit moves while terms are chosen: what the motion knows nothing of, and one of two rests."""
+    motion = task.rig.motion
+    held = set(task.rig.downstream_parameters)
+    if task.rig.is_driven:
+        # A linear spring cannot tell a constant force from a shifted rest position.
+        rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
+        held |= {symbol.name for symbol in (rest if task.no_spring else bias)}
+    if task.no_spring:
+        held.add(motion.stiffness.name)
+    return frozenset(held)
+
+
+def _without_downstream(rig: Rig, record: Record) -> Record:
+    """Return a record without the outputs that the motion knows nothing of."""
+    keep = {rig.inputs[0].name, rig.outputs[0].name}
+    return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
+
+
+def _projected(task: Task, motions: Sequence[Motion], rows: Rows) -> Projected:
+    """Return the regression of acceleration (or force) on the rig's own terms."""
+    order = 2 if task.rig.is_driven else 0
+    blocks, targets = [], []
+    for motion in motions:
+        velocity, displacement = rows.velocity(motion), rows.of(motion.x)
+        one = np.ones_like(displacement)
+        if not task.rig.is_driven:
+            blocks.append(np.column_stack([velocity, displacement, one]))
+            targets.append(rows.of(motion.measured))
+            continue
+        drive = rows.of(motion.u)
+        own = (drive, -velocity, one) if task.no_spring else (drive, -velocity, -displacement, one)
+        blocks.append(np.column_stack(own))
+        targets.append(rows.acceleration(motion))
+    target = np.concatenate(targets)
+    independent = max(target.size * rows.independent_share(order), 10.0)
+    return Projected(np.concatenate(blocks), target, independent)
+
+
+def _library(
+    task: Task, motions: Sequence[Motion], rows: Rows, projected: Projected, scales: Mapping[str, float]
+) -> list[Candidate]:
+    effects = offered_effects(task.rig, not task.no_spring)
+    found = candidates(effects, motions, rows, projected, scales, task.rig.is_driven)
+    return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
+
+
+def _distinct(library: Sequence[Candidate], projected: Projected) -> tuple[list[Candidate], dict[str, list[str]]]:
+    """Leave out terms that these records cannot tell from an earlier one; return the rest, and who stands for whom."""
+    if not library:
+        return [], {}
+    columns = np.column_stack([candidate.column for candidate in library])
+    stands_for: dict[str, list[str]] = {}
+    dropped: set[int] = set()
+    for i, j, _ in alike(projected, columns, _SAME_COLUMN):
+        # A loop may turn into friction or damping, not the other way round: the simpler term stands for it.
+        first, second = (j, i) if library[i].name == LOOP else (i, j)
+        if first not in dropped and second not in dropped:
+            dropped.add(second)
+            stands_for.setdefault(library[first].name, []).append(library[second].name)
+    return [candidate for i, candidate in enumerate(library) if i not in dropped], stands_for
+
+
+def _rows(pointwise: bool, time: float, motions: Sequence[Motion]) -> Rows:
+    if pointwise:
+        return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
+    return Rows.weak(_WINDOW * 2.0 * np.pi * time, motions[0].dt)
+
+
+def _own_terms(task: Task, projected: Projected) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of the rig's damper and spring, which compete in the full form."""
+    motion = task.rig.motion
+    first = 1 if task.rig.is_driven else 0
+    own = {motion.damping.name: projected.base[:, first]}
+    if not task.no_spring:
+        own[motion.stiffness.name] = projected.base[:, first + 1]
+    return own
+
+
+def _released(bench: Bench, selection: Selection, say: Callable[[str], None]) -> Trial:
+    """Release what was held at a special value, and let the rig's damper go in the full form, where the records ask for it."""
+    chosen = selection.best
+
+    def better(trial: Trial, by: float) -> bool:
+        cost = criterion(trial, selection.independent)
+        return cost < criterion(chosen, selection.independent) - by
+
+    special = dict(chosen.fit.structure.fixed)
+    if special:
+        released = bench.trial(chosen.support, release=frozenset(special), start={**chosen.fit.values, **special})
+        say(f"{', '.join(sorted(special))} released")
+        if better(released, STRONG):
+            chosen = released
+    damping = bench.rig.motion.damping.name
+    if damping in bench.own_terms:
+        release = frozenset(special) - frozenset(dict(chosen.fit.structure.fixed))
+        without = bench.trial(
+            chosen.support, release=release, start={**chosen.fit.values, damping: 0.0}, left_out=frozenset({damping})
+        )
+        say(f"without {damping}")
+        if better(without, -STRONG):
+            chosen = without
+    return chosen
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What the stages of a discovery hand on."""
+
+    estimation: tuple[Record, ...]
+    held_out: tuple[Record, ...]
+    how: str
+    selection: Selection
+    chosen: Trial
+    final: FitResult
+    inclusion: Mapping[str, float]
+    force: ForceEquation | None
+    same: Mapping[str, list[str]]
+    motions: Sequence[Motion]
+
+
+def _polished(task: Task, bench: Bench, chosen: Trial) -> FitResult:
+    """Fit the chosen structure once more, all outputs and all records that may be fitted, to full precision."""
+    records = tuple(record for record in task.records if record.role == "estimation")
+    rig = task.rig
+    free = set(chosen.fit.free)
+    measured = {name for record in records for name in record.signals}
+    if any(symbol.name in measured for symbol in rig.downstream):
+        free |= rig.downstream_parameters
+    structure = chosen.fit.structure
+    fit = GreyBoxFit(structure, records, bench.scales, bench.noise).fit(
+        chosen.fit.values, [name for name in structure.names if name in free], max_evaluations=_FINAL_EVALUATIONS
+    )
+    if not math.isfinite(fit.cost):
+        raise SimulationError(f"The discovered equations cannot be fitted to all records: {fit.message}")
+    return fit
+
+
+def _inclusion(bench: Bench, selection: Selection, rng: np.random.Generator) -> dict[str, float]:
+    """Return the inclusion probability of the terms that came near the equation, and of the rig's own in the full form."""
+    names = list(bench.own_terms)
+    for trial in selection.trials:
+        names += [name for name in sorted(trial.support) if name not in names]
+    names = names[: _ENSEMBLE_TERMS + len(bench.own_terms)]
+    if not names:
+        return {}
+    columns = np.column_stack([bench.column(name) for name in names])
+    found = inclusion_probabilities(bench.sparse, columns, rng)
+    return dict(zip(names, map(float, found), strict=True))
+
+
+def _force_equation(
+    bench: Bench, final: FitResult, motions: Sequence[Motion], rows: Rows, rng: np.random.Generator
+) -> ForceEquation | None:
+    """Regress the equation of the hysteretic force that the polished model leaves as a residual of the measured motion."""
+    rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
+    loops = [effect for effect in final.structure.effects if effect.name == LOOP]
+    if not loops or not rig.is_driven:
+        return None
+    others = [e for e in final.structure.effects if e.name != LOOP]
+    if any(effect.torque is None for effect in others):
+        return None
+    motion = rig.motion
+
+    def number(expression: sp.Expr) -> float:
+        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
+
+    without_memory = values[final.structure.parameter_name(loops[0], "a")] * number(motion.stiffness)
+    shift = number(motion.rest) - bench.values[motion.rest.name]
+    forces = []
+    for own in motions:
+        force = number(motion.drive_gain) * own.u + number(motion.bias) - number(motion.inertia) * own.acceleration
+        force -= number(motion.damping) * own.v + without_memory * (own.x - shift)
+        for effect in others:
+            force -= torque_along(effect, final.structure.values_of(effect, values), own)
+        forces.append(force)
+    n = values[final.structure.parameter_name(loops[0], "n")]
+    return force_equation(motions, rows, forces, n, rng)
+
+
+def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found: _Found) -> Discovery:
+    rig, final, selection = task.rig, found.final, found.selection
+    output = rig.outputs[0].name
+    structure = final.structure
+    text, latex = equations(structure)
+    own = {p.name for p in rig.parameters}
+    units = {p.name: p.unit for p in structure.parameters}
+    coefficients = {
+        name: Coefficient(final.values[name], final.standard_errors[name], units[name]) for name in final.free
+    }
+    terms = _terms(bench, found, coefficients)
+    measured = np.concatenate([record[output] for record in found.held_out])
+    size = float(np.std(measured)) or 1.0
+    warnings = warnings_of(
+        task, found.estimation, found.how, selection, found.chosen, terms, found.same, found.force
+    )
+    return Discovery(
+        title=task.title,
+        rig=rig.name,
+        method=method,
+        form="pointwise" if pointwise else "weak",
+        equations=text,
+        latex=latex,
+        rig_parameters={name: c for name, c in coefficients.items() if name in own},
+        terms=terms,
+        alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
+        force_equation={} if found.force is None else dict(found.force.inclusion),
+        held_out=tuple(record.name for record in found.held_out),
+        held_out_error=found.chosen.excess,
+        held_out_nrmse=found.chosen.excess * task.noise[output] / size,
+        noise_floor=task.noise[output] / size,
+        independent=selection.independent,
+        runs=_runs(bench, found, output),
+        output=output,
+        unit=rig.outputs[0].unit,
+        model=Model.of(structure, final.values, found.estimation[0].hold).to_json(),
+        warnings=warnings,
+    )
+
+
+def _terms(bench: Bench, found: _Found, coefficients: Mapping[str, Coefficient]) -> tuple[Term, ...]:
+    structure = found.final.structure
+    kept = {effect.name for effect in structure.effects}
+    terms = []
+    for name in bench.own_terms:
+        stays = name in coefficients
+        own = {name: coefficients[name]} if stays else {}
+        terms.append(Term(name, "The rig's own.", stays, found.inclusion.get(name, 0.0), own))
+    for effect in structure.effects:
+        names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
+        own = {name: coefficients[name] for name in names if name in coefficients}
+        terms.append(
+            Term(
+                effect.name, effect.summary, True, found.inclusion.get(effect.name, 0.0), own,
+                doubts(effect, own, found.inclusion.get(effect.name, 0.0), found.same.get(effect.name, [])),
+            )
+        )  # fmt: skip
+    rest = sorted(set(found.inclusion) - kept - set(bench.own_terms), key=lambda n: -found.inclusion[n])
+    terms += [Term(n, bench.candidates[n].effect.summary, False, found.inclusion[n], {}) for n in rest]
+    return tuple(terms)
+
+
+def _alternative(trial: Trial, selection: Selection) -> Alternative:
+    bic = criterion(trial, selection.independent)
+    aic = bic - trial.n_free * (math.log(selection.independent) - 2.0)
+    return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.excess, aic, bic)
+
+
+def _runs(bench: Bench, found: _Found, output: str) -> tuple[Run, ...]:
+    """Return the free runs of the chosen model on the held-out records."""
+    ends = np.cumsum([record.n_samples for record in found.held_out])
+    parts = np.split(found.chosen.residuals * bench.noise[output], ends[:-1])
+    return tuple(
+        Run(record.name, record.role, record.t, record[output], record[output] - error)
+        for record, error in zip(found.held_out, parts, strict=True)
+    )

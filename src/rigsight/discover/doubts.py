@@ -1,0 +1,122 @@
+"""What should a user know before using the equations? Doubts about a term, and about the records, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigsight.discover.hysteresis import LOOP, ForceEquation
+from rigsight.discover.result import Coefficient, Term
+from rigsight.discover.selection import STRONG, Selection, Trial, criterion
+from rigsight.effects import Effect
+from rigsight.records.record import Record
+
+if TYPE_CHECKING:
+    from rigsight.discover.discovery import Task
+
+_SURE = 0.9
+_ZERO = 3.0
+_VAGUE = 0.1
+_FLOOR = 1.5
+_FORCE_TERMS_OF = {"beta": "|x'| |F|^(n-1) F", "gamma": "x' |F|^n"}
+
+
+def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
+    """Return why a kept term is in doubt, empty where it is not.
+
+    Parameters
+    ----------
+    effect
+        The term.
+    own
+        Its coefficients.
+    inclusion
+        Its inclusion probability.
+    same
+        Terms that the records cannot tell from it.
+    """
+    found = []
+    for name, coefficient in own.items():
+        size = abs(coefficient.value)
+        if not math.isfinite(coefficient.std):
+            found.append(f"{name} is not determined by these records")
+        elif name not in effect.special_cases and coefficient.std > size / _ZERO:
+            found.append(f"{name} cannot be told from zero")
+        elif coefficient.std > _VAGUE * size:
+            found.append(f"{name} is known to {100.0 * coefficient.std / size:.0f} % only")
+    if inclusion < _SURE:
+        found.append(f"sparse regression takes it in {100.0 * inclusion:.0f} % of the draws")
+    if same:
+        found.append(f"{' and '.join(same)} would do as well on these records")
+    return "; ".join(found)
+
+
+def warnings_of(
+    task: Task,
+    estimation: Sequence[Record],
+    how: str,
+    selection: Selection,
+    chosen: Trial,
+    terms: Sequence[Term],
+    same: Mapping[str, Sequence[str]],
+    force: ForceEquation | None,
+) -> tuple[str, ...]:
+    """Return what a user should know, one sentence each."""
+    found = [how] if how else []
+    source = task.rig.inputs[0].name
+    sizes = [float(np.std(record[source])) for record in estimation]
+    if max(sizes) < 1.2 * min(sizes):
+        found.append(
+            "The records have one amplitude: a softening or hardening spring, friction and hysteresis look like other numbers "
+            "of a linear rig there. Add a record at half or twice the amplitude."
+        )
+    best = criterion(chosen, selection.independent)
+    rivals = [
+        trial
+        for trial in selection.trials
+        if trial.support != chosen.support
+        and criterion(trial, selection.independent) < best + STRONG
+        and trial.n_free <= chosen.n_free
+    ]
+    richer = [
+        trial
+        for trial in selection.trials
+        if trial.support > chosen.support and criterion(trial, selection.independent) < best
+    ]
+    if rivals:
+        listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in rivals[:3])
+        found.append(
+            f"The noise is too high, or the records too short, to decide the terms: as good is {listed}. "
+            "Add records of other amplitudes, or average repeated ones."
+        )
+    extra = sorted({name for trial in richer for name in trial.support - chosen.support})
+    if extra:
+        found.append(
+            f"In doubt: {', '.join(extra)}. With it the held-out error is lower, but not by enough to tell it from chance."
+        )
+    if chosen.excess > _FLOOR:
+        found.append(
+            f"The equations leave {chosen.excess:.1f} times the noise floor in free run on the held-out records: "
+            "something is still missing, or disturbances are larger than the floor says."
+        )
+    found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
+    found += [
+        f"The records cannot tell {', '.join(others)} from {name}; {name} stands for all of them."
+        for name, others in same.items()
+        if any(term.name == name and term.kept for term in terms)
+    ]
+    if force is not None:
+        blind = [
+            parameter
+            for parameter, term in _FORCE_TERMS_OF.items()
+            if force.inclusion.get(term, 0.0) < _SURE
+        ]
+        if blind:
+            found.append(
+                f"The regressed equation of the hysteretic force does not show {' and '.join(blind)} of {LOOP} for sure; "
+                f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
+            )
+    return tuple(found)

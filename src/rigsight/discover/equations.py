@@ -1,0 +1,98 @@
+"""How is a structure written as equations that people read? Plain text, and LaTeX."""
+
+from __future__ import annotations
+
+import sympy as sp
+from sympy.printing.latex import LatexPrinter
+from sympy.printing.str import StrPrinter
+
+from rigsight.simulate import Structure
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+
+
+class _Text(StrPrinter):  # type: ignore[misc]
+    def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
+        return str(super()._print_Pow(expr, rational=rational)).replace("**", "^")
+
+    def _print_Mul(self, expr: sp.Expr) -> str:  # noqa: N802
+        return str(super()._print_Mul(expr)).replace("*", " ")
+
+    def _print_Abs(self, expr: sp.Expr) -> str:  # noqa: N802
+        return f"|{self._print(expr.args[0])}|"
+
+    def _print_positive_part(self, expr: sp.Expr) -> str:
+        return f"max(0, {self._print(expr.args[0])})"
+
+
+def equations(structure: Structure) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the equations of motion of a structure as text and as LaTeX, one per dynamic state.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects; kinematic rows (x' = v) are left out.
+    """
+    plain, pretty = _names(structure)
+    rows = _rows(structure)
+    text = tuple(f"{left[0]} = {_Text().doprint(right.xreplace(plain))}" for left, right in rows)
+    printer = LatexPrinter({"symbol_names": pretty})
+    latex = tuple(
+        f"{left[1]} = {printer.doprint(right.xreplace({s: s for s in pretty}))}" for left, right in rows
+    )
+    return text, latex
+
+
+def _rows(structure: Structure) -> list[tuple[tuple[str, str], sp.Expr]]:
+    rig = structure.rig
+    own = {f"p_{p.name}": sp.Symbol(f"p_{p.name}", real=True) for p in structure.parameters}
+    if rig.motion.inertia is None:
+        rows = [((rig.outputs[0].name, rig.outputs[0].name), structure.outputs[0])]
+        first = 0
+    else:
+        name = rig.outputs[0].name
+        inertia = own[f"p_{rig.motion.inertia.name}"]
+        # The rate is a force divided by the inertia, and nothing else holds the inertia.
+        right = structure.equations[1].rate * inertia
+        left = (f"{rig.motion.inertia.name} {name}''", rf"{sp.latex(rig.motion.inertia)} \ddot{{{_tex(name)}}}")
+        rows = [(left, right)]
+        first = 2
+    for equation in structure.equations[first:]:
+        short = _state_name(structure, equation.symbol)
+        rows.append(((f"{short}'", rf"\dot{{{_tex(short)}}}"), equation.rate))
+    return rows
+
+
+def _state_name(structure: Structure, symbol: sp.Symbol) -> str:
+    """Return the state's own name without its effect's, where that is enough to know it."""
+    short = symbol.name.split(".")[-1]
+    same = [s for s in structure.states if s.name.split(".")[-1] == short]
+    return short if len(same) == 1 else symbol.name.replace(".", "_")
+
+
+def _names(structure: Structure) -> tuple[dict[sp.Symbol, sp.Symbol], dict[sp.Symbol, str]]:
+    """Return what symbols are called in text and in LaTeX."""
+    rig = structure.rig
+    plain: dict[sp.Symbol, str] = {TIME: "t"}
+    tex: dict[sp.Symbol, str] = {TIME: "t"}
+    displacement = rig.outputs[0].name if rig.is_driven else rig.inputs[0].name
+    source = rig.inputs[0].name
+    if rig.is_driven:
+        late = structure.delay is not None
+        plain |= {rig.motion.displacement: displacement, rig.motion.velocity: f"{displacement}'"}
+        tex |= {rig.motion.displacement: _tex(displacement), rig.motion.velocity: rf"\dot{{{_tex(displacement)}}}"}
+        plain[INPUT] = f"{source}(t - T_d)" if late else source
+        tex[INPUT] = rf"{source}(t - T_d)" if late else source
+    else:
+        plain |= {INPUT: displacement, INPUT_RATE: f"{displacement}'"}
+        tex |= {INPUT: _tex(displacement), INPUT_RATE: rf"\dot{{{_tex(displacement)}}}"}
+    for state in structure.states:
+        if state not in plain:
+            plain[state], tex[state] = _state_name(structure, state), _tex(_state_name(structure, state))
+    for parameter in structure.parameters:
+        symbol = sp.Symbol(f"p_{parameter.name}", real=True)
+        plain[symbol], tex[symbol] = parameter.name, _tex(parameter.name.split(".")[-1])
+    return {symbol: sp.Symbol(name, real=True) for symbol, name in plain.items()}, tex
+
+
+def _tex(name: str) -> str:
+    return str(sp.latex(sp.Symbol(name)))

@@ -1,0 +1,274 @@
+"""Which terms may the equation hold, and what is each along the measured motion?
+
+Every candidate comes from an effect's own declaration. Where its torque is linear in its parameters, those become
+coefficients; what stands inside (a clearance, a dead time, the shape of a loop) is found by variable projection: a grid
+outside, linear regression inside. Each effect then brings one column to the library, at its best inner values.
+"""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from rigsight.discover.hysteresis import LOOP, best_loop
+from rigsight.discover.monomials import MONOMIALS
+from rigsight.discover.motion import Motion
+from rigsight.discover.regression import Projected
+from rigsight.discover.weak_form import Rows
+from rigsight.effects import CATALOGUE, Effect
+from rigsight.effects import symbols as canonical
+from rigsight.effects.effect import Place
+from rigsight.parameters import Parameter
+from rigsight.rigs import Rig
+from rigsight.units import characteristic_value
+
+_GRID = 10
+_LEAST_SHARE = 0.02
+_MOST_SHARE = 3.0
+_LAG = "actuator_lag"
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect at its best inner values, as one column of the library.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    inner
+        Values of the parameters that stand inside the term.
+    linear
+        Share of each of the effect's linear parameters in the coefficient of the column; empty where it has none.
+    column
+        Rows of all records, shape (n_rows,).
+    """
+
+    effect: Effect
+    inner: Mapping[str, float]
+    linear: Mapping[str, float]
+    column: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+
+def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
+    """Return the effects that a regression can hold as terms on this rig.
+
+    A state has no signal of its own along a measured motion; loop and lag are the exceptions, because theirs follow from
+    motion and input.
+    """
+    changes_spring = [e for e in (*CATALOGUE, *MONOMIALS) if e.spring is not None or e.deflection is not None]
+    return [
+        effect
+        for effect in (*CATALOGUE, *MONOMIALS)
+        if rig.offers(effect)
+        and (has_spring or effect not in changes_spring)
+        and (effect.name in (LOOP, _LAG) or _is_static(effect))
+    ]
+
+
+def _is_static(effect: Effect) -> bool:
+    """Return True for a known signal of displacement, velocity and input: no state, no use of a torque it would change."""
+    known = (effect.torque, effect.deflection, effect.drive, effect.delay)
+    symbols = {canonical.x, canonical.v, canonical.u, *(sp.Symbol(p.name, real=True) for p in effect.parameters)}
+    return (
+        effect.place in (Place.ACTUATOR, Place.DYNAMICS)
+        and not effect.states
+        and effect.spring is None
+        and any(part is not None for part in known)
+        and all(part is None or part.free_symbols <= symbols for part in known)
+    )
+
+
+def candidates(
+    effects: Sequence[Effect],
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    driven: bool,
+) -> list[Candidate]:
+    """Return one candidate per effect, at the inner values that explain most of what the rig's own terms leave.
+
+    Parameters
+    ----------
+    effects
+        From `offered_effects`.
+    motions
+        Of all records.
+    rows
+        How signals become rows.
+    projected
+        The rig's own terms, projected out of every column.
+    scales
+        Size of each base quantity.
+    driven
+        True if the acceleration is regressed, false if the force is: a resisting force has the other sign there.
+    """
+    sign = -1.0 if driven else 1.0
+    plain = [effect for effect in effects if _is_plain(effect)]
+    found = []
+    for effect, column in zip(plain, _library_columns(plain, motions, rows, scales), strict=True):
+        found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
+    for effect in effects:
+        if effect in plain:
+            continue
+        best = (
+            _loop(effect, motions, rows, projected, scales, driven)
+            if effect.name == LOOP
+            else _best_inner(effect, motions, rows, projected, scales, sign)
+        )
+        if best is not None:
+            found.append(best)
+    return found
+
+
+def _loop(
+    effect: Effect,
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    driven: bool,
+) -> Candidate | None:
+    loop = best_loop(motions, rows, projected, scales["x"], driven)
+    return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
+
+
+def _best_inner(
+    effect: Effect,
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    sign: float,
+) -> Candidate | None:
+    best: Candidate | None = None
+    highest = 0.0
+    for inner, names, signals in _with_inner_values(effect, motions, scales):
+        parts = sign * np.column_stack(
+            [np.concatenate([rows.of(one) for one in part]) for part in zip(*signals, strict=True)]
+        )
+        weights, share = projected.explained(parts)
+        if share > highest and np.any(weights):
+            # One part keeps its own unit; several are mixed as the regression wishes them.
+            mixture = np.ones(1) if len(weights) == 1 else weights / np.max(np.abs(weights))
+            linear = dict(zip(names, map(float, mixture), strict=True)) if names else {}
+            best, highest = Candidate(effect, inner, linear, parts @ mixture), share
+    return best
+
+
+def _is_plain(effect: Effect) -> bool:
+    """Return True for a torque with one coefficient and nothing inside."""
+    return effect.torque is not None and not effect.states and len(effect.parameters) == 1
+
+
+def _library_columns(
+    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows, scales: Mapping[str, float]
+) -> list[NDArray[np.float64]]:
+    """Return the columns of the terms without inner parameters, as a pysindy library gives them on [x, x']."""
+    if not effects:
+        return []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pysindy import CustomLibrary
+
+    library = CustomLibrary(
+        library_functions=[_term(effect) for effect in effects],
+        function_names=[_constant_name(effect.name) for effect in effects],
+    )
+    # On numbers near one, and back to SI by the dimension of the coefficient.
+    sizes = [characteristic_value(e.parameters[0].dimension, {**scales, "force": 1.0, "drive": 1.0}) for e in effects]
+    columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
+    for motion in motions:
+        points = np.column_stack([motion.x / scales["x"], motion.v * scales["time"] / scales["x"]])
+        values = np.asarray(library.fit_transform(points))
+        for i, size in enumerate(sizes):
+            columns[i].append(rows.of(values[:, i] / size))
+    return [np.concatenate(parts) for parts in columns]
+
+
+def _term(effect: Effect) -> Any:
+    compiled = sp.lambdify((canonical.x, canonical.v), _slope(effect, effect.parameters[0]), "numpy")
+
+    def term(x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(compiled(x, v))
+
+    return term
+
+
+def _constant_name(name: str) -> Any:
+    return lambda _x, _v: name
+
+
+def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
+    assert effect.torque is not None
+    return sp.diff(effect.torque, sp.Symbol(parameter.name, real=True))
+
+
+def _with_inner_values(
+    effect: Effect, motions: Sequence[Motion], scales: Mapping[str, float]
+) -> Iterator[tuple[dict[str, float], list[str], list[list[NDArray[np.float64]]]]]:
+    """Yield inner values, names of the linear parameters, and per record the signals of the term's parts."""
+    fitted = [p for p in effect.parameters if p.fitted]
+    linear = [p for p in fitted if effect.torque is not None and _is_linear(effect, p)]
+    inside = [p for p in fitted if p not in linear]
+    for values in itertools.product(*(_grid(p, scales) for p in inside)):
+        inner = dict(zip((p.name for p in inside), values, strict=True))
+        yield inner, [p.name for p in linear], [_signals(effect, linear, inner, motion) for motion in motions]
+
+
+def _is_linear(effect: Effect, parameter: Parameter) -> bool:
+    return not _slope(effect, parameter).has(sp.Symbol(parameter.name, real=True))
+
+
+def _grid(parameter: Parameter, scales: Mapping[str, float]) -> list[float]:
+    size = characteristic_value(parameter.dimension, scales)
+    low, high = max(parameter.search[0], _LEAST_SHARE), min(parameter.search[1], _MOST_SHARE)
+    return [float(share * size) for share in np.geomspace(low, 0.97 * high, _GRID)]
+
+
+def _signals(
+    effect: Effect, linear: Sequence[Parameter], inner: Mapping[str, float], motion: Motion
+) -> list[NDArray[np.float64]]:
+    """Return the parts of an effect as resisting forces per unit of their coefficient."""
+    if effect.delay is not None:
+        time = motion.dt * np.arange(motion.u.size)
+        return [motion.u - np.interp(time - next(iter(inner.values())), time, motion.u)]
+    if effect.name == _LAG:
+        pole = float(np.exp(-motion.dt / next(iter(inner.values()))))
+        lagged = lfilter([1.0 - pole], [1.0, -pole], motion.u - motion.u[0]) + motion.u[0]
+        return [motion.u - np.asarray(lagged)]
+    if effect.torque is not None:
+        return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
+    if effect.deflection is not None:
+        return [_evaluated(effect.deflection, inner, motion) - motion.x]
+    assert effect.drive is not None
+    return [motion.u - _evaluated(effect.drive, inner, motion)]
+
+
+def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+    """Return the torque of a static effect along a measured motion, shape (n_samples,)."""
+    assert effect.torque is not None
+    return _evaluated(effect.torque, values, motion)
+
+
+def _evaluated(
+    expression: sp.Expr, inner: Mapping[str, float], motion: Motion
+) -> NDArray[np.float64]:
+    numbers = {sp.Symbol(name, real=True): value for name, value in inner.items()}
+    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2).subs(numbers)
+    compiled = sp.lambdify((canonical.x, canonical.v, canonical.u), plain, "numpy", cse=True)
+    return np.broadcast_to(compiled(motion.x, motion.v, motion.u), motion.x.shape).astype(np.float64)

@@ -1,0 +1,188 @@
+"""What did the mass do, and which force is missing? Kalman filter and Rauch-Tung-Striebel smoother with the known input.
+
+The rig's linear equations carry the estimate; the force that they leave over is a state of its own, an integrated random walk.
+Its intensity is the one that makes the record most likely, so that the records decide how fast it may change.
+
+References
+----------
+H. E. Rauch, F. Tung and C. T. Striebel, AIAA J. 3 (1965) 1445; C. F. Van Loan, IEEE Trans. Autom. Control 23 (1978) 395, for
+the discrete noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.linalg import expm, solve_discrete_are
+
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate.prescribed_motion import smooth_motion
+
+_DECADES = (-4.0, -2.0, 0.0, 2.0, 4.0, 6.0)
+"""Intensities tried, in decades about that of a missing force as large as the spring's within one radian."""
+_BETWEEN = (-1.0, 1.0)
+_LONGEST_TRIAL = 3000
+_SETTLING = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Smoothed motion of one record about its rest position.
+
+    Attributes
+    ----------
+    record
+        What was measured.
+    x, v, acceleration
+        Displacement, velocity and acceleration, shape (n_samples,) each.
+    u
+        Input, shape (n_samples,); the displacement where the motion is prescribed.
+    measured
+        What was measured of the quantity that is regressed: displacement, or force where the motion is prescribed.
+    """
+
+    record: Record
+    x: NDArray[np.float64]
+    v: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    u: NDArray[np.float64]
+    measured: NDArray[np.float64]
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return self.record.dt
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """The linear equation that carries the estimate: ``m x'' = g u - k (x - rest) - d x' + missing force``."""
+
+    inertia: float
+    damping: float
+    stiffness: float
+    gain: float
+    rest: float
+
+    @classmethod
+    def of(cls, rig: Rig, values: Mapping[str, float]) -> Carrier:
+        """Evaluate a driven rig's equation with numbers."""
+
+        def number(expression: sp.Expr) -> float:
+            return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
+
+        motion = rig.motion
+        return cls(
+            number(motion.inertia),
+            number(motion.damping),
+            number(motion.stiffness),
+            number(motion.drive_gain),
+            number(motion.rest),
+        )
+
+
+def motion_of(rig: Rig, record: Record, values: Mapping[str, float], noise: float) -> Motion:
+    """Return the smoothed motion of a record.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    record
+        Holds the input and the first output.
+    values
+        Constants and linear parameters by name.
+    noise
+        Standard deviation of the first output's noise.
+    """
+    source, response = record[rig.inputs[0].name], record[rig.outputs[0].name]
+    if not rig.is_driven:
+        x, v = smooth_motion(source, record.dt)
+        return Motion(record, x, v, np.gradient(v, record.dt), x, response)
+    carrier = Carrier.of(rig, values)
+    smoother = _Smoother(carrier, record.dt, record.hold == "zoh", noise**2)
+    displacement = response - carrier.rest
+    intensity = smoother.likeliest(displacement[:_LONGEST_TRIAL], source[:_LONGEST_TRIAL])
+    states = smoother.smoothed(displacement, source, intensity)
+    x, v, missing = states[:, 0], states[:, 1], states[:, 2]
+    forces = carrier.gain * source - carrier.damping * v - carrier.stiffness * x + missing
+    return Motion(record, x, v, forces / carrier.inertia, source, displacement)
+
+
+class _Smoother:
+    """Steady-state filter and smoother of displacement, velocity, missing force and its rate."""
+
+    def __init__(self, carrier: Carrier, dt: float, held: bool, variance: float) -> None:
+        self._carrier, self._dt, self._variance = carrier, dt, variance
+        m, d, k = carrier.inertia, carrier.damping, carrier.stiffness
+        rates = np.array([[0, 1, 0, 0], [-k / m, -d / m, 1 / m, 0], [0, 0, 0, 1], [0, 0, 0, 0]], dtype=float)
+        driven = np.zeros((6, 6))
+        driven[:4, :4], driven[1, 4], driven[4, 5] = rates, carrier.gain / m, 1.0
+        step = expm(driven * dt)
+        self._transition, self._level = step[:4, :4], step[:4, 4]
+        self._slope = np.zeros(4) if held else step[:4, 5]
+        doubled = np.zeros((8, 8))
+        doubled[:4, :4], doubled[4:, 4:], doubled[3, 7] = -rates, rates.T, 1.0
+        parts = expm(doubled * dt)
+        noise = parts[4:, 4:].T @ parts[:4, 4:]
+        self._noise = (noise + noise.T) / 2.0
+        # In units in which one sample time moves everything by about one: the Riccati equation is badly scaled in SI.
+        self._units = np.array([1.0, 1.0 / dt, m / dt**2, m / dt**3])
+
+    def likeliest(self, x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+        """Return the intensity of the missing force's second derivative that makes the displacement most likely."""
+        carrier = self._carrier
+        size = float(np.std(x)) or 1.0
+        omega = np.sqrt(max(carrier.stiffness, 1e-12) / carrier.inertia)
+        omega = max(omega, 2.0 * np.pi / (x.size * self._dt))
+        unit = (carrier.inertia * omega**2 * size * omega**2) ** 2 / omega
+
+        def cost(decade: float) -> float:
+            gain, variance, _ = self._gains(unit * 10.0**decade)
+            _, _, errors = self._filtered(x, u, gain)
+            return float(np.mean(errors[_SETTLING:] ** 2)) / variance + float(np.log(variance))
+
+        coarse = min(_DECADES, key=cost)
+        return float(unit * 10.0 ** min((coarse, *(coarse + step for step in _BETWEEN)), key=cost))
+
+    def smoothed(
+        self, x: NDArray[np.float64], u: NDArray[np.float64], intensity: float
+    ) -> NDArray[np.float64]:
+        """Return the four states, shape (n_samples, 4)."""
+        gain, _, back = self._gains(intensity)
+        predicted, filtered, _ = self._filtered(x, u, gain)
+        states = filtered.copy()
+        for i in range(x.size - 2, -1, -1):
+            states[i] += back @ (states[i + 1] - predicted[i + 1])
+        return states
+
+    def _gains(self, intensity: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+        units = self._units
+        seen = np.array([[1.0, 0.0, 0.0, 0.0]])
+        transition = self._transition * (units[None, :] / units[:, None])
+        noise = intensity * self._noise / np.outer(units, units) / self._variance
+        spread = solve_discrete_are(transition.T, seen.T, noise, np.eye(1))
+        gain = spread[:, 0] / (spread[0, 0] + 1.0)
+        after = spread - np.outer(gain, spread[0])
+        back = np.linalg.solve(spread, transition @ after).T
+        return gain * units, float((spread[0, 0] + 1.0) * self._variance), back * np.outer(units, 1.0 / units)
+
+    def _filtered(
+        self, x: NDArray[np.float64], u: NDArray[np.float64], gain: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        n = x.size
+        driven = np.outer(u[:-1], self._level) + np.outer(np.diff(u) / self._dt, self._slope)
+        predicted, filtered, errors = np.zeros((n, 4)), np.zeros((n, 4)), np.zeros(n)
+        state = np.array([np.mean(x[:5]), 0.0, 0.0, 0.0])
+        for i in range(n):
+            predicted[i] = state
+            errors[i] = x[i] - state[0]
+            filtered[i] = state + gain * errors[i]
+            if i < n - 1:
+                state = self._transition @ filtered[i] + driven[i]
+        return predicted, filtered, errors

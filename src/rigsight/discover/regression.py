@@ -1,0 +1,176 @@
+"""Which terms does sparse regression take, in which order, and how surely? pysindy's optimizers on columns without units.
+
+What the rig has anyway (its drive, its rest position, and in the discrepancy form its damper and spring too) is projected out
+first, so that it never competes. Rows are kept as a triangular factor, which has the same normal equations as all rows and a
+few hundred times fewer of them.
+
+References
+----------
+L. Boninsegna, F. Nueske and C. Clementi, J. Chem. Phys. 148 (2018) 241723, for stepwise sparse regression; U. Fasel et al.,
+Proc. R. Soc. A 478 (2022) 20210904, for inclusion probabilities from ensembles.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+N_ENSEMBLE = 50
+_BLOCKS = 40
+"""Contiguous stretches of rows that an ensemble draws from: neighboring rows share their noise."""
+_CLEARLY = 1.1
+"""Factor by which a larger support must lower what is left: the columns, made of a smoothed motion, are no better."""
+_TINY = 1e-10
+_RIDGE = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """A regression with some columns projected out of everything.
+
+    Attributes
+    ----------
+    base
+        Columns that are always there, shape (n_rows, n_base).
+    target
+        Shape (n_rows,).
+    independent
+        Number of independent rows: windows overlap.
+    """
+
+    base: NDArray[np.float64]
+    target: NDArray[np.float64]
+    independent: float
+
+    def rest_of(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return columns, or the target, without what the base columns explain."""
+        directions = np.linalg.qr(self.base / np.linalg.norm(self.base, axis=0))[0]
+        return np.asarray(columns - directions @ (directions.T @ columns))
+
+    def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Return coefficients of further columns and the share of what the base leaves that they explain."""
+        left, added = self.rest_of(self.target), self.rest_of(columns)
+        size = np.linalg.norm(added, axis=0)
+        if np.any(size <= _TINY * np.linalg.norm(columns, axis=0)):
+            return np.zeros(columns.shape[1]), 0.0
+        solution = np.linalg.lstsq(added / size, left, rcond=1e-10)[0]
+        rest = left - (added / size) @ solution
+        return solution / size, float(1.0 - (rest @ rest) / (left @ left))
+
+    def solved(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of what is left."""
+        matrix = np.column_stack([self.base, columns])
+        size = np.linalg.norm(matrix, axis=0) + 1e-300
+        solution = np.linalg.lstsq(matrix / size, self.target, rcond=1e-12)[0]
+        rest = self.target - (matrix / size) @ solution
+        return solution / size, float(np.sqrt(np.mean(rest**2)))
+
+
+def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tuple[int, ...]]:
+    """Return supports of every size, smallest first: those that remain when pysindy's SSR drops term after term.
+
+    Beside them stand the supports of FROLS, which grows instead of shrinking; the two differ where columns are alike.
+
+    Parameters
+    ----------
+    projected
+        What is regressed, and what never competes.
+    columns
+        Shape (n_rows, n_terms).
+    """
+    matrix, target = _compressed(projected.rest_of(columns), projected.rest_of(projected.target))
+    paths = [_shrinking(matrix, target), _growing(matrix, target)]
+    supports = {support for path in paths for support in path if support}
+    return sorted(supports, key=lambda s: (len(s), s))
+
+
+def inclusion_probabilities(
+    projected: Projected, columns: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return how often each term is taken when stretches of the rows are drawn anew, shape (n_terms,).
+
+    In every draw the support is the smallest that leaves hardly more than the one of the lowest Bayesian information criterion.
+    """
+    matrix, target = projected.rest_of(columns), projected.rest_of(projected.target)
+    blocks = np.array_split(np.arange(target.size), min(_BLOCKS, target.size))
+    counts = np.zeros(columns.shape[1])
+    for _ in range(N_ENSEMBLE):
+        rows = np.concatenate([blocks[i] for i in rng.integers(len(blocks), size=len(blocks))])
+        own_matrix, own_target = _compressed(matrix[rows], target[rows])
+        supports = [(), *_shrinking(own_matrix, own_target)]
+        left = np.array([_left(own_matrix, own_target, support) for support in supports])
+        costs = [
+            information_criterion(square / rows.size, len(support), projected.independent)
+            for square, support in zip(left, supports, strict=True)
+        ]
+        enough = np.flatnonzero(left <= _CLEARLY**2 * left[int(np.argmin(costs))])[0]
+        counts[list(supports[int(enough)])] += 1.0
+    return np.asarray(counts / N_ENSEMBLE)
+
+
+def information_criterion(mean_square: float, n_terms: int, independent: float) -> float:
+    """Return the Bayesian information criterion with the number of independent residuals."""
+    return float(independent * np.log(mean_square + 1e-300) + n_terms * np.log(independent))
+
+
+def alike(projected: Projected, columns: NDArray[np.float64], threshold: float) -> list[tuple[int, int, float]]:
+    """Return pairs of terms whose columns differ by little once the rig's own terms are taken out, with their correlation."""
+    rest = projected.rest_of(columns)
+    size = np.linalg.norm(rest, axis=0)
+    size[size == 0.0] = 1.0
+    correlation = (rest / size).T @ (rest / size)
+    return [
+        (i, j, float(abs(correlation[i, j])))
+        for i in range(rest.shape[1])
+        for j in range(i + 1, rest.shape[1])
+        if abs(correlation[i, j]) >= threshold
+    ]
+
+
+def _compressed(
+    matrix: NDArray[np.float64], target: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return few rows with the same normal equations and the same sum of squares, columns of unit length."""
+    size = np.linalg.norm(matrix, axis=0)
+    size[size == 0.0] = 1.0
+    factor = np.linalg.qr(np.column_stack([matrix / size, target]), mode="r")
+    return factor[:, :-1], factor[:, -1]
+
+
+def _shrinking(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[tuple[int, ...]]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pysindy import SSR
+
+        optimizer = SSR(
+            alpha=_RIDGE, max_iter=max(1, matrix.shape[1]), criteria="model_residual", unbias=False
+        )
+        optimizer.fit(matrix, target)
+    return _supports(optimizer.history_)
+
+
+def _growing(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[tuple[int, ...]]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pysindy import FROLS
+
+        optimizer = FROLS(alpha=_RIDGE, max_iter=min(6, matrix.shape[1]), unbias=False)
+        optimizer.fit(matrix, target)
+    return _supports(optimizer.history_)
+
+
+def _supports(history: Sequence[NDArray[np.float64]]) -> list[tuple[int, ...]]:
+    supports = (tuple(int(i) for i in np.flatnonzero(np.ravel(coefficients))) for coefficients in history)
+    return sorted({support for support in supports if support}, key=lambda s: (len(s), s))
+
+
+def _left(matrix: NDArray[np.float64], target: NDArray[np.float64], support: tuple[int, ...]) -> float:
+    if not support:
+        return float(target @ target)
+    chosen = matrix[:, list(support)]
+    rest = target - chosen @ np.linalg.lstsq(chosen, target, rcond=1e-10)[0]
+    return float(rest @ rest)

@@ -1,0 +1,208 @@
+"""What did a discovery find? Equations, terms with intervals and inclusion probabilities, and the model, as data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A number of the equation with its standard error and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data with a 95 % interval; what is not determined has none."""
+        known = math.isfinite(self.std)
+        interval = [self.value - 1.96 * self.std, self.value + 1.96 * self.std] if known else None
+        return {
+            "value": self.value,
+            "std": self.std if known else None,
+            "interval_95": interval,
+            "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term that stands in the equation or was offered to it.
+
+    Attributes
+    ----------
+    name
+        Name of the effect that the term is.
+    summary
+        What it does, one sentence.
+    kept
+        True if it stands in the equation.
+    inclusion
+        How often sparse regression takes it when stretches of the records are drawn anew.
+    coefficients
+        Its parameters; empty where it is not kept.
+    doubt
+        Why it is in doubt, empty where it is not.
+    """
+
+    name: str
+    summary: str
+    kept: bool
+    inclusion: float
+    coefficients: Mapping[str, Coefficient]
+    doubt: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            "name": self.name,
+            "summary": self.summary,
+            "kept": self.kept,
+            "inclusion_probability": self.inclusion,
+            "coefficients": {name: c.to_json() for name, c in self.coefficients.items()},
+            "doubt": self.doubt,
+        }
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A support that was polished and scored.
+
+    Attributes
+    ----------
+    terms
+        Names of the effects.
+    n_parameters
+        Number of fitted parameters.
+    held_out
+        Free-run error on the held-out records in units of the noise floor.
+    aic, bic
+        Information criteria of that error with the number of independent samples.
+    """
+
+    terms: tuple[str, ...]
+    n_parameters: int
+    held_out: float
+    aic: float
+    bic: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data; a support that could not be simulated has no numbers."""
+        numbers = {"held_out": self.held_out, "aic": self.aic, "bic": self.bic}
+        return {
+            "terms": list(self.terms),
+            "n_parameters": self.n_parameters,
+            **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Measured and simulated first output of a record in free run, shape (n_samples,) each."""
+
+    record: str
+    role: str
+    t: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """Everything that a discovery found.
+
+    Attributes
+    ----------
+    title, rig, method
+        What was discovered on, and how (``"full"`` or ``"discrepancy"``).
+    form
+        ``"weak"`` or ``"pointwise"``.
+    equations, latex
+        The equations as plain text and as LaTeX, one per state.
+    rig_parameters
+        The rig's own parameters.
+    terms
+        Terms of the equation first, then those that were offered.
+    alternatives
+        All supports that were polished, best first.
+    force_equation
+        Inclusion probability of each term in the equation of the hysteretic force; empty where there is none.
+    held_out
+        Names of the records that chose between supports.
+    held_out_error
+        Free-run error there in units of the noise floor.
+    held_out_nrmse, noise_floor
+        The same error, and the noise floor, relative to the spread of the measured output.
+    independent
+        Independent samples behind that error.
+    runs
+        Free runs of the model, for a picture.
+    output, unit
+        Name and unit of the output in those.
+    model
+        Content of ``model.json``.
+    warnings
+        What a user should know before using the equations, one sentence each.
+    by_record
+        What was found on each record alone; empty unless asked for.
+    """
+
+    title: str
+    rig: str
+    method: str
+    form: str
+    equations: tuple[str, ...]
+    latex: tuple[str, ...]
+    rig_parameters: Mapping[str, Coefficient]
+    terms: tuple[Term, ...]
+    alternatives: tuple[Alternative, ...]
+    force_equation: Mapping[str, float]
+    held_out: tuple[str, ...]
+    held_out_error: float
+    held_out_nrmse: float
+    noise_floor: float
+    independent: float
+    runs: tuple[Run, ...]
+    output: str
+    unit: str
+    model: Mapping[str, Any]
+    warnings: tuple[str, ...]
+    by_record: tuple[tuple[str, Discovery], ...] = ()
+
+    @property
+    def kept(self) -> tuple[Term, ...]:
+        """The terms of the equation."""
+        return tuple(term for term in self.terms if term.kept)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of ``discovery.json``."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "title": self.title,
+            "rig": self.rig,
+            "method": self.method,
+            "form": self.form,
+            "equations": list(self.equations),
+            "latex": list(self.latex),
+            "rig_parameters": {name: c.to_json() for name, c in self.rig_parameters.items()},
+            "terms": [term.to_json() for term in self.terms],
+            "alternatives": [alternative.to_json() for alternative in self.alternatives],
+            "force_equation": dict(self.force_equation),
+            "held_out": {
+                "records": list(self.held_out),
+                "error_in_noise_floors": self.held_out_error if math.isfinite(self.held_out_error) else None,
+                "nrmse": self.held_out_nrmse if math.isfinite(self.held_out_nrmse) else None,
+                "noise_floor": self.noise_floor if math.isfinite(self.noise_floor) else None,
+                "independent_samples": self.independent,
+            },
+            "warnings": list(self.warnings),
+            "by_record": {name: found.to_json() for name, found in self.by_record},
+        }

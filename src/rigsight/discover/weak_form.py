@@ -1,0 +1,92 @@
+"""How does a record become rows of a regression? Against smooth test functions (the weak form), or point by point.
+
+In the weak form every row is an integral over a window. Derivatives move to the test function, so that the measured
+displacement itself gives acceleration and velocity and nothing is differentiated.
+
+References
+----------
+D. A. Messenger and D. M. Bortz, "Weak SINDy", Multiscale Model. Simul. 19 (2021) 1474.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.motion import Motion
+
+_POWER = 5
+"""Of the test function (1 - s^2)^p; its first four derivatives vanish at the ends of the window."""
+_ROWS_PER_WINDOW = 4
+_LEAST_WIDTH = 11
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Test functions on one sample time.
+
+    Attributes
+    ----------
+    weights
+        Test function and its first two derivatives with respect to time, integration weights included, shape (3, width); None
+        for point-wise rows.
+    step
+        Samples from row to row.
+    """
+
+    weights: NDArray[np.float64] | None
+    step: int
+
+    @classmethod
+    def weak(cls, width: float, dt: float) -> Rows:
+        """Make windows of `width` [s]."""
+        half = max(round(width / dt), _LEAST_WIDTH) // 2
+        s = np.arange(-half, half + 1) / (half + 1)
+        rate = 1.0 / ((half + 1) * dt)
+        inside = 1.0 - s**2
+        value = inside**_POWER
+        slope = -2.0 * _POWER * s * inside ** (_POWER - 1) * rate
+        bend = 2.0 * _POWER * inside ** (_POWER - 2) * (2.0 * (_POWER - 1) * s**2 - inside) * rate**2
+        # Rows of unit integral, so that a row is the mean of a signal over its window.
+        weights = np.array([value, slope, bend]) / np.sum(value)
+        return cls(weights, max(1, (2 * half + 1) // _ROWS_PER_WINDOW))
+
+    @classmethod
+    def pointwise(cls, step: int = 1) -> Rows:
+        """Make a row of every `step`-th sample."""
+        return cls(None, step)
+
+    def of(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the rows of a signal of shape (n_samples,)."""
+        return signal[:: self.step] if self.weights is None else self._against(signal, 0)
+
+    def rate_of(self, signal: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
+        """Return the rows of the derivative of a signal."""
+        if self.weights is None:
+            return np.asarray(np.gradient(signal, dt)[:: self.step])
+        return -self._against(signal, 1)
+
+    def velocity(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the rows of the velocity."""
+        return motion.v[:: self.step] if self.weights is None else -self._against(motion.x, 1)
+
+    def acceleration(self, motion: Motion) -> NDArray[np.float64]:
+        """Return the rows of the acceleration."""
+        if self.weights is None:
+            return motion.acceleration[:: self.step]
+        return self._against(motion.measured, 2)
+
+    def independent_share(self, order: int) -> float:
+        """Return how many independent rows stand behind each row, at most 1: windows overlap."""
+        if self.weights is None:
+            return 1.0
+        own = self.weights[order]
+        products = np.correlate(own, own, "full") / np.sum(own**2)
+        lags = products[own.size - 1 :: self.step][1:]
+        return float(1.0 / (1.0 + 2.0 * np.sum(lags**2)))
+
+    def _against(self, signal: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+        assert self.weights is not None
+        return np.asarray(np.correlate(signal, self.weights[order], "valid")[:: self.step])

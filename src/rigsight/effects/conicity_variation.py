@@ -1,0 +1,45 @@
+"""Conicity variation: the wheel's profile steepens away from the middle.
+
+Equation
+--------
+``y' = v c_y (psi - (y - y_off) (1 + ((y - y_off) / y_n)^2) / (2 l_0))``
+
+y_n: lateral displacement at which the restoring part has doubled; the effect vanishes as y_n grows without bound.
+
+Applies to worn or curved wheel profiles. Does not describe a contact that saturates.
+
+Signature: y is held back at large displacement, most where it is slow; odd harmonics in y alone.
+
+References: A. H. Wickens, *Fundamentals of Rail Vehicle Dynamics* (Swets & Zeitlinger 2003), on equivalent conicity.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.symbols import creep_gain, creepage, lateral_displacement, lateral_feedback
+from rigsight.parameters import Parameter
+
+y_n = sp.Symbol("y_n", real=True)
+
+CONICITY_VARIATION = Effect(
+    name="conicity_variation",
+    place=Place.LATERAL_DYNAMICS,
+    summary="The wheel profile steepens away from the middle and holds the axle back.",
+    parameters=(
+        Parameter(
+            "y_n",
+            "displacement at which the restoring part has doubled",
+            "length",
+            lower=1e-12,
+            upper=1e300,
+            null=1e300,
+            starts=(2.0, 0.7),
+            search=(0.05, 100.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.FALLS),
+    lateral=creep_gain
+    * (creepage - lateral_displacement * (lateral_displacement / y_n) ** 2 * lateral_feedback),
+)

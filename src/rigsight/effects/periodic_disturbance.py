@@ -1,0 +1,57 @@
+"""Periodic disturbance: a torque that comes back with its own period, whatever the drive does.
+
+Equation
+--------
+``torque = -T_p sin(phi)``,  ``phi' = w_p``, phi free at the start of each record
+
+===  ==============================================
+T_p  amplitude of the torque; the effect vanishes at 0
+w_p  angular frequency
+===  ==============================================
+
+Applies to eccentric rollers, unbalance at constant speed, cogging and mains hum. Does not describe a disturbance whose speed
+follows the motion.
+
+Signature: a line in the response that stays where it is when the excitation changes or rests.
+
+References: L. Ljung, *System Identification* (Prentice Hall 1999), on periodic disturbances.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.parameters import Parameter
+
+T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
+
+PERIODIC_DISTURBANCE = Effect(
+    name="periodic_disturbance",
+    place=Place.DISTURBANCE,
+    summary="A torque from outside repeats with its own period.",
+    parameters=(
+        Parameter(
+            "T_p",
+            "amplitude",
+            "drive",
+            lower=-1e15,
+            upper=1e15,
+            null=0.0,
+            starts=(0.05,),
+            search=(0.0, 2.0),
+        ),
+        Parameter(
+            "w_p",
+            "angular frequency",
+            "time^-1",
+            lower=1e-9,
+            upper=1e9,
+            starts=(2.0, 0.8),
+            search=(0.02, 50.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    torque=-T_p * sp.sin(phi),
+    states=(State(phi, w_p, ""),),
+)

@@ -1,0 +1,45 @@
+"""Position-dependent damping: the damper grips harder away from rest.
+
+Equation
+--------
+``torque = c_x x^2 x'``
+
+c_x: damping per squared displacement; the effect vanishes at 0.
+
+Applies to squeeze films, magnetic dampers and seals whose overlap changes with position, and to electronic dampers with a
+curved characteristic. Does not describe drag, which depends on speed alone.
+
+Signature: the peak falls and widens with amplitude while the gain far below resonance stays; odd harmonics.
+
+References: K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics* (IOP 2001), on damping nonlinearities; the
+van der Pol equation has its negative.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.symbols import v, x
+from rigsight.parameters import Parameter
+
+c_x = sp.Symbol("c_x", real=True)
+
+POSITION_DEPENDENT_DAMPING = Effect(
+    name="position_dependent_damping",
+    place=Place.DYNAMICS,
+    summary="Damping that grows with the square of the displacement.",
+    parameters=(
+        Parameter(
+            "c_x",
+            "damping per squared displacement",
+            "force time x^-3",
+            lower=0.0,
+            upper=1e18,
+            null=0.0,
+            starts=(0.3, 3.0),
+            search=(0.0, 1e3),
+        ),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.FALLS),
+    torque=c_x * x**2 * v,
+)

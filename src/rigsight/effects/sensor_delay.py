@@ -1,0 +1,36 @@
+"""Sensor delay: the displacement is measured later than it happens.
+
+Equation
+--------
+``measured(t) = x(t - T_s)``
+
+T_s: dead time of the sensor; the effect vanishes at 0.
+
+Applies to sensors that average, filter digitally or are polled. On a rig whose displacement drives nothing else that is
+measured, it cannot be told from a delay of the input.
+
+Signature: phase that falls in proportion to frequency, in the displacement alone; what follows from it is early.
+
+References: K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prentice Hall 1997), on time delays.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.parameters import Parameter
+
+T_s = sp.Symbol("T_s", real=True)
+
+SENSOR_DELAY = Effect(
+    name="sensor_delay",
+    place=Place.SENSOR,
+    summary="The displacement is measured later than it happens.",
+    parameters=(
+        Parameter(
+            "T_s", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    measured_late=T_s,
+)

@@ -1,0 +1,46 @@
+"""Sensor lag: the displacement is measured through a first-order low pass.
+
+Equation
+--------
+``T_m x_m' + x_m = x``, x_m is what is measured
+
+T_m: time constant of the sensor; the effect vanishes at 0.
+
+Applies to sensors with an analogue filter or slow electronics. On a rig whose displacement drives nothing else that is
+measured, it cannot be told from a lag of the actuator.
+
+Signature: the displacement loses gain and phase above 1 / T_m; what follows from it does not.
+
+References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on first-order instruments.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import reading
+from rigsight.parameters import Parameter
+
+T_m, x_m = sp.symbols("T_m x_m", real=True)
+
+SENSOR_LAG = Effect(
+    name="sensor_lag",
+    place=Place.SENSOR,
+    summary="The displacement is measured through a first-order lag.",
+    parameters=(
+        Parameter(
+            "T_m",
+            "time constant",
+            "time",
+            lower=0.0,
+            upper=1e6,
+            null=0.0,
+            starts=(0.05, 0.3),
+            search=(1e-3, 10.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    measured=x_m,
+    states=(State(x_m, (reading - x_m) / T_m, "x"),),
+)

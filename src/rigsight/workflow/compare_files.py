@@ -1,0 +1,123 @@
+"""How is a comparison written: `comparison.json`, and `comparison.csv` with one row per model, record and quantity?"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from rigsight.compare import QUANTITIES, Column, Comparison, Score
+from rigsight.compare.comparison import best
+
+SCHEMA_VERSION = 1
+_HEAD = (
+    "model", "record", "role", "kind", "amplitude", "signal", "quantity", "unit", "value",
+    "noise_floor", "n_values", "best", "problem",
+)  # fmt: skip
+
+
+def comparison_json(comparison: Comparison, figures: Mapping[str, str]) -> dict[str, Any]:
+    """Return the content of ``comparison.json``.
+
+    Parameters
+    ----------
+    comparison
+        The result.
+    figures
+        File -> what it shows.
+    """
+    overall = comparison.overall()
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "title": comparison.title,
+        "rig": comparison.rig,
+        "method": comparison.method,
+        "step_seconds": comparison.step_seconds,
+        "window_length": comparison.window_length,
+        "quantities": dict(QUANTITIES),
+        "models": [
+            {"name": c.name, "source": c.source, "model": c.model.to_json()} for c in comparison.competitors
+        ],
+        "records": [
+            {
+                "name": r.record.name,
+                "role": r.record.role,
+                "kind": r.record.kind,
+                "amplitude": r.record.amplitude,
+                "notes": list(r.notes),
+            }
+            for r in comparison.records
+        ],
+        "noise_floors": [
+            {
+                "output": f.output,
+                "unit": f.unit,
+                "std": f.std,
+                "method": f.method,
+                "lower_bound": f.lower_bound,
+            }
+            for f in comparison.floors
+        ],
+        "scores": [_score(s) for s in comparison.scores],
+        "overall": [
+            {
+                "model": model,
+                **_column(column),
+                "value": row[column],
+                "noise_floor": comparison.floor(column),
+                "best": model in best(overall, column),
+            }
+            for model, row in overall.items()
+            for column in row
+        ],
+        "failures": [
+            {
+                "model": f.model,
+                "record": f.record,
+                **(_column(f.column) if f.column else {}),
+                "reason": f.reason,
+            }
+            for f in comparison.failures
+        ],
+        "notes": list(comparison.notes),
+        "figures": dict(figures),
+    }
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """Return the content of ``comparison.csv``: SI units, an empty value with its problem where a model failed."""
+    file = io.StringIO()
+    table = csv.writer(file, lineterminator="\n")
+    table.writerow(_HEAD)
+    for own in comparison.records:
+        record = own.record
+        facts = (record.name, record.role, record.kind, "" if record.amplitude is None else record.amplitude)
+        rows = comparison.table(record.name)
+        winners = {column: best(rows, column) for column in comparison.columns(record.name)}
+        for s in own.scores:
+            floor = "" if s.noise_floor is None else f"{s.noise_floor:.9g}"
+            first = "yes" if s.model in winners[s.column] else "no"
+            told = (f"{s.value:.9g}", floor, s.n_values, first, "")
+            table.writerow((s.model, *facts, s.column.signal, s.column.quantity, s.column.unit, *told))
+        for f in own.failures:
+            missing = [f.column] if f.column else comparison.columns(record.name)
+            for column in missing or (None,):
+                named = ("", "", "") if column is None else (column.signal, column.quantity, column.unit)
+                table.writerow((f.model, *facts, *named, "", "", "", "no", " ".join(f.reason.split())))
+    return file.getvalue()
+
+
+def _column(column: Column) -> dict[str, str]:
+    return {"signal": column.signal, "quantity": column.quantity, "unit": column.unit}
+
+
+def _score(score: Score) -> dict[str, Any]:
+    return {
+        "model": score.model,
+        "record": score.record,
+        **_column(score.column),
+        "value": score.value,
+        "noise_floor": score.noise_floor,
+        "n_values": score.n_values,
+    }

@@ -1,0 +1,189 @@
+"""The comparison of models as a command: all results or none, bad models told in words."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rigsight.cli import app
+from rigsight.errors import InputError
+from rigsight.excitation import log_sweep, step
+from rigsight.workflow.compare import run_compare
+from rigsight.workflow.virtual_rig import VirtualRig
+
+GEAR = """\
+title = "rear <axle>"
+
+[rig]
+model = "running_gear"
+constants = { v = 1.0, r_0 = 0.1, b = 0.3, k_tau = 0.27 }
+"""
+
+
+@pytest.fixture(scope="module")
+def gear(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A campaign of the virtual rig: a sweep and a step."""
+    folder = tmp_path_factory.mktemp("gear")
+    rig, rng = VirtualRig(), np.random.default_rng(1)
+    rest = np.zeros(400)
+    u = np.concatenate([rest, log_sweep(rig.time(25.0), 1.0, 0.8, 80.0), rest])
+    records = {
+        "sweep": rig.measure("sweep", u, rng, kind="sweep"),
+        "step": rig.measure("step", step(rig.time(10.0), 0.6, 5.0), rng, kind="step", hold="zoh"),
+    }
+    text = GEAR
+    for name, record in records.items():
+        np.savetxt(
+            folder / f"{name}.csv",
+            np.column_stack([record.t, record["u"], record["psi"], record["y"]]),
+            delimiter=",",
+            header="t,u,psi,y",
+            comments="",
+        )
+        text += f'\n[[records]]\nfile = "{name}.csv"\nkind = "{name}"\nhold = "{record.hold}"\n'
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def linear_model(write_model: Callable[..., Path]) -> Path:
+    def linear(content: dict[str, Any]) -> None:
+        content.update(effects=[], effect_parameters={}, units={})
+
+    return write_model(linear)
+
+
+def test_the_command_writes_tables_a_page_and_figures(gear: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    models = ["nominal", "iwan_tables", "mine=identified"]
+    result = CliRunner().invoke(app, ["compare", str(gear), *models, "--out", str(out), "--jobs", "1"])
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in out.iterdir()} == {
+        "comparison.json", "comparison.csv", "comparison.html", "errors.svg", "responses_01_sweep.svg", "step_02_step.svg"
+    }  # fmt: skip
+    rows = list(csv.DictReader((out / "comparison.csv").read_text(encoding="utf-8").splitlines()))
+    assert len({(r["model"], r["record"], r["signal"], r["quantity"]) for r in rows}) == len(rows)
+    # Two paths with three errors and two outputs in free run on the sweep; two outputs twice on the step.
+    assert len(rows) == 3 * (2 * 3 + 2 + 4)
+    assert {r["model"] for r in rows} == {"nominal", "iwan_tables", "mine"}
+    truth = [r for r in rows if r["model"] == "iwan_tables" and r["signal"] in ("psi", "u -> psi")]
+    assert all(r["best"] == "yes" and float(r["value"]) < 1.5 * float(r["noise_floor"]) for r in truth)
+    content = json.loads((out / "comparison.json").read_text(encoding="utf-8"))
+    assert (content["schema_version"], len(content["scores"]), content["failures"]) == (1, len(rows), [])
+    assert [s["value"] for s in content["scores"]] == pytest.approx(
+        [float(r["value"]) for r in rows], rel=1e-8
+    )
+    assert content["models"][2]["model"]["parameters"]["k_c"] == 81.0
+    page = (out / "comparison.html").read_text(encoding="utf-8")
+    assert "rear &lt;axle&gt;" in page
+    assert "<script" not in page
+    assert not re.findall(r'(?:src|href)="(?!#|data:)', page)
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert "noise floor" in result.output
+    assert re.search(r"iwan_tables +[0-9.e-]+\*", result.output)
+
+
+def test_the_method_of_the_thesis_is_an_option(gear: Path) -> None:
+    comparison = run_compare(gear, ["identified", "nominal"], method="thesis", n_jobs=1)
+    errors = {(s.model, s.column.signal, s.column.quantity): s for s in comparison.scores}
+    yaw = errors["identified", "u -> psi", "magnitude_rmse"]
+    assert (yaw.column.unit, yaw.noise_floor) == ("rad/A", None)
+    # Table 5.1 has the same order at 1 A.
+    assert yaw.value < errors["nominal", "u -> psi", "magnitude_rmse"].value
+
+
+def test_a_model_of_another_rig_is_refused_before_anything_is_done(
+    axis_campaign: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=r"'nominal' is of the rig 'running_gear'.*rig 'axis'"):
+        run_compare(axis_campaign, ["nominal"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("model", "told"),
+    [("nominl", "Did you mean 'nominal'"), ("=nominal", "NAME=MODEL"), ("missing.json", "does not exist")],
+)
+def test_a_model_that_is_none_is_told(axis_campaign: Path, model: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        run_compare(axis_campaign, [model])
+
+
+def test_a_diverging_model_is_marked_and_the_others_go_on(
+    axis_campaign: Path, linear_model: Path, tmp_path: Path
+) -> None:
+    content = json.loads(linear_model.read_text())
+    content.update(effects=["cubic_stiffness"], effect_parameters={"k_3": -4e7})
+    (tmp_path / "softening.json").write_text(json.dumps(content), encoding="utf-8")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(
+        app,
+        [
+            "compare",
+            str(axis_campaign),
+            str(tmp_path / "softening.json"),
+            f"linear={linear_model}",
+            "--out",
+            str(out),
+        ],
+    )
+    assert result.exit_code == 0, result.output
+    rows = list(csv.DictReader((out / "comparison.csv").read_text(encoding="utf-8").splitlines()))
+    failed = [r for r in rows if r["model"] == "softening" and r["record"] == "fit"]
+    assert failed
+    assert all(r["value"] == "" and "unstable" in r["problem"] for r in failed)
+    assert all(r["value"] for r in rows if r["model"] == "linear")
+    assert "softening on 'fit' cannot be simulated" in " ".join(result.output.split())
+
+
+def test_if_no_model_can_be_simulated_nothing_is_written(
+    axis_campaign: Path, linear_model: Path, tmp_path: Path
+) -> None:
+    content = json.loads(linear_model.read_text())
+    content.update(effects=["cubic_stiffness"], effect_parameters={"k_3": -4e8})
+    linear_model.write_text(json.dumps(content), encoding="utf-8")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["compare", str(axis_campaign), str(linear_model), "--out", str(out)])
+    assert result.exit_code == 2
+    assert "No model can be compared" in result.output
+    assert not out.exists()
+
+
+def test_without_sweeps_the_steps_and_free_runs_are_compared(gear: Path, tmp_path: Path) -> None:
+    text = (gear / "campaign.toml").read_text(encoding="utf-8")
+    head, _, last = text.split("[[records]]")
+    (tmp_path / "campaign.toml").write_text(f"{head}[[records]]{last}", encoding="utf-8")
+    (tmp_path / "step.csv").write_bytes((gear / "step.csv").read_bytes())
+    comparison = run_compare(tmp_path, ["nominal", "nominal"], n_jobs=1)
+    assert {s.column.quantity for s in comparison.scores} == {"step_rmse", "free_run_nrmse"}
+    assert "no frequency responses" in comparison.notes[0]
+    assert [c.name for c in comparison.competitors] == ["nominal", "nominal_2"]
+
+
+def test_other_constants_than_the_campaign_has_are_told(gear: Path, tmp_path: Path) -> None:
+    for file in gear.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text(campaign.read_text().replace("v = 1.0", "v = 2.0"), encoding="utf-8")
+    notes = run_compare(tmp_path, ["nominal"], n_jobs=1).notes
+    assert notes == (
+        "Model 'nominal' has other constants than the campaign: v = 1 (campaign: 2). It is compared as it is.",
+    )
+
+
+def test_a_rig_without_a_spring_is_run_in_windows(axis_campaign: Path, linear_model: Path) -> None:
+    content = json.loads(linear_model.read_text())
+    content["parameters"]["k"] = 0.0
+    linear_model.write_text(json.dumps(content), encoding="utf-8")
+    comparison = run_compare(axis_campaign, [linear_model], n_jobs=1)
+    assert comparison.window_length is not None
+    assert comparison.window_length < 9.0
