@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigsight.plot import GIVEN, MEASURED, WITH_EFFECT, style
+from rigsight.plot.drawing import GIVEN, MEASURED, WITH_EFFECT, style
 from rigsight.records import Record
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaign import read_campaign
@@ -35,7 +35,7 @@ def draw(demo: Path) -> None:
         axes = figure.subplots(1, 2)
         for ax, (name, window) in zip(axes, PANELS.items(), strict=True):
             (record,) = [record for record in task.records if record.name == name]
-            before = simulate(compose(task.rig), given, record)
+            before = simulate(compose(task.rig, task.modelled), given, record)
             after = simulate(model.structure, model.values, record)
             panel(ax, record, before, after, window)
             ax.set_title(TITLES[name])

@@ -11,17 +11,14 @@ Errors = dict[tuple[str, str], dict[str, float]]
 
 _LABELS = {"identify": "linear", "calibrate": "Bouc-Wen", "discover": "discovered"}
 _SHOWN = {
-    ("u -> psi", "magnitude_db"): ("Magnitude u -> psi: RMS error in dB on sweeps", "sweep", "{:.2f}", 1.0),
-    ("u -> psi", "phase_rmse"): ("Phase u -> psi: RMSE (5.1) in rad on sweeps", "sweep", "{:.2f}", 1.0),
+    ("u -> psi", "magnitude_db"): ("dB", "Magnitude u -> psi: RMS error in dB on sweeps", "sweep", "{:.2f}", 1.0),
+    ("u -> psi", "phase_rmse"): ("phase", "Phase u -> psi: RMSE (5.1) in rad on sweeps", "sweep", "{:.2f}", 1.0),
     ("u -> psi", "magnitude_rmse"): (
-        "Magnitude u -> psi: RMSE (5.1) in 1e-3 rad/A on sweeps",
-        "sweep",
-        "{:.2f}",
-        1e3,
+        "magnitude", "Magnitude u -> psi: RMSE (5.1) in 1e-3 rad/A on sweeps", "sweep", "{:.2f}", 1e3
     ),
-    ("psi", "step_rmse"): ("Step, psi: RMSE in 1e-3 rad over 4 s", "step", "{:.3f}", 1e3),
-    ("psi", "free_run_nrmse"): ("Free run, psi: NRMSE in % on sweeps", "sweep", "{:.0f}", 100.0),
-}
+    ("psi", "step_rmse"): ("step", "Step, psi: RMSE in 1e-3 rad over 4 s", "step", "{:.3f}", 1e3),
+    ("psi", "free_run_nrmse"): ("free run", "Free run, psi: NRMSE in % on sweeps", "sweep", "{:.0f}", 100.0),
+}  # fmt: skip
 
 
 def read_errors(out: Path, configs: Mapping[str, float]) -> tuple[dict[str, Errors], Errors]:
@@ -52,11 +49,11 @@ def summary_text(out: Path, configs: Mapping[str, float]) -> str:
     if not models:
         return "Nothing was compared.\n"
     blocks = ["\n".join(_table(models, floors, key)) for key in _SHOWN]
-    return "\n\n".join([*blocks, *_sentences(models)]) + "\n"
+    return "\n\n".join([*blocks, "\n".join(_sentences(models))]).rstrip() + "\n"
 
 
 def _table(models: Mapping[str, Errors], floors: Errors, key: tuple[str, str]) -> Iterator[str]:
-    title, kind, form, factor = _SHOWN[key]
+    _, title, kind, form, factor = _SHOWN[key]
     records = sorted({r for errors in models.values() for r in errors.get(key, {}) if r.startswith(kind)})
     heads = [record.removeprefix(f"{kind}_").replace("A", " A") for record in records]
     yield f"**{title}**\n"
@@ -85,15 +82,13 @@ def _sentences(models: Mapping[str, Errors]) -> Iterator[str]:
     if joint is None:
         return
     for rival in ("linear, joint", "identified", "hysteresis_r", "hysteresis_b", "hysteresis_p"):
-        lost = [
-            f"{_SHOWN[key][0].split(':')[0]} on {record}"
-            for key in _SHOWN
-            for record, error in models[joint].get(key, {}).items()
-            if record.startswith(_SHOWN[key][1])
-            and error >= models.get(rival, {}).get(key, {}).get(record, float("inf"))
-        ]
-        yield (
-            f"- '{joint}' beats '{rival}' everywhere."
-            if not lost
-            else f"- '{rival}' is better than '{joint}' in: {'; '.join(lost)}."
+        lost = []
+        for key, (short, _, kind, _, _) in _SHOWN.items():
+            own, other = models[joint].get(key, {}), models.get(rival, {}).get(key, {})
+            places = [r for r in other if r.startswith(kind) and other[r] <= own.get(r, float("inf"))]
+            if places:
+                lost.append(f"{short} ({', '.join(r.removeprefix(f'{kind}_') for r in places)})")
+        told = (
+            f"is better than '{joint}' in {', '.join(lost)}" if lost else f"is nowhere better than '{joint}'"
         )
+        yield f"- '{rival}' {told}."

@@ -16,6 +16,7 @@ from virtual_rig import CONSTANTS, STEP_START
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, thesis_response
 from rigsight.identify import (
+    driven_offsets,
     estimate_conicity,
     fit_frequency_response,
     fit_step,
@@ -97,7 +98,7 @@ def our_sweep_values(record: Record) -> Values:
     yaw = fit_frequency_response(our_pair(record, "u", "psi"), "pt2", LONGEST_DEAD_TIME)
     lateral = fit_frequency_response(our_pair(record, "psi", "y"), "pt1")
     own = lateral_parameters(lateral, CONSTANTS)
-    rest = offsets(record, own.values["l_0"], own.standard_errors["l_0"], yaw.values["gain"])
+    rest = driven_offsets(record, yaw, lateral)
     found = [yaw_parameters(yaw, CONSTANTS), own, rest]
     values = {name: (part.values[name], part.standard_errors[name]) for part in found for name in part.names}
     return {**values, "dead_time": (yaw.values["dead_time"], yaw.standard_errors["dead_time"])}

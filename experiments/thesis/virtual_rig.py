@@ -1,7 +1,7 @@
-"""What would the thesis have measured on the virtual rig? Sweeps and steps with noise, offsets and a disturbance.
+"""What would the thesis have measured on the virtual rig? Its sweeps and steps, with more disturbance than in the demo.
 
-The virtual rig is the published set `iwan_tables`: the one model that gives the thesis's tables (see fit_tables.py). The
-records of the rig itself are not public.
+The virtual rig is the library's: the one model that gives the thesis's tables (see fit_tables.py). The records of the rig itself
+are not public.
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from fit_tables import DT, GROWTH
+from fit_tables import GROWTH
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep, log_sweep, step
@@ -20,6 +19,7 @@ from rigsight.records import Kind, Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, simulate
+from rigsight.workflow.virtual_rig import VirtualRig
 
 AMPLITUDES = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
 """Amplitudes of Figure 5.6 [A]; Table 5.2 has the first four."""
@@ -28,23 +28,19 @@ SWEEP_START = 1e-3
 SWEEP_TIME = 149.5
 """The thesis sweeps to 640 rad/s, above the Nyquist frequency of 628 rad/s; here the sweep ends half a second earlier."""
 STEP_START, STEP_TIME, STEP_AMPLITUDE = 180.0, 200.0, 0.6
-NOISE = {"psi": 2e-5, "y": 2e-5}
-"""Standard deviation of the sensor noise [rad], [m]."""
-DISTURBANCE = 0.01
-"""Standard deviation of the torque disturbance, as a current that is not recorded [A]: 0.008 N m."""
-DISTURBANCE_CORNER = 5.0
-"""Corner frequency of the disturbance [rad/s]."""
 SEED = 1
 
-VIRTUAL_RIG = published_sets()["iwan_tables"]
-STRUCTURE = compose(RUNNING_GEAR, [effect_named(name) for name in VIRTUAL_RIG.effects])
-CONSTANTS = dict(VIRTUAL_RIG.constants)
+CONSTANTS = dict(VirtualRig().truth.constants)
 DRIVE = CONSTANTS["b"] * CONSTANTS["k_tau"] / CONSTANTS["r_0"]
 """Torque per current [N m/A]."""
+DISTURBANCE = 0.01
+"""Standard deviation of the torque disturbance, as a current that is not recorded [A]: 0.008 N m."""
+RIG = VirtualRig(disturbance=DRIVE * DISTURBANCE)
+VIRTUAL_RIG, STRUCTURE, NOISE, DT = RIG.truth, RIG.structure, RIG.noise, RIG.dt
 
 
 def times(duration: float) -> NDArray[np.float64]:
-    return DT * np.arange(round(duration / DT), dtype=np.float64)
+    return RIG.time(duration)
 
 
 def excitation(name: str, u: NDArray[np.float64], kind: Kind, amplitude: float) -> Record:
@@ -89,14 +85,14 @@ def measured(commanded: Record, seed: int = SEED) -> Record:
     The seed and the record's name make the noise, so that a record is the same in whichever table it occurs.
     """
     rng = np.random.default_rng([seed, *commanded.name.encode()])
-    n = commanded.n_samples
-    pole = float(np.exp(-DISTURBANCE_CORNER * DT))
-    white = rng.normal(scale=DISTURBANCE * np.sqrt(1.0 - pole**2), size=n)
-    disturbance, _ = lfilter([1.0], [1.0, -pole], white, zi=[pole * rng.normal(scale=DISTURBANCE)])
-    driven = commanded.with_signals(u=commanded["u"] + disturbance)
-    clean = simulate(STRUCTURE, VIRTUAL_RIG.values(), driven)
-    noisy = {name: clean[name] + rng.normal(scale=size, size=n) for name, size in NOISE.items()}
-    return commanded.with_signals(**noisy)
+    return RIG.measure(
+        commanded.name,
+        commanded["u"],
+        rng,
+        kind=commanded.kind,
+        amplitude=commanded.amplitude,
+        hold=commanded.hold,
+    )
 
 
 def simulated(structure: Structure, values: Mapping[str, float], commanded: Record) -> Record:

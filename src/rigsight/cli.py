@@ -225,6 +225,60 @@ def identify(
 
 
 @app.command()
+def discover(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "discovery"
+    ),
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="discrepancy: regress what the rig's own terms leave; full: the whole acceleration.",
+        ),
+    ] = "discrepancy",
+    pointwise: Annotated[
+        bool, typer.Option("--pointwise", help="Regress sample by sample instead of in the weak form.")
+    ] = False,
+    one_by_one: Annotated[
+        bool, typer.Option("--one-by-one", help="Discover on each estimation record alone as well.")
+    ] = False,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Find the governing equations behind the records by sparse regression and free-run simulation.
+
+    Writes discovery.json, model.json and discovery.svg into DIR, all or none.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.workflow.discover import run_discover
+
+        found = run_discover(
+            campaign,
+            out,
+            method=method,
+            pointwise=pointwise,
+            one_by_one=one_by_one,
+            seed=seed,
+            n_jobs=jobs,
+            listener=listener,
+        )
+    if not quiet:
+        from rich.console import Console
+
+        from rigsight.report.discovery import discovery_summary
+
+        Console(highlight=False).print(discovery_summary(found))
+        for line in ("", f"Results: {out / 'discovery.json'}", f"Model:   {out / 'model.json'}"):
+            typer.echo(line)
+
+
+@app.command()
 def compare(
     campaign: Annotated[
         Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")

@@ -21,6 +21,8 @@ from rigsight.simulate.model import Model
 
 _TOLERANCE, _EVALUATIONS = 1e-5, 60
 """Relative change of the squared error at which states are good enough, and limit: hysteresis that does not forget needs many."""
+_STATE_ACCURACY = 1e-3
+"""Relative accuracy of the simulations that estimate a state; the one that is scored is a thousand times better."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ def free_run(
     """
     structure, rig = model.structure, model.structure.rig
     scales = characteristic_scales(rig, windows, model.values)
-    found = GreyBoxFit(structure, windows, scales, output_noise).fit(
+    found = GreyBoxFit(structure, windows, scales, output_noise, _STATE_ACCURACY).fit(
         model.values, [], max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False
     )
     runs = [

@@ -88,10 +88,10 @@ def fit_candidates(
     looks = _looks(bench, linear, bench.offered(effects), regression, n_jobs)
     lowest = min((look.cost for look in looks), default=float("inf"))
 
-    def one(look: Look) -> Scored:
-        scored = _followed(bench, look, promising=look.cost <= _PROMISING * lowest)
+    def one(found: Look) -> Scored:
+        scored = followed(bench, found, promising=found.cost <= _PROMISING * lowest)
         if progress is not None:
-            progress(look.effects[-1].name)
+            progress(found.effects[-1].name)
         return scored
 
     models = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in looks))
@@ -115,7 +115,7 @@ def _looks(
         waiting = [effect for effect in waiting if effect not in ready]
         parents = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
         looks = Parallel(n_jobs=n_jobs, prefer="threads")(
-            delayed(_look)(bench, (effect,), linear.fit, parents, regression) for effect in ready
+            delayed(look_at)(bench, (effect,), linear.fit, parents, regression) for effect in ready
         )
         done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
     return [done[effect.name] for effect in effects]
@@ -140,8 +140,8 @@ def fit_candidate(
     hold
         Rig parameters to keep at their base value.
     """
-    look = _look(bench, effects, base, {}, hold=hold)
-    return refine(bench, [_followed(bench, look, promising=True)])[0]
+    found = look_at(bench, effects, base, {}, hold=hold)
+    return refine(bench, [followed(bench, found, promising=True)])[0]
 
 
 def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[Scored]:
@@ -165,14 +165,34 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
     return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(model) for model in models))
 
 
-def _look(
+def look_at(
     bench: Workbench,
     effects: tuple[Effect, ...],
     base: FitResult,
     parents: Mapping[str, FitResult],
     regression: EffectRegression | None = None,
     hold: frozenset[str] = frozenset(),
+    substeps: Sequence[int] | None = None,
 ) -> Look:
+    """Fit a set of effects to the liveliest stretches of the records, from all starts of the last effect.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects
+        All effects of the model; the last is new.
+    base
+        Fit without the last.
+    parents
+        Fits with a simpler effect in place of the last, by name of that effect.
+    regression
+        Gives one more start, where it can.
+    hold
+        Rig parameters to keep at their base value.
+    substeps
+        Integration steps per sample in each stretch; None chooses them, which needs the accurate integrator.
+    """
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
     structure = bench.composed(effects, special)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
@@ -188,13 +208,14 @@ def _look(
             max_evaluations=_LOOK_EVALUATIONS,
             tolerance=_LOOK_TOLERANCE,
             finish=False,
+            substeps=substeps,
         )
         for start in starts
     ]
     return Look(effects, structure, free, _distinct(fits))
 
 
-def _followed(bench: Workbench, look: Look, promising: bool) -> Scored:
+def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking."""
     scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising)
     special = look.effects[-1].special_cases

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.grow import Prepare, grown
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import (
     Candidate,
@@ -19,7 +20,7 @@ from rigsight.diagnose.result import (
     OutputGap,
     Trace,
 )
-from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge
+from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge
 from rigsight.diagnose.windows import WINDOW, cut, window_length
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import CATALOGUE, Effect
@@ -70,6 +71,7 @@ def diagnose(
     seed: int = 0,
     n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
+    prepare: Prepare | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a simulation and records of its rig.
 
@@ -85,6 +87,8 @@ def diagnose(
         Candidates fitted at the same time.
     progress
         Called with a short text when a stage or candidate is done.
+    prepare
+        Called with structures that are about to be simulated, to compile them side by side.
 
     Raises
     ------
@@ -132,12 +136,16 @@ def diagnose(
     say("given simulation")
     singles = fit_candidates(bench, linear, effects, n_jobs, progress)
 
+    lower_bound = any(floor.lower_bound for floor in floors)
+    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
+    pairs = grown(bench, singles, effects, at_floor, n_jobs, prepare)
+
     rng = np.random.default_rng(seed)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    ranking = rank(singles, vector, rng)
+    ranking = rank([*singles, *pairs], vector, rng)
     if ranking.order and ranking.order[0].residuals:
         ranking = _with_offset_rivals(bench, ranking, effects, vector, rng)
-        judgement = judge(before.excess, linear, ranking.order[0], any(floor.lower_bound for floor in floors))
+        judgement = judge(before.excess, linear, ranking.order[0], lower_bound)
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     notes.append(judgement.reason)

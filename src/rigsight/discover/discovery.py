@@ -50,8 +50,6 @@ class Task:
         The rig.
     constants
         Every constant of the rig.
-    given
-        Parameters of the rig that were given; the discrepancy form starts from them.
     records
         Estimation and validation records, cut into windows where the rig drifts.
     noise
@@ -63,7 +61,6 @@ class Task:
     title: str
     rig: Rig
     constants: Mapping[str, float]
-    given: Mapping[str, float]
     records: tuple[Record, ...]
     noise: Mapping[str, float]
     no_spring: bool = False
@@ -132,7 +129,7 @@ def discover(
     chosen = _released(bench, selection, say)
     final = _polished(task, bench, chosen)
     say("polished")
-    inclusion = _inclusion(bench, selection, rng)
+    inclusion = _inclusion(task, bench, selection, final, motions, rows, rng)
     force = _force_equation(bench, final, motions, rows, rng)
     say("ensembles")
     found = _Found(estimation, held_out, how, selection, chosen, final, inclusion, force, same, motions)
@@ -153,9 +150,15 @@ def _split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
     if validation:
         return estimation, validation, ""
     if len(estimation) > 1:
-        middle = sorted(estimation, key=lambda r: float(np.std(r[task.rig.inputs[0].name])))[len(estimation) // 2]
+        middle = sorted(estimation, key=lambda r: float(np.std(r[task.rig.inputs[0].name])))[
+            len(estimation) // 2
+        ]
         rest = tuple(record for record in estimation if record is not middle)
-        return rest, (middle,), f"No record is for validation; '{middle.name}' was set aside to choose the terms."
+        return (
+            rest,
+            (middle,),
+            f"No record is for validation; '{middle.name}' was set aside to choose the terms.",
+        )
     cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
     return (
         (estimation[0].slice(0, cut),),
@@ -216,7 +219,9 @@ def _library(
     return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 
 
-def _distinct(library: Sequence[Candidate], projected: Projected) -> tuple[list[Candidate], dict[str, list[str]]]:
+def _distinct(
+    library: Sequence[Candidate], projected: Projected
+) -> tuple[list[Candidate], dict[str, list[str]]]:
     """Leave out terms that these records cannot tell from an earlier one; return the rest, and who stands for whom."""
     if not library:
         return [], {}
@@ -258,7 +263,9 @@ def _released(bench: Bench, selection: Selection, say: Callable[[str], None]) ->
 
     special = dict(chosen.fit.structure.fixed)
     if special:
-        released = bench.trial(chosen.support, release=frozenset(special), start={**chosen.fit.values, **special})
+        released = bench.trial(
+            chosen.support, release=frozenset(special), start={**chosen.fit.values, **special}
+        )
         say(f"{', '.join(sorted(special))} released")
         if better(released, STRONG):
             chosen = released
@@ -266,7 +273,10 @@ def _released(bench: Bench, selection: Selection, say: Callable[[str], None]) ->
     if damping in bench.own_terms:
         release = frozenset(special) - frozenset(dict(chosen.fit.structure.fixed))
         without = bench.trial(
-            chosen.support, release=release, start={**chosen.fit.values, damping: 0.0}, left_out=frozenset({damping})
+            chosen.support,
+            release=release,
+            start={**chosen.fit.values, damping: 0.0},
+            left_out=frozenset({damping}),
         )
         say(f"without {damping}")
         if better(without, -STRONG):
@@ -300,24 +310,56 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> FitResult:
         free |= rig.downstream_parameters
     structure = chosen.fit.structure
     fit = GreyBoxFit(structure, records, bench.scales, bench.noise).fit(
-        chosen.fit.values, [name for name in structure.names if name in free], max_evaluations=_FINAL_EVALUATIONS
+        chosen.fit.values,
+        [name for name in structure.names if name in free],
+        max_evaluations=_FINAL_EVALUATIONS,
     )
     if not math.isfinite(fit.cost):
         raise SimulationError(f"The discovered equations cannot be fitted to all records: {fit.message}")
     return fit
 
 
-def _inclusion(bench: Bench, selection: Selection, rng: np.random.Generator) -> dict[str, float]:
-    """Return the inclusion probability of the terms that came near the equation, and of the rig's own in the full form."""
-    names = list(bench.own_terms)
-    for trial in selection.trials:
-        names += [name for name in sorted(trial.support) if name not in names]
-    names = names[: _ENSEMBLE_TERMS + len(bench.own_terms)]
-    if not names:
+def _inclusion(
+    task: Task,
+    bench: Bench,
+    selection: Selection,
+    final: FitResult,
+    motions: Sequence[Motion],
+    rows: Rows,
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    """Return the inclusion probability of the terms that came near the equation, and of the rig's own in the full form.
+
+    The columns are taken about the rest position of the polished equation: about any other, a cubic spring shows a square.
+    """
+    names = list(dict.fromkeys(name for trial in selection.trials for name in sorted(trial.support)))
+    names = names[:_ENSEMBLE_TERMS]
+    shift = _rest_shift(bench, final)
+    moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
+    projected = _projected(task, moved, rows) if shift else bench.projected
+    own_terms = _own_terms(task, projected) if bench.own_terms else {}
+    effects = [bench.candidates[name].effect for name in names]
+    library = candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
+    again = replace(
+        bench,
+        candidates={candidate.name: candidate for candidate in library},
+        projected=projected,
+        own_terms=own_terms,
+    )
+    offered = [*own_terms, *again.candidates]
+    if not offered:
         return {}
-    columns = np.column_stack([bench.column(name) for name in names])
-    found = inclusion_probabilities(bench.sparse, columns, rng)
-    return dict(zip(names, map(float, found), strict=True))
+    columns = np.column_stack([again.column(name) for name in offered])
+    found = inclusion_probabilities(again.sparse, columns, rng)
+    return dict(zip(offered, map(float, found), strict=True))
+
+
+def _rest_shift(bench: Bench, final: FitResult) -> float:
+    """Return how far the polished rest position lies from the one that the motion was smoothed about."""
+    motion = bench.rig.motion
+    if not bench.rig.is_driven:
+        return 0.0
+    return sum(final.values[s.name] - bench.values[s.name] for s in motion.rest.free_symbols)
 
 
 def _force_equation(
@@ -337,10 +379,14 @@ def _force_equation(
         return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
 
     without_memory = values[final.structure.parameter_name(loops[0], "a")] * number(motion.stiffness)
-    shift = number(motion.rest) - bench.values[motion.rest.name]
+    shift = _rest_shift(bench, final)
     forces = []
     for own in motions:
-        force = number(motion.drive_gain) * own.u + number(motion.bias) - number(motion.inertia) * own.acceleration
+        force = (
+            number(motion.drive_gain) * own.u
+            + number(motion.bias)
+            - number(motion.inertia) * own.acceleration
+        )
         force -= number(motion.damping) * own.v + without_memory * (own.x - shift)
         for effect in others:
             force -= torque_along(effect, final.structure.values_of(effect, values), own)
@@ -353,7 +399,9 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
     rig, final, selection = task.rig, found.final, found.selection
     output = rig.outputs[0].name
     structure = final.structure
-    text, latex = equations(structure)
+    constants = {p.name for p in rig.constants}
+    numbers = {n: v for n, v in final.values.items() if n not in final.free and n not in constants}
+    text, latex = equations(structure, numbers)
     own = {p.name for p in rig.parameters}
     units = {p.name: p.unit for p in structure.parameters}
     coefficients = {

@@ -110,9 +110,7 @@ def warnings_of(
     ]
     if force is not None:
         blind = [
-            parameter
-            for parameter, term in _FORCE_TERMS_OF.items()
-            if force.inclusion.get(term, 0.0) < _SURE
+            parameter for parameter, term in _FORCE_TERMS_OF.items() if force.inclusion.get(term, 0.0) < _SURE
         ]
         if blind:
             found.append(

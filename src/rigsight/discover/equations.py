@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import sympy as sp
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
@@ -21,19 +23,22 @@ class _Text(StrPrinter):  # type: ignore[misc]
         return f"|{self._print(expr.args[0])}|"
 
     def _print_positive_part(self, expr: sp.Expr) -> str:
-        return f"max(0, {self._print(expr.args[0])})"
+        return str(f"max(0, {self._print(expr.args[0])})")
 
 
-def equations(structure: Structure) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the equations of motion of a structure as text and as LaTeX, one per dynamic state.
 
     Parameters
     ----------
     structure
         Rig and effects; kinematic rows (x' = v) are left out.
+    numbers
+        Parameters that stand as numbers: those that no fit moved, a scale of one or a force of zero.
     """
     plain, pretty = _names(structure)
-    rows = _rows(structure)
+    written = {sp.Symbol(f"p_{name}", real=True): sp.nsimplify(value) for name, value in numbers.items()}
+    rows = [(left, right.xreplace(written)) for left, right in _rows(structure)]
     text = tuple(f"{left[0]} = {_Text().doprint(right.xreplace(plain))}" for left, right in rows)
     printer = LatexPrinter({"symbol_names": pretty})
     latex = tuple(
@@ -53,7 +58,10 @@ def _rows(structure: Structure) -> list[tuple[tuple[str, str], sp.Expr]]:
         inertia = own[f"p_{rig.motion.inertia.name}"]
         # The rate is a force divided by the inertia, and nothing else holds the inertia.
         right = structure.equations[1].rate * inertia
-        left = (f"{rig.motion.inertia.name} {name}''", rf"{sp.latex(rig.motion.inertia)} \ddot{{{_tex(name)}}}")
+        left = (
+            f"{rig.motion.inertia.name} {name}''",
+            rf"{sp.latex(rig.motion.inertia)} \ddot{{{_tex(name)}}}",
+        )
         rows = [(left, right)]
         first = 2
     for equation in structure.equations[first:]:
@@ -66,7 +74,7 @@ def _state_name(structure: Structure, symbol: sp.Symbol) -> str:
     """Return the state's own name without its effect's, where that is enough to know it."""
     short = symbol.name.split(".")[-1]
     same = [s for s in structure.states if s.name.split(".")[-1] == short]
-    return short if len(same) == 1 else symbol.name.replace(".", "_")
+    return str(short if len(same) == 1 else symbol.name.replace(".", "_"))
 
 
 def _names(structure: Structure) -> tuple[dict[sp.Symbol, sp.Symbol], dict[sp.Symbol, str]]:
@@ -79,7 +87,10 @@ def _names(structure: Structure) -> tuple[dict[sp.Symbol, sp.Symbol], dict[sp.Sy
     if rig.is_driven:
         late = structure.delay is not None
         plain |= {rig.motion.displacement: displacement, rig.motion.velocity: f"{displacement}'"}
-        tex |= {rig.motion.displacement: _tex(displacement), rig.motion.velocity: rf"\dot{{{_tex(displacement)}}}"}
+        tex |= {
+            rig.motion.displacement: _tex(displacement),
+            rig.motion.velocity: rf"\dot{{{_tex(displacement)}}}",
+        }
         plain[INPUT] = f"{source}(t - T_d)" if late else source
         tex[INPUT] = rf"{source}(t - T_d)" if late else source
     else:

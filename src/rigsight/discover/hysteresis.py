@@ -101,7 +101,7 @@ def best_loop(
     bounds = ([np.log(_SATURATIONS[0] / 3), np.log(_SKEWS[0] / 3)], [np.log(1e3), np.log(2e3)])
     start = np.array(grid[first][:2])
     # A step in the logarithm that moves the column by more than the integrator's error.
-    solution = least_squares(left, start, bounds=bounds, diff_step=1e-3, max_nfev=_REFINEMENTS)
+    solution = least_squares(left, start, bounds=bounds, diff_step=[1e-3], max_nfev=_REFINEMENTS)
     theta = (float(solution.x[0]), float(solution.x[1]), n)
     column = sign * _columns(motions, rows, [theta], x_size)[:, 0]
     return Loop(_values(theta, x_size), column, _share(projected, column))
@@ -136,9 +136,7 @@ def _columns(
         start = np.zeros((1, len(thetas)))
         with np.errstate(all="ignore"):
             z = simulate_sets(structure, held, p, start, motion.x.size, _SUBSTEPS)[:, 0, :]
-        blocks.append(
-            np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(thetas))])
-        )
+        blocks.append(np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(thetas))]))
     return np.concatenate(blocks)
 
 
@@ -199,9 +197,7 @@ def force_equation(
     matrix = np.concatenate(columns)
     rate = np.concatenate(target)
     # Nothing is projected out but a constant rate, which no force can have for long.
-    projected = Projected(
-        np.ones((rate.size, 1)), rate, rate.size * rows.independent_share(1)
-    )
+    projected = Projected(np.ones((rate.size, 1)), rate, rate.size * rows.independent_share(1))
     inclusion = inclusion_probabilities(projected, matrix, rng)
     taken = inclusion >= 0.5
     coefficients = np.zeros(len(FORCE_TERMS))

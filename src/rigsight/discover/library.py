@@ -82,7 +82,12 @@ def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
 def _is_static(effect: Effect) -> bool:
     """Return True for a known signal of displacement, velocity and input: no state, no use of a torque it would change."""
     known = (effect.torque, effect.deflection, effect.drive, effect.delay)
-    symbols = {canonical.x, canonical.v, canonical.u, *(sp.Symbol(p.name, real=True) for p in effect.parameters)}
+    symbols = {
+        canonical.x,
+        canonical.v,
+        canonical.u,
+        *(sp.Symbol(p.name, real=True) for p in effect.parameters),
+    }
     return (
         effect.place in (Place.ACTUATOR, Place.DYNAMICS)
         and not effect.states
@@ -190,7 +195,10 @@ def _library_columns(
         function_names=[_constant_name(effect.name) for effect in effects],
     )
     # On numbers near one, and back to SI by the dimension of the coefficient.
-    sizes = [characteristic_value(e.parameters[0].dimension, {**scales, "force": 1.0, "drive": 1.0}) for e in effects]
+    sizes = [
+        characteristic_value(e.parameters[0].dimension, {**scales, "force": 1.0, "drive": 1.0})
+        for e in effects
+    ]
     columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
     for motion in motions:
         points = np.column_stack([motion.x / scales["x"], motion.v * scales["time"] / scales["x"]])
@@ -265,9 +273,7 @@ def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) ->
     return _evaluated(effect.torque, values, motion)
 
 
-def _evaluated(
-    expression: sp.Expr, inner: Mapping[str, float], motion: Motion
-) -> NDArray[np.float64]:
+def _evaluated(expression: sp.Expr, inner: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
     numbers = {sp.Symbol(name, real=True): value for name, value in inner.items()}
     plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2).subs(numbers)
     compiled = sp.lambdify((canonical.x, canonical.v, canonical.u), plain, "numpy", cse=True)

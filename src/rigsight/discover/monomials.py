@@ -19,9 +19,7 @@ _PREFIX = "monomial"
 
 def _monomial(i: int, j: int) -> Effect:
     name = f"c_{i}{j}"
-    dimension = " ".join(
-        factor for factor in ("force", f"x^{-(i + j)}", f"time^{j}" if j else "") if factor
-    )
+    dimension = " ".join(factor for factor in ("force", f"x^{-(i + j)}", f"time^{j}" if j else "") if factor)
     # Odd in the velocity: it can only take energy out (or, with a negative coefficient, put it in).
     damps = j % 2 == 1 and i % 2 == 0
     return Effect(
@@ -58,3 +56,8 @@ def _powers() -> list[tuple[int, int]]:
 
 MONOMIALS: tuple[Effect, ...] = tuple(_monomial(i, j) for i, j in _powers())
 """Declared once; a monomial that an effect of the catalogue already is stands there and not here."""
+
+
+def known_terms() -> dict[str, Effect]:
+    """Return every effect that a model may hold, by name: those of the catalogue and the monomials."""
+    return {effect.name: effect for effect in (*CATALOGUE, *MONOMIALS)}

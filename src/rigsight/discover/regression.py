@@ -117,7 +117,9 @@ def information_criterion(mean_square: float, n_terms: int, independent: float) 
     return float(independent * np.log(mean_square + 1e-300) + n_terms * np.log(independent))
 
 
-def alike(projected: Projected, columns: NDArray[np.float64], threshold: float) -> list[tuple[int, int, float]]:
+def alike(
+    projected: Projected, columns: NDArray[np.float64], threshold: float
+) -> list[tuple[int, int, float]]:
     """Return pairs of terms whose columns differ by little once the rig's own terms are taken out, with their correlation."""
     rest = projected.rest_of(columns)
     size = np.linalg.norm(rest, axis=0)
@@ -137,7 +139,7 @@ def _compressed(
     """Return few rows with the same normal equations and the same sum of squares, columns of unit length."""
     size = np.linalg.norm(matrix, axis=0)
     size[size == 0.0] = 1.0
-    factor = np.linalg.qr(np.column_stack([matrix / size, target]), mode="r")
+    factor = np.asarray(np.linalg.qr(np.column_stack([matrix / size, target]), mode="r"))
     return factor[:, :-1], factor[:, -1]
 
 

@@ -152,7 +152,7 @@ class Discovery:
     warnings
         What a user should know before using the equations, one sentence each.
     by_record
-        What was found on each record alone; empty unless asked for.
+        What was found on each record alone, or why nothing was; empty unless asked for.
     """
 
     title: str
@@ -175,7 +175,7 @@ class Discovery:
     unit: str
     model: Mapping[str, Any]
     warnings: tuple[str, ...]
-    by_record: tuple[tuple[str, Discovery], ...] = ()
+    by_record: tuple[tuple[str, Discovery | str], ...] = ()
 
     @property
     def kept(self) -> tuple[Term, ...]:
@@ -204,5 +204,8 @@ class Discovery:
                 "independent_samples": self.independent,
             },
             "warnings": list(self.warnings),
-            "by_record": {name: found.to_json() for name, found in self.by_record},
+            "by_record": {
+                name: {"error": found} if isinstance(found, str) else found.to_json()
+                for name, found in self.by_record
+            },
         }

@@ -107,7 +107,9 @@ class Bench:
         kept = [
             i
             for i in range(self.projected.base.shape[1])
-            if not any(np.array_equal(self.projected.base[:, i], column) for column in self.own_terms.values())
+            if not any(
+                np.array_equal(self.projected.base[:, i], column) for column in self.own_terms.values()
+            )
         ]
         return replace(self.projected, base=self.projected.base[:, kept])
 
@@ -140,10 +142,16 @@ class Bench:
     def start(self, structure: Structure, support: Support) -> dict[str, float]:
         """Return the values that the regression gives a support, in SI."""
         chosen = [self.candidates[name] for name in sorted(support)]
-        columns = np.column_stack([c.column for c in chosen]) if chosen else np.zeros((self.projected.target.size, 0))
+        columns = (
+            np.column_stack([c.column for c in chosen])
+            if chosen
+            else np.zeros((self.projected.target.size, 0))
+        )
         solution, _ = self.projected.solved(columns)
         values, force = _rig_values(self.rig, self.values, solution[: self.projected.base.shape[1]])
-        for candidate, coefficient in zip(chosen, solution[self.projected.base.shape[1] :] * force, strict=True):
+        for candidate, coefficient in zip(
+            chosen, solution[self.projected.base.shape[1] :] * force, strict=True
+        ):
             values |= self._effect_values(structure, candidate, float(coefficient), values)
         bounds = {p.name: p for p in structure.parameters}
         return {
@@ -230,6 +238,7 @@ def _rig_values(
         values |= {motion.damping.name: base[0], motion.stiffness.name: base[1], motion.bias.name: base[2]}
         return values, 1.0
     gain = float(motion.drive_gain.subs({s: known[s.name] for s in motion.drive_gain.free_symbols}))
+    assert motion.inertia is not None
     inertia = gain / base[0] if base[0] * gain > 0.0 else known[motion.inertia.name]
     values[motion.inertia.name] = inertia
     values[motion.damping.name] = max(base[1] * inertia, 1e-4 * known[motion.damping.name])

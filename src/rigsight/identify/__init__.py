@@ -4,6 +4,7 @@ from rigsight.identify.conicity import ConicityEstimate as ConicityEstimate
 from rigsight.identify.conicity import conicity_slope as conicity_slope
 from rigsight.identify.conicity import creep_error_of_sine as creep_error_of_sine
 from rigsight.identify.conicity import estimate_conicity as estimate_conicity
+from rigsight.identify.driven_offsets import driven_offsets as driven_offsets
 from rigsight.identify.effect_start import EffectRegression as EffectRegression
 from rigsight.identify.fit_result import FitResult as FitResult
 from rigsight.identify.grey_box import GreyBoxFit as GreyBoxFit
@@ -36,6 +37,7 @@ __all__ = [
     "characteristic_scales",
     "conicity_slope",
     "creep_error_of_sine",
+    "driven_offsets",
     "estimate_conicity",
     "fit_frequency_response",
     "fit_jointly",

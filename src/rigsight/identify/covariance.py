@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 _DEPENDENT = 1e-14
 """Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
 _TAKES_PART = 1e-9
-_SMOOTHED = 15
+SMOOTHED = 15
 """Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
 record however fast it is sampled, and what a disturbance leaves of a resonance is some of them wide."""
 
@@ -136,7 +136,7 @@ def _spectral_product(
 
 def _smoothed(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Average over neighbors; beyond zero and Nyquist the spectrum of a real signal goes on conjugated."""
-    half = min(_SMOOTHED // 2, spectrum.size - 1)
+    half = min(SMOOTHED // 2, spectrum.size - 1)
     before, after = spectrum[half:0:-1].conj(), spectrum[-2 : -2 - half : -1].conj()
     around = np.concatenate([before, spectrum, after])
     return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))

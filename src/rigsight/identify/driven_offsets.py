@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.signal import lfilter
+from scipy.stats import norm, t
 
 from rigsight.errors import InputError
-from rigsight.identify.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.physical import PhysicalEstimates
+from rigsight.identify.covariance import SMOOTHED, colored_covariance, propagated_covariance
+from rigsight.identify.physical import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.records.record import Hold, Record
 
 _LEAST_SAMPLES = 20
 _DIFFERENCE = 1e-4
+_NUMBERS = SMOOTHED - 1
+"""Real numbers behind the spectrum at frequency zero: lines below it mirror those above, and the offset takes its own."""
 
 
 def driven_offsets(
@@ -73,10 +76,19 @@ def driven_offsets(
     places = np.cumsum([0, *(design.shape[1] for design in designs)])[:-1]
     stacked = block_diag(*designs)
     noise = colored_covariance([(np.concatenate(residuals), stacked)], stacked.shape[1], [len(parts)])
-    covariance = noise[np.ix_(places, places)] + np.diag(of_fits)
+    covariance = _few_numbers() * noise[np.ix_(places, places)] + np.diag(of_fits)
     return PhysicalEstimates(
-        tuple(values), values, covariance, f"(2.26), (2.27) from what the fits leave of record '{record.name}'"
+        tuple(values),
+        values,
+        covariance,
+        f"(2.26), (2.27) from what the fits leave of record '{record.name}'",
     )
+
+
+def _few_numbers() -> float:
+    """Return the factor by which the variance of an offset grows because so few numbers show the noise near frequency zero."""
+    share = 0.5 + 0.5 * LEVEL
+    return float((t.ppf(share, _NUMBERS) / norm.ppf(share)) ** 2 * SMOOTHED / _NUMBERS)
 
 
 def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,10 +104,8 @@ def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -
 def _fading(fit: TransferFit, n_samples: int, dt: float) -> NDArray[np.float64]:
     """Return shapes that span the form's motion without input, shape (n_samples, order)."""
     omega_b = fit.values["omega_b"]
-    if fit.form.order == "pt1":
-        poles = np.array([-omega_b])
-    else:
-        poles = np.roots([1.0, 2.0 * fit.values["zeta"] * omega_b, omega_b**2])
+    inertia = [] if fit.form.order == "pt1" else [omega_b**-2]
+    poles = np.roots([*inertia, 2.0 * fit.values.get("zeta", 0.5) / omega_b, 1.0])
     pulse = np.zeros(n_samples)
     pulse[0] = 1.0
     first = lfilter([1.0], np.poly(np.exp(poles * dt)).real, pulse)

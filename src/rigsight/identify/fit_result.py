@@ -36,6 +36,8 @@ class FitResult:
         Names of the fitted parameters, in the order of `covariance`.
     covariance
         Shape (n_free, n_free), in units of the parameters.
+    substeps
+        Integration steps per sample that were used for each record.
     """
 
     structure: Structure
@@ -51,6 +53,7 @@ class FitResult:
     covariance: NDArray[np.float64]
     residuals: tuple[NDArray[np.float64], ...]
     """Measured minus simulated per record, shape (n_samples, n_outputs), NaN where an output was not measured."""
+    substeps: tuple[int, ...] = ()
 
     @property
     def weighted_rms(self) -> float:

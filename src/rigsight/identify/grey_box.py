@@ -107,6 +107,7 @@ class GreyBoxFit:
         max_evaluations: int = 60,
         tolerance: float = 1e-7,
         finish: bool = True,
+        substeps: Sequence[int] | None = None,
     ) -> FitResult:
         """Fit the free parameters and every record's initial state.
 
@@ -124,6 +125,8 @@ class GreyBoxFit:
             Relative change of the cost at which the optimizer stops.
         finish
             Compute standard errors, and residuals with the accurate integrator. False for a first look.
+        substeps
+            Integration steps per sample of each record; default is chosen from the accuracy with the accurate integrator.
 
         Returns
         -------
@@ -144,7 +147,10 @@ class GreyBoxFit:
             [coordinates.upper, *(np.where(self._limited, 1.0, x + _STATE_RANGE) for x in places)]
         )
         problem = _Problem(self, coordinates, n_states, upper)
-        problem.choose_substeps(theta)
+        if substeps is None:
+            problem.choose_substeps(theta)
+        else:
+            problem.substeps = list(substeps)
         if not np.isfinite(problem.at(theta).cost):
             return self._failed(coordinates, theta, "The start values cannot be simulated.")
         if theta.size == 0:
@@ -179,6 +185,7 @@ class GreyBoxFit:
             free=coordinates.free,
             covariance=np.full((n, n), np.inf),
             residuals=(),
+            substeps=(_MOST_SUBSTEPS,) * len(self._data),
         )
 
     def _result(
@@ -220,6 +227,7 @@ class GreyBoxFit:
             free=coordinates.free,
             covariance=covariance,
             residuals=residuals,
+            substeps=tuple(problem.substeps),
         )
 
     @property

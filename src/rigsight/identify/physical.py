@@ -210,7 +210,7 @@ def offsets(
     static_gain
         psi / u at rest [rad/A], to take out the mean of the input; None requires an input that is zero on the mean.
     start, stop
-        The stretch [s], default the whole record: a sweep about zero, or a rest.
+        The stretch [s], default the whole record: a rest, or a constant current. Of a sweep `driven_offsets` knows more.
 
     Returns
     -------

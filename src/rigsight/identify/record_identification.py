@@ -12,8 +12,9 @@ from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.axis_parameters import axis_parameters, springless_parameters
 from rigsight.identify.conicity import ConicityEstimate, estimate_conicity
+from rigsight.identify.driven_offsets import driven_offsets
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.physical import PhysicalEstimates, lateral_parameters, offsets, yaw_parameters
+from rigsight.identify.physical import PhysicalEstimates, lateral_parameters, yaw_parameters
 from rigsight.identify.record_response import Method, RecordResponse, record_response
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.identify.transfer_form import Order
@@ -288,22 +289,9 @@ def _offsets(record: Record, rig: Rig, paths: list[PathIdentification]) -> Physi
         return None
     lateral = paths[1] if len(paths) > 1 and paths[1].physical is not None else None
     rest = next(symbol.name for symbol in rig.motion.rest.free_symbols)
-    gain = motion.fit.values["gain"]
     if record.kind == "step":
         return _step_offsets(record, rest, motion.fit, lateral)
-    if lateral is not None and lateral.physical is not None:
-        known = lateral.physical
-        return offsets(record, known.values["l_0"], known.standard_errors["l_0"], gain)
-    # Without y, only the first of the two offsets has a meaning.
-    alone = offsets(
-        record.with_signals(psi=record[motion.response], y=np.zeros(record.n_samples)), 0.0, 0.0, gain
-    )
-    return PhysicalEstimates(
-        (rest,),
-        {rest: alone.values["psi_off"]},
-        alone.covariance[:1, :1],
-        "mean of the record less the drive's",
-    )
+    return driven_offsets(record, motion.fit, None if lateral is None else lateral.fit, rest)
 
 
 def _step_offsets(

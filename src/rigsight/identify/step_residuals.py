@@ -124,7 +124,9 @@ def _autocovariance(
     if zeta is None:
         a = np.array([[-omega_b, omega_b], [0.0, -corner]])
     else:
-        a = np.array([[0.0, 1.0, 0.0], [-(omega_b**2), -2.0 * zeta * omega_b, omega_b**2], [0.0, 0.0, -corner]])
+        a = np.array(
+            [[0.0, 1.0, 0.0], [-(omega_b**2), -2.0 * zeta * omega_b, omega_b**2], [0.0, 0.0, -corner]]
+        )
     driven = np.zeros_like(a)
     driven[-1, -1] = -2.0 * corner
     state = solve_continuous_lyapunov(a, driven)[:, 0]

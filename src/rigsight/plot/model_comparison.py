@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.frequency import FrequencyResponse
-from rigsight.plot.drawing import FLOOR, MEASURED, OTHER, in_style, new_figure, shown_in
+from rigsight.plot.drawing import FLOOR, MEASURED, OTHER, WITH_EFFECT, in_style, new_figure, shown_in
 from rigsight.plot.frequency_responses import (
     TWO_SIDED,
     decibel,
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#000000")
 """Okabe and Ito's palette, its yellow darkened for white paper."""
+_MOST_TICKS = 5
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.2, 1, 1.2)))
 
 
@@ -83,6 +84,8 @@ class ErrorPanel:
         Model -> root mean square over records; a model without one is said to lack it.
     single
         Model -> error on each record.
+    best
+        Models with the smallest root mean square.
     floor
         Noise floor over all records, None if unknown.
     """
@@ -90,6 +93,7 @@ class ErrorPanel:
     title: str
     overall: Mapping[str, float]
     single: Mapping[str, Sequence[float]]
+    best: frozenset[str]
     floor: float | None
 
 
@@ -203,17 +207,10 @@ def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
         values = [v for single in panel.single.values() for v in single if v > 0.0]
         values += [v for v in (*panel.overall.values(), panel.floor) if v is not None and v > 0.0]
         left, right = 0.6 * min(values, default=1.0), 1.6 * max(values, default=1.0)
-        least = min((v for v in panel.overall.values()), default=0.0)
         for row, name in enumerate(names):
             if name in panel.overall:
-                is_best = panel.overall[name] <= least * (1.0 + 1e-9)
-                ax.barh(
-                    row,
-                    panel.overall[name] - left,
-                    left=left,
-                    height=0.66,
-                    color="#0072b2" if is_best else OTHER,
-                )
+                color = WITH_EFFECT if name in panel.best else OTHER
+                ax.barh(row, panel.overall[name] - left, left=left, height=0.66, color=color)
             elif not panel.single.get(name):
                 ax.text(1.05 * left, row, "failed", va="center", fontsize=8, color=MEASURED)
             points = [value for value in panel.single.get(name, ()) if value > 0.0]
@@ -222,6 +219,7 @@ def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
             ax.axvline(panel.floor, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.1)
         ax.set_xscale("log")
         ax.set_xlim(left, right)
+        _decade_ticks(ax, left, right)
         ax.set_ylim(len(names) - 0.4, -0.6)
         ax.set_yticks(range(len(names)), names)
         ax.tick_params(axis="y", length=0)
@@ -229,6 +227,16 @@ def model_errors(panels: Sequence[ErrorPanel], names: Sequence[str]) -> Figure:
         ax.grid(axis="x")
         ax.set_axisbelow(True)
     return figure
+
+
+def _decade_ticks(ax: Axes, left: float, right: float) -> None:
+    """Label whole decades, as few as fit into a narrow panel."""
+    from matplotlib.ticker import NullLocator
+
+    decades = np.arange(np.ceil(np.log10(left)), np.floor(np.log10(right)) + 1.0)
+    shown = 10.0 ** decades[:: -(-decades.size // _MOST_TICKS) or 1]
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xticks(shown, [f"{tick:g}" for tick in shown])
 
 
 def _measured(ax: Axes, omega: NDArray[np.float64], values: NDArray[np.float64], label: str | None) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigsight.compare import Column, Comparison, RecordComparison
+from rigsight.compare.comparison import best
 from rigsight.plot import (
     ErrorPanel,
     ResponsesPanel,
@@ -80,7 +81,9 @@ def _errors(comparison: Comparison) -> ComparisonFigure:
             if score.column == column:
                 single[score.model].append(score.value)
         values = {name: row[column] for name, row in overall.items() if column in row}
-        panels.append(ErrorPanel(column_label(column), values, single, comparison.floor(column)))
+        panels.append(
+            ErrorPanel(column_label(column), values, single, best(overall, column), comparison.floor(column))
+        )
     caption = (
         "Errors of all models: bars are root mean squares over the records, points the single records, the best is blue. "
         "Dashed: noise floor."

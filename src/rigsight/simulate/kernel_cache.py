@@ -12,6 +12,7 @@ import os
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -97,8 +98,8 @@ def run_kernel(structure: Structure, function: str, *arguments: Any) -> Any:
 _sources_by_identity: dict[int, tuple[Structure, str]] = {}
 
 
-def compiled(structure: Structure) -> bool:
-    """Return True if this machine seems to hold the machine code of a structure's kernels already.
+def compiled(structure: Structure, functions: Sequence[str] = ENTRY_POINTS) -> bool:
+    """Return True if this machine seems to hold the machine code of these functions of a structure's kernels already.
 
     A hint: code of another processor or numba version is only found out, and compiled anew, when it is called.
     """
@@ -106,7 +107,7 @@ def compiled(structure: Structure) -> bool:
     version = f"py{sys.version_info.major}{sys.version_info.minor}"
     return all(
         any((path.parent / "__pycache__").glob(f"{path.stem}.{function}-*.{version}*.nbi"))
-        for function in ENTRY_POINTS
+        for function in functions
     )
 
 

@@ -13,8 +13,15 @@ from rigsight.simulate.simulation import simulate_outputs, simulate_sets
 from rigsight.simulate.structure import Structure
 
 
-def compile_kernels(structure: Structure) -> None:
-    """Compile all kernels of a structure and keep them on disk, by simulating an instant of rest.
+def compile_kernels(structure: Structure, side_by_side_only: bool = False) -> None:
+    """Compile the kernels of a structure and keep them on disk, by simulating an instant of rest.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    side_by_side_only
+        Leave out the accurate integrator, which a first look does not need.
 
     Raises
     ------
@@ -28,6 +35,7 @@ def compile_kernels(structure: Structure) -> None:
         [parameter.upper for parameter in structure.parameters],
     )
     state = np.zeros(max(1, len(structure.states)))
-    with contextlib.suppress(SimulationError):
-        simulate_outputs(structure, held, p, state, 3, 1e-3)
+    if not side_by_side_only:
+        with contextlib.suppress(SimulationError):
+            simulate_outputs(structure, held, p, state, 3, 1e-3)
     simulate_sets(structure, held, p[:, None], state[:, None], 3, 1)

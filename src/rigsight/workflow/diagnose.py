@@ -69,7 +69,14 @@ def run_diagnose(
     candidates = [effect for effect in effects if read.rig.offers(effect) and effect not in read.modelled]
     prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
-    diagnosis = diagnose(task_of(read), candidates, seed=seed, n_jobs=jobs, progress=stage.finished)
+    diagnosis = diagnose(
+        task_of(read),
+        candidates,
+        seed=seed,
+        n_jobs=jobs,
+        progress=stage.finished,
+        prepare=lambda structures: prepare_kernels(structures, jobs, listener, for_looks=True),
+    )
     if out is not None:
         write_diagnosis(
             diagnosis, Path(out), command or f"rigsight diagnose {shlex.quote(str(campaign))}", seed

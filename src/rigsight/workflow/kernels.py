@@ -13,10 +13,12 @@ from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
+from rigsight.simulate.kernel_cache import ENTRY_POINTS
 from rigsight.simulate.precompile import compile_kernels, compiled
 from rigsight.workflow.progress import Listener, Stage, silent
 
 COMPILING = "Compiling kernels (first run on this machine only)"
+COMPILING_PAIRS = "Compiling kernels of pairs (first time only)"
 _MOST_JOBS = 1024
 
 
@@ -46,7 +48,9 @@ def structures_to_try(
     ]
 
 
-def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:
+def prepare_kernels(
+    structures: Sequence[Structure], n_jobs: int, listener: Listener = silent, for_looks: bool = False
+) -> None:
     """Compile what this machine does not hold yet, several at a time.
 
     Parameters
@@ -57,20 +61,23 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
         Processes.
     listener
         Told of every compiled kernel; not at all where there is nothing to compile.
+    for_looks
+        Compile only what a first look at pairs of effects needs.
 
     Raises
     ------
     InputError
         If the cache folder cannot be written.
     """
-    missing = [structure for structure in structures if not compiled(structure)]
+    functions = ("simulate_lanes",) if for_looks else ENTRY_POINTS
+    missing = [structure for structure in structures if not compiled(structure, functions)]
     if not missing:
         return
-    stage = Stage(COMPILING, len(missing), listener)
+    stage = Stage(COMPILING_PAIRS if for_looks else COMPILING, len(missing), listener)
     n_jobs = min(n_jobs, len(missing))
     if n_jobs < 2:
         for structure in missing:
-            compile_kernels(structure)
+            compile_kernels(structure, for_looks)
             stage.finished(_described(structure))
         return
     # Processes that ignore Ctrl-C do not each print a traceback; joblib ends them when this process is interrupted.
@@ -82,15 +89,15 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
         initializer=_ignore_interrupts,
     )
     try:
-        for name in parallel(delayed(_compile)(structure) for structure in missing):
+        for name in parallel(delayed(_compile)(structure, for_looks) for structure in missing):
             stage.finished(name)
     finally:
         # Idle workers would keep half a gigabyte each for minutes.
         get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
-def _compile(structure: Structure) -> str:
-    compile_kernels(structure)
+def _compile(structure: Structure, for_looks: bool) -> str:
+    compile_kernels(structure, for_looks)
     return _described(structure)
 
 

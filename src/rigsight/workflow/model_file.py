@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from rigsight.effects import CATALOGUE, effect_named
+from rigsight.discover.monomials import known_terms
+from rigsight.effects import effect_named
 from rigsight.errors import InputError, nearest
 from rigsight.records import Hold
 from rigsight.rigs import RIGS
@@ -173,14 +174,14 @@ def _structure(path: Path, table: ModelTable) -> Structure:
         raise InputError(
             f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, RIGS)} Allowed: {', '.join(RIGS)}."
         )
-    known = [effect.name for effect in CATALOGUE]
+    known = known_terms()
     for name in table.effects:
         if name not in known:
             raise InputError(
                 f"{path.name}: effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
             )
     try:
-        return compose(RIGS[table.rig], [effect_named(name) for name in table.effects])
+        return compose(RIGS[table.rig], [known[name] for name in table.effects])
     except InputError as error:
         raise InputError(f"{path.name}: effects: {error}") from None
 

@@ -1,0 +1,155 @@
+"""What `rigsight discover` does: a campaign -> `discovery.json`, `model.json` and a picture, together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+from joblib import Parallel, delayed
+
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.windows import cut, window_length
+from rigsight.discover import METHODS, Discovery, Task, discover
+from rigsight.discover.discovery import Method
+from rigsight.errors import RigsightError, check_option
+from rigsight.plot import svg_text
+from rigsight.plot.discovery import discovery_figure
+from rigsight.records import Record
+from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.kernels import checked_jobs
+from rigsight.workflow.model_file import MODEL_FILE
+from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.results import check_writable, json_text, write_together
+
+DISCOVERY_FILE = "discovery.json"
+FIGURE_FILE = "discovery.svg"
+DISCOVERING = "Discovering"
+_STEPS = 18
+"""About as many as a discovery takes; more raise the total."""
+
+
+def run_discover(
+    campaign: str | Path,
+    out: str | Path | None = None,
+    *,
+    method: str = "discrepancy",
+    pointwise: bool = False,
+    one_by_one: bool = False,
+    seed: int = 0,
+    n_jobs: int | None = None,
+    listener: Listener = silent,
+) -> Discovery:
+    """Discover the governing equations behind the records of a campaign.
+
+    Parameters
+    ----------
+    campaign
+        The toml file or its folder.
+    out
+        Folder for ``discovery.json``, ``model.json`` and ``discovery.svg``; None writes nothing.
+    method
+        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. ``"full"``: the whole acceleration is.
+    pointwise
+        Regress sample by sample instead of in the weak form.
+    one_by_one
+        Discover on each estimation record alone as well.
+    seed
+        Seed of the ensembles.
+    n_jobs
+        Records discovered on at the same time; None for one per processor.
+    listener
+        Told of every finished step.
+
+    Raises
+    ------
+    InputError
+        If the campaign or its records cannot be used, or the results cannot be written; nothing is written then.
+    SimulationError
+        If the rig's own equations cannot be simulated near the records.
+    """
+    check_option("The method", method, METHODS)
+    jobs = checked_jobs(n_jobs)
+    if out is not None:
+        check_writable(Path(out))
+    read = read_campaign(campaign)
+    task = discovery_task(read)
+    stage = Stage(DISCOVERING, _STEPS, listener)
+    chosen = cast("Method", method)
+    found = discover(task, chosen, pointwise, seed, stage.finished)
+    notes = (*read.notes, *(note for record in read.records for note in record.notes))
+    found = replace(found, warnings=(*found.warnings, *notes))
+    if one_by_one:
+        found = replace(
+            found, by_record=_one_by_one(read, task, chosen, pointwise, seed, jobs, stage.finished)
+        )
+    if out is not None:
+        write_discovery(found, Path(out))
+    return found
+
+
+def discovery_task(campaign: Campaign) -> Task:
+    """Return what is to be discovered in a campaign; records of a rig that drifts are cut into windows.
+
+    Parameters
+    ----------
+    campaign
+        A campaign that was read.
+    """
+    no_spring = campaign.parameters.get("k") == 0.0
+    length = window_length(campaign.rig, campaign.estimation) if no_spring else None
+    noise = {floor.output: floor.std for floor in noise_floors(campaign.rig, campaign.records)}
+    return Task(
+        title=campaign.title,
+        rig=campaign.rig,
+        constants=campaign.constants,
+        records=cut(campaign.records, length),
+        noise=noise,
+        no_spring=no_spring,
+    )
+
+
+def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
+    """Write all results of a discovery into a folder, all or none.
+
+    Raises
+    ------
+    InputError
+        If they cannot be written.
+    """
+    return write_together(
+        out,
+        {
+            DISCOVERY_FILE: json_text(found.to_json()),
+            MODEL_FILE: json_text(found.model),
+            FIGURE_FILE: svg_text(discovery_figure(found), FIGURE_FILE),
+        },
+    )
+
+
+def _one_by_one(
+    campaign: Campaign,
+    task: Task,
+    method: Method,
+    pointwise: bool,
+    seed: int,
+    n_jobs: int,
+    finished: Callable[[str], None],
+) -> tuple[tuple[str, Discovery | str], ...]:
+    """Discover on each estimation record alone; where that fails, the reason stands in its place."""
+
+    def alone(record: Record) -> tuple[str, Discovery | str]:
+        own = [r for r in task.records if r.role == "validation" or r.name.startswith(record.name)]
+        try:
+            return record.name, discover(replace(task, records=tuple(own)), method, pointwise, seed)
+        except RigsightError as error:
+            return record.name, str(error)
+
+    found = []
+    # Threads: the kernels let others run.
+    parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+    for name, result in parallel(delayed(alone)(record) for record in campaign.estimation):
+        found.append((name, result))
+        finished(f"{name} alone")
+    return tuple(found)
