@@ -39,13 +39,8 @@ def run_study(study: Study, configs: Mapping[str, Config], out: Path, n_jobs: in
         told += lines
         for line in lines:
             print(line, flush=True)
-    (out / "summary.md").write_text(summary_text(out, read_names(configs)), encoding="utf-8")
+    (out / "summary.md").write_text(summary_text(out), encoding="utf-8")
     return told
-
-
-def read_names(configs: Mapping[str, Config]) -> dict[str, float]:
-    """Return the factor on the noise by config."""
-    return {name: config.noise for name, config in configs.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

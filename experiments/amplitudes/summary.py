@@ -21,14 +21,12 @@ _SHOWN = {
 }  # fmt: skip
 
 
-def read_errors(out: Path, configs: Mapping[str, float]) -> tuple[dict[str, Errors], Errors]:
-    """Return the errors by model, and the noise floors, from all comparisons that are finished."""
+def read_errors(out: Path) -> tuple[dict[str, Errors], Errors]:
+    """Return the errors by model, and the noise floors, from all comparisons that are finished; the joint config first."""
     models: dict[str, Errors] = {}
     floors: Errors = {}
-    for config in configs:
-        file = out / config / "compare" / "comparison.csv"
-        if not file.is_file():
-            continue
+    for file in sorted(out.glob("*/compare/comparison.csv"), key=_order):
+        config = file.parents[1].name
         with file.open(encoding="utf-8", newline="") as stream:
             for row in csv.DictReader(stream):
                 if not row["value"]:
@@ -43,9 +41,14 @@ def read_errors(out: Path, configs: Mapping[str, float]) -> tuple[dict[str, Erro
     return models, floors
 
 
-def summary_text(out: Path, configs: Mapping[str, float]) -> str:
+def _order(file: Path) -> tuple[bool, str, float]:
+    kind, _, number = file.parents[1].name.partition("_")
+    return kind != "joint", kind, float(number) if number.replace(".", "").isdigit() else 0.0
+
+
+def summary_text(out: Path) -> str:
     """Return the tables as Markdown, best of each column in bold; the truth itself stands below the line."""
-    models, floors = read_errors(out, configs)
+    models, floors = read_errors(out)
     if not models:
         return "Nothing was compared.\n"
     blocks = ["\n".join(_table(models, floors, key)) for key in _SHOWN]

@@ -21,7 +21,6 @@ from rigsight.errors import InputError, RigsightError
 
 if TYPE_CHECKING:
     from rigsight.diagnose import Diagnosis
-    from rigsight.effects import Effect
     from rigsight.records import ColumnMapping
     from rigsight.workflow.progress import Listener, Step
 
@@ -48,6 +47,15 @@ Jobs = Annotated[
         min=1,
         show_default="one per processor",
         help="Candidates fitted, or records identified, at the same time.",
+    ),
+]
+OwnEffects = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--effects",
+        metavar="FILE",
+        show_default="none",
+        help="A Python file that declares effects of your own; it is run. May be repeated.",
     ),
 ]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -146,9 +154,12 @@ def diagnose(
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME", show_default="the whole catalogue", help="Try only this effect. May be repeated."
+            metavar="NAME",
+            show_default="the catalogue and your own",
+            help="Try only this effect. May be repeated.",
         ),
     ] = None,
+    effects: OwnEffects = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     quiet: Quiet = False,
@@ -160,11 +171,14 @@ def diagnose(
     """
     with _told(debug), _listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
+        from rigsight.workflow.own_effects import named, own_effects
 
+        own = own_effects(effects or [], listener=listener)
         diagnosis = run_diagnose(
             campaign,
             out,
-            effects=_effects(effect or []),
+            effects=named(effect or [], own),
+            own_effects=own,
             seed=seed,
             n_jobs=jobs,
             listener=listener,
@@ -370,6 +384,7 @@ def simulate(
             help="States that start elsewhere (psi=0.01,w=0), or 'estimated' from the outputs in the record.",
         ),
     ] = None,
+    effects: OwnEffects = None,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -379,10 +394,16 @@ def simulate(
     """
     file = out or Path(f"{record.stem}_simulated.csv")
     with _told(debug), _listening(quiet):
+        from rigsight.workflow.own_effects import own_effects
         from rigsight.workflow.simulate import run_simulate
 
         simulated = run_simulate(
-            model, record, file, columns=_columns(column or []), initial_state=_states(initial_state)
+            model,
+            record,
+            file,
+            columns=_columns(column or []),
+            initial_state=_states(initial_state),
+            own_effects=own_effects(effects or [], check=False),
         )
     if not quiet:
         typer.echo(f"{simulated.n_samples} samples simulated: {file}")
@@ -454,10 +475,27 @@ def vary(
         typer.echo(f"Pictures and numbers: {out}")
 
 
-def _effects(names: list[str]) -> tuple[Effect, ...]:
-    from rigsight.effects import CATALOGUE, effect_named
+@app.command(name="effects")
+def list_effects(
+    effects: OwnEffects = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """List the effects that a diagnosis tries, and check effects of your own before they compete.
 
-    return tuple(effect_named(name) for name in dict.fromkeys(names)) or CATALOGUE
+    A file's effects are simulated and fitted: exit code 2 and the reason if one does not keep what an effect promises.
+    """
+    with _told(debug), _listening(quiet) as listener:
+        from rigsight.effects import CATALOGUE
+        from rigsight.workflow.own_effects import equation_text, own_effects
+
+        own = own_effects(effects or [], listener=listener)
+        if quiet:
+            return
+        for effect in (*CATALOGUE, *own):
+            typer.echo(f"{effect.name:28}{effect.place.value:18}{equation_text(effect)}")
+        if own:
+            typer.echo(f"\nYour own, checked: {', '.join(effect.name for effect in own)}")
 
 
 def _columns(given: list[str]) -> dict[str, ColumnMapping]:

@@ -8,6 +8,7 @@ import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep, step
@@ -300,3 +301,22 @@ def test_bad_steps_are_told_in_words() -> None:
     fit = fit_step(deaf, "u", "psi", "pt2", 178.0, 184.0)
     assert not fit.success
     assert "does not stand out" in fit.message
+
+
+def test_errors_from_short_steps_allow_for_a_disturbance_that_rings_as_the_rig_does() -> None:
+    """Lightly damped, 4 s, and nearly all that is left is a disturbance: lines of a spectrum lie wider than the resonance."""
+    own = {**GEAR_VALUES, "k_d": 1.2}
+    truth = {**STEP_TRUTH, "zeta": 1.2 / (2.0 * np.sqrt(81.0 * 0.56))}
+    found = []
+    for seed in range(16):
+        rng = np.random.default_rng([8, seed])
+        t = 5e-3 * np.arange(8800)
+        pole = np.exp(-5.0 * 5e-3)
+        unseen = 2e-2 * np.sqrt(1.0 - pole**2) * lfilter([1.0], [1.0, -pole], rng.standard_normal(t.size))
+        u = step(t, 0.6, 40.0)
+        record = Record("step", 5e-3, {"u": u + unseen}, {"u": "A", "psi": "rad"}, hold="zoh")
+        clean = simulate(compose(RUNNING_GEAR), own, record)
+        seen = record.with_signals(u=u, psi=clean["psi"] + rng.normal(0.0, 2e-5, t.size))
+        found.append(pulls(fit_step(seen, "u", "psi", "pt2", 40.0, 44.0), truth))
+    # 16 pulls of each of four parameters: three standard deviations of their rms.
+    assert np.sqrt(np.mean(np.square(found), axis=0)) == pytest.approx(1.0, abs=3.0 / np.sqrt(32.0))

@@ -101,6 +101,16 @@ def test_the_method_of_the_thesis_is_an_option(gear: Path) -> None:
     assert yaw.value < errors["nominal", "u -> psi", "magnitude_rmse"].value
 
 
+@pytest.mark.parametrize("method", ["local_polynomial", "h1"])
+def test_with_any_estimator_the_truth_is_best(gear: Path, method: str) -> None:
+    comparison = run_compare(gear, ["identified", "iwan_tables"], method=method, n_jobs=1)
+    rows = comparison.table("sweep")
+    columns = [column for column in comparison.columns("sweep") if column.signal == "u -> psi"]
+    assert len(columns) == 3
+    for column in columns:
+        assert rows["iwan_tables"][column] < rows["identified"][column]
+
+
 def test_a_model_of_another_rig_is_refused_before_anything_is_done(
     axis_campaign: Path, tmp_path: Path
 ) -> None:

@@ -282,7 +282,8 @@ class _Trial:
     def add(self, column: Column, value: float, noise_floor: float | None, n_values: int) -> None:
         """Keep one score, or say that it is no number."""
         if math.isfinite(value):
-            self.scores.append(Score(self.model, self.record, column, value, noise_floor, n_values))
+            floor = noise_floor if noise_floor is not None and math.isfinite(noise_floor) else None
+            self.scores.append(Score(self.model, self.record, column, value, floor, n_values))
         else:
             self.failures.append(Failure(self.model, self.record, "The error is not finite.", column))
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.grow import Prepare, grown
+from rigsight.diagnose.localize import localize
+from rigsight.diagnose.quantify import budget_intervals, effect_shares
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import (
     Candidate,
@@ -149,7 +151,7 @@ def diagnose(
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     notes.append(judgement.reason)
-    return _assembled(task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on)
+    return _assembled(task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on, rng)
 
 
 def _no_spring(task: Task) -> bool:
@@ -226,18 +228,23 @@ def _assembled(
     notes: Sequence[str],
     length: float | None,
     scored_on: str,
+    rng: np.random.Generator,
 ) -> Diagnosis:
     rig = task.rig
     is_effect = judgement.verdict == "effect"
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else linear)
     noise = {floor.output: floor for floor in floors}
     measured = _measured(rig, bench.scoring)
+    traces = _traces(task, bench, before, linear, after)
+    scored = [trace for trace in traces if trace.role == scored_on]
+    at_floor = {name: noise[name].std / float(np.std(values)) for name, values in measured.items()}
     gap = {
         name: OutputGap(
             before=nrmse(_column(rig, before, name), measured[name]),
             reidentified=nrmse(_column(rig, linear, name), measured[name]),
             after=nrmse(_column(rig, after, name), measured[name]),
-            noise_floor=noise[name].std / float(np.std(measured[name])),
+            noise_floor=at_floor[name],
+            intervals=budget_intervals(scored, name, at_floor[name], rng),
         )
         for name in measured
     }
@@ -263,12 +270,16 @@ def _assembled(
         candidates=candidates,
         gap=gap,
         noise_floors=tuple(floors),
-        traces=_traces(task, bench, before, linear, after),
+        traces=traces,
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
         model=Model.of(after.fit.structure, after.fit.values, task.records[0].hold).to_json(),
         notes=tuple(notes),
         windows=length,
         scored_on=scored_on,
+        localization=localize(bench, traces, scored_on, before, linear, after, rng),
+        effect_shares=effect_shares(
+            [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
+        ),
     )
 
 

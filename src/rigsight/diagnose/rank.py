@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.block_means import RESAMPLES, block_means
 from rigsight.diagnose.workbench import Scored
 
-_RESAMPLES = 1000
-_MIN_BLOCKS = 8
 _TIE = 0.01
 """Relative difference of held-out errors that no engineer would build a decision on."""
 _PRIOR_PER_EFFECT = 1.0 / 3.0
@@ -60,7 +59,7 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
     if not usable:
         return Ranking(tuple(models), tuple(0.0 for _ in models), ())
     squares = np.column_stack([_blocks(m, noise) for m in usable])
-    draws = rng.integers(0, squares.shape[0], size=(_RESAMPLES, squares.shape[0]))
+    draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
     means = np.mean(squares[draws], axis=1)
     errors = np.sqrt(np.mean(squares, axis=0))
     best = float(np.min(errors))
@@ -94,14 +93,7 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
 
 def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean squared weighted residual of blocks long enough to be independent, shape (n_blocks,)."""
-    series = [np.nanmean((residual / noise) ** 2, axis=1) for residual in model.residuals]
-    total = sum(s.size for s in series)
-    length = max(1, total // max(_MIN_BLOCKS, min(100, total // 200)))
-    blocks = []
-    for s in series:
-        count = max(1, s.size // length)
-        blocks += [float(np.mean(part)) for part in np.array_split(s, count)]
-    return np.array(blocks)
+    return block_means([np.nanmean((residual / noise) ** 2, axis=1) for residual in model.residuals])
 
 
 def noise_vector(outputs: Sequence[str], noise: Mapping[str, float]) -> NDArray[np.float64]:

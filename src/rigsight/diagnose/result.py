@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.gap_parts import Localization
+
 Verdict = Literal["effect", "parameters", "none", "unknown"]
+Stage = Literal["before", "reidentified", "after"]
+STAGES: tuple[Stage, ...] = ("before", "reidentified", "after")
 
 SCHEMA_VERSION = 1
 
@@ -37,12 +41,15 @@ class OutputGap:
         With the effects of the verdict added.
     noise_floor
         What a perfect model would leave.
+    intervals
+        95 % limits by stage and of ``"closed"``, see `quantify.gap_intervals`.
     """
 
     before: float
     reidentified: float
     after: float
     noise_floor: float
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def closed(self) -> float:
@@ -120,6 +127,16 @@ class Trace:
     reidentified: Mapping[str, NDArray[np.float64]]
     after: Mapping[str, NDArray[np.float64]]
 
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return float(self.t[-1] - self.t[0]) / max(1, self.t.size - 1)
+
+    def residual(self, stage: Stage, output: str) -> NDArray[np.float64]:
+        """Return measured minus simulated of a stage, shape (n_samples,)."""
+        simulated = {"before": self.before, "reidentified": self.reidentified, "after": self.after}[stage]
+        return np.asarray(self.measured[output] - simulated[output], dtype=np.float64)
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -145,6 +162,10 @@ class Diagnosis:
         Length [s] of the windows scored with their own initial states, None where whole records are.
     scored_on
         ``"validation"``, or ``"estimation"`` where the campaign has no validation records.
+    localization
+        The gap split by record, amplitude, band, state, time and signal path.
+    effect_shares
+        Effect -> output -> share of the closed gap that it explains, where the verdict names several.
     """
 
     title: str
@@ -162,6 +183,8 @@ class Diagnosis:
     notes: tuple[str, ...]
     windows: float | None = None
     scored_on: str = "validation"
+    localization: Localization = field(default_factory=Localization)
+    effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -181,6 +204,7 @@ class Diagnosis:
                     "after": _number(gap.after),
                     "noise_floor": _number(gap.noise_floor),
                     "closed": _number(gap.closed),
+                    "interval": {k: [_number(limit) for limit in v] for k, v in gap.intervals.items()},
                 }
                 for output, gap in self.gap.items()
             },
@@ -193,10 +217,11 @@ class Diagnosis:
                 }
                 for floor in self.noise_floors
             },
-            "gap_by_record": [],
-            "gap_by_band": [],
-            "gap_by_amplitude": [],
-            "gap_by_state": [],
+            **self.localization.to_json(),
+            "effect_shares": {
+                effect: {output: _number(share) for output, share in shares.items()}
+                for effect, shares in self.effect_shares.items()
+            },
             "window": self.windows,
             "scored_on": self.scored_on,
             "notes": list(self.notes),

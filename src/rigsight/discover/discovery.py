@@ -18,12 +18,13 @@ from rigsight.discover.library import Candidate, candidates, offered_effects, to
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
-from rigsight.discover.selection import STRONG, Bench, Selection, Trial, criterion, select
+from rigsight.discover.selection import STRONG, Bench, Selection, Trial, criterion, proposals, select
 from rigsight.discover.weak_form import Rows
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
+from rigsight.simulate import Structure
 from rigsight.simulate.model import Model
 
 Method = Literal["full", "discrepancy"]
@@ -34,6 +35,8 @@ _LEAST_SAMPLES = 200
 _HELD_BACK = 0.3
 _SAME_COLUMN = 0.999
 _FINAL_EVALUATIONS = 150
+_CLEARLY_OFF = 3.0
+"""Standard errors from its special value at which an exponent is released."""
 _ENSEMBLE_TERMS = 8
 _MOST_POINTS = 20_000
 
@@ -126,13 +129,13 @@ def discover(
         raise SimulationError(
             f"The equations of {task.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
         )
-    chosen = _released(bench, selection, say)
-    final = _polished(task, bench, chosen)
+    chosen = _without_damper(bench, selection, say)
+    final, held = _polished(task, bench, chosen)
     say("polished")
     inclusion = _inclusion(task, bench, selection, final, motions, rows, rng)
     force = _force_equation(bench, final, motions, rows, rng)
     say("ensembles")
-    found = _Found(estimation, held_out, how, selection, chosen, final, inclusion, force, same, motions)
+    found = _Found(estimation, held_out, how, selection, chosen, final, inclusion, force, same, held)
     return _assembled(task, method, pointwise, bench, found)
 
 
@@ -253,35 +256,22 @@ def _own_terms(task: Task, projected: Projected) -> dict[str, NDArray[np.float64
     return own
 
 
-def _released(bench: Bench, selection: Selection, say: Callable[[str], None]) -> Trial:
-    """Release what was held at a special value, and let the rig's damper go in the full form, where the records ask for it."""
+def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], None]) -> Trial:
+    """Let the rig's own damper go in the full form, where the held-out records do not miss it."""
     chosen = selection.best
-
-    def better(trial: Trial, by: float) -> bool:
-        cost = criterion(trial, selection.independent)
-        return cost < criterion(chosen, selection.independent) - by
-
-    special = dict(chosen.fit.structure.fixed)
-    if special:
-        released = bench.trial(
-            chosen.support, release=frozenset(special), start={**chosen.fit.values, **special}
-        )
-        say(f"{', '.join(sorted(special))} released")
-        if better(released, STRONG):
-            chosen = released
     damping = bench.rig.motion.damping.name
-    if damping in bench.own_terms:
-        release = frozenset(special) - frozenset(dict(chosen.fit.structure.fixed))
-        without = bench.trial(
-            chosen.support,
-            release=release,
-            start={**chosen.fit.values, damping: 0.0},
-            left_out=frozenset({damping}),
-        )
-        say(f"without {damping}")
-        if better(without, -STRONG):
-            chosen = without
-    return chosen
+    if damping not in bench.own_terms:
+        return chosen
+    special = {name for effect in chosen.fit.structure.effects for name in effect.special_cases}
+    without = bench.trial(
+        chosen.support,
+        release=frozenset(special - set(dict(chosen.fit.structure.fixed))),
+        start={**dict(chosen.fit.structure.fixed), **chosen.fit.values, damping: 0.0},
+        left_out=frozenset({damping}),
+    )
+    say(f"without {damping}")
+    worse = criterion(without, selection.independent) - criterion(chosen, selection.independent)
+    return without if worse < STRONG else chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,26 +287,44 @@ class _Found:
     inclusion: Mapping[str, float]
     force: ForceEquation | None
     same: Mapping[str, list[str]]
-    motions: Sequence[Motion]
+    held: str
 
 
-def _polished(task: Task, bench: Bench, chosen: Trial) -> FitResult:
-    """Fit the chosen structure once more, all outputs and all records that may be fitted, to full precision."""
+def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
+    """Fit the chosen structure once more, all outputs and all records that may be fitted, to full precision.
+
+    A special value (an exponent of 1) is released as well: where the fit leaves it clearly, the intervals of everything else
+    would be wrong with it. Returns the fit and, where the special value was kept, a note on how well it is known.
+    """
     records = tuple(record for record in task.records if record.role == "estimation")
     rig = task.rig
     free = set(chosen.fit.free)
     measured = {name for record in records for name in record.signals}
     if any(symbol.name in measured for symbol in rig.downstream):
         free |= rig.downstream_parameters
-    structure = chosen.fit.structure
-    fit = GreyBoxFit(structure, records, bench.scales, bench.noise).fit(
-        chosen.fit.values,
-        [name for name in structure.names if name in free],
-        max_evaluations=_FINAL_EVALUATIONS,
-    )
+
+    def fitted(structure: Structure, start: Mapping[str, float], moved: set[str]) -> FitResult:
+        return GreyBoxFit(structure, records, bench.scales, bench.noise).fit(
+            start, [name for name in structure.names if name in moved], max_evaluations=_FINAL_EVALUATIONS
+        )
+
+    fit = fitted(chosen.fit.structure, chosen.fit.values, free)
     if not math.isfinite(fit.cost):
         raise SimulationError(f"The discovered equations cannot be fitted to all records: {fit.message}")
-    return fit
+    special = dict(chosen.fit.structure.fixed)
+    if not special:
+        return fit, ""
+    released = fitted(
+        bench.structure(chosen.support, frozenset(special)), {**fit.values, **special}, free | set(special)
+    )
+    if not math.isfinite(released.cost):
+        return fit, ""
+    known = {name: (released.values[name], released.standard_errors[name]) for name in special}
+    if any(abs(value - special[name]) > _CLEARLY_OFF * error for name, (value, error) in known.items()):
+        return released, ""
+    told = ", ".join(f"{name} = {value:.3g} +/- {error:.2g}" for name, (value, error) in known.items())
+    held = ", ".join(f"{name} = {value:g}" for name, value in special.items())
+    return fit, f"{held} is held; released, the fit says {told}, and the other coefficients move with it."
 
 
 def _inclusion(
@@ -332,8 +340,18 @@ def _inclusion(
 
     The columns are taken about the rest position of the polished equation: about any other, a cubic spring shows a square.
     """
-    names = list(dict.fromkeys(name for trial in selection.trials for name in sorted(trial.support)))
-    names = names[:_ENSEMBLE_TERMS]
+    polished = [name for trial in selection.trials for name in sorted(trial.support)]
+    proposed = [name for support in proposals(bench) for name in sorted(support)]
+    shares = {n: bench.projected.explained(c.column[:, None])[1] for n, c in bench.candidates.items()}
+    ranked = sorted(shares, key=lambda name: -shares[name])
+    kept = set(final.structure.effect_names)
+    # An effect that contains a kept one as a special case explains whatever that does, and would only share its draws.
+    offered_terms = [
+        name
+        for name in dict.fromkeys((*polished, *proposed, *ranked))
+        if name in kept or not kept.intersection(bench.candidates[name].effect.parents)
+    ]
+    names = offered_terms[:_ENSEMBLE_TERMS]
     shift = _rest_shift(bench, final)
     moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
     projected = _projected(task, moved, rows) if shift else bench.projected
@@ -411,7 +429,7 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
     measured = np.concatenate([record[output] for record in found.held_out])
     size = float(np.std(measured)) or 1.0
     warnings = warnings_of(
-        task, found.estimation, found.how, selection, found.chosen, terms, found.same, found.force
+        task, found.estimation, found.how, selection, found.chosen, terms, found.held, found.force
     )
     return Discovery(
         title=task.title,

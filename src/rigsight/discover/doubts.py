@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _SURE = 0.9
 _ZERO = 3.0
-_VAGUE = 0.1
+_VAGUE = 0.05
 _FLOOR = 1.5
 _FORCE_TERMS_OF = {"beta": "|x'| |F|^(n-1) F", "gamma": "x' |F|^n"}
 
@@ -61,11 +61,11 @@ def warnings_of(
     selection: Selection,
     chosen: Trial,
     terms: Sequence[Term],
-    same: Mapping[str, Sequence[str]],
+    held: str,
     force: ForceEquation | None,
 ) -> tuple[str, ...]:
     """Return what a user should know, one sentence each."""
-    found = [how] if how else []
+    found = [note for note in (how, held) if note]
     source = task.rig.inputs[0].name
     sizes = [float(np.std(record[source])) for record in estimation]
     if max(sizes) < 1.2 * min(sizes):
@@ -103,11 +103,6 @@ def warnings_of(
             "something is still missing, or disturbances are larger than the floor says."
         )
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
-    found += [
-        f"The records cannot tell {', '.join(others)} from {name}; {name} stands for all of them."
-        for name, others in same.items()
-        if any(term.name == name and term.kept for term in terms)
-    ]
     if force is not None:
         blind = [
             parameter for parameter, term in _FORCE_TERMS_OF.items() if force.inclusion.get(term, 0.0) < _SURE

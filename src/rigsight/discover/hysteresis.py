@@ -29,7 +29,7 @@ FORCE_TERMS = ("x'", "|x'| |F|^(n-1) F", "x' |F|^n", "F", "x")
 """Terms offered to the equation of the hysteretic force; the last two are a force that relaxes and one without memory."""
 _SATURATIONS = np.geomspace(0.3, 100.0, 7)
 _SKEWS = np.geomspace(0.3, 300.0, 6)
-_EXPONENTS = (1.0, 2.0)
+_EXPONENTS = (1.0, 1.5, 2.0)
 _SUBSTEPS = 2
 _REFINEMENTS = 40
 

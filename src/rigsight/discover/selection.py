@@ -26,10 +26,19 @@ _SEEDS = 5
 _LONGEST_SEED = 3
 _MOST_TERMS = 5
 _GROWTH = 3
+_WORTH = 0.02
+"""Share of the regression's residual power that a term must explain to be worth a polish, unless it is the first in line."""
 _ROUNDS = 4
 _EVALUATIONS = 40
 _TOLERANCE = 1e-5
 _SMALL = 1e-3
+_RELEASED = 0.98
+"""Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
+
+_CHANCE = 2.0
+"""Standard deviations by which an RMS may exceed the floor by chance."""
+_WHITE = 0.75
+"""Share of independent samples from which residuals count as white."""
 
 Support = frozenset[str]
 
@@ -263,6 +272,17 @@ def independent_samples(residuals: NDArray[np.float64]) -> float:
     return float(max(n / (1.0 + 2.0 * np.sum(lags**2)), 10.0))
 
 
+def at_floor(trial: Trial) -> bool:
+    """Return True if a held-out error is as small and as white as the noise: there is nothing left to explain."""
+    n = trial.residuals.size
+    if n == 0:
+        return False
+    return bool(
+        trial.excess <= 1.0 + _CHANCE / np.sqrt(2.0 * n)
+        and independent_samples(trial.residuals) >= _WHITE * n
+    )
+
+
 def criterion(trial: Trial, independent: float) -> float:
     """Return the information criterion of a held-out error."""
     if not np.isfinite(trial.excess):
@@ -305,11 +325,19 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
 
     def tried(support: Support) -> Trial:
         trial = bench.trial(support)
+        special = dict(trial.fit.structure.fixed)
+        if special and not at_floor(trial):
+            start = {**trial.fit.values, **special}
+            released = bench.trial(support, release=frozenset(special), start=start)
+            trial = released if released.excess < _RELEASED * trial.excess else trial
         progress(", ".join(sorted(support)) or "linear")
         return trial
 
-    linear = tried(frozenset())
-    pool = [linear, *(tried(support) for support in _seeds(bench))]
+    pool = [tried(frozenset())]
+    for support in proposals(bench):
+        if at_floor(pool[-1]):
+            break
+        pool.append(tried(support))
     independent = independent_samples(min(pool, key=lambda t: t.excess).residuals)
 
     def cost(trial: Trial) -> float:
@@ -317,9 +345,9 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
 
     best = _fewest(pool, cost)
     for _ in range(_ROUNDS):
-        shorter = [best.support - {name} for name in best.support]
+        shorter = _simpler(bench, best.support)
         longer = [best.support | {name} for name in _next_terms(bench, best.support)]
-        if len(best.support) >= _MOST_TERMS:
+        if len(best.support) >= _MOST_TERMS or at_floor(best):
             longer = []
         around = [tried(frozenset(support)) for support in (*shorter, *longer)]
         pool += around
@@ -340,8 +368,8 @@ def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:
     return min(close, key=lambda t: (t.n_free, cost(t)))
 
 
-def _seeds(bench: Bench) -> list[Support]:
-    """Return the supports that the regression proposes, the likeliest first."""
+def proposals(bench: Bench) -> list[Support]:
+    """Return the supports that the regression proposes, short ones first, each of which is worth a polish."""
     names = list(bench.candidates)
     if not names:
         return []
@@ -351,14 +379,33 @@ def _seeds(bench: Bench) -> list[Support]:
     supports = {tuple(i for i in path if i < len(names)) for path in paths}
     shares = [bench.projected.explained(columns[:, [i]])[1] for i in range(len(names))]
     supports |= {(int(i),) for i in np.argsort(shares)[::-1][:_GROWTH]}
-    short = [support for support in supports if 0 < len(support) <= _LONGEST_SEED]
+
+    def left(support: tuple[int, ...]) -> float:
+        return bench.projected.solved(columns[:, list(support)])[1] ** 2
+
+    def worth(support: tuple[int, ...]) -> bool:
+        shorter = [tuple(i for i in support if i != out) for out in support]
+        return len(support) == 1 or all(left(support) < (1.0 - _WORTH) * left(less) for less in shorter)
+
+    short = [support for support in supports if 0 < len(support) <= _LONGEST_SEED and worth(support)]
 
     def cost(support: tuple[int, ...]) -> float:
-        _, left = bench.projected.solved(columns[:, list(support)])
-        return information_criterion(left**2, len(support), bench.projected.independent)
+        return information_criterion(left(support), len(support), bench.projected.independent)
 
-    ordered = sorted(short, key=cost)
-    return [frozenset(names[i] for i in support) for support in ordered[:_SEEDS]]
+    # Short ones first: what reaches the noise floor with one term needs no look at two.
+    ordered = sorted(sorted(short, key=cost)[:_SEEDS], key=lambda support: (len(support), cost(support)))
+    return [frozenset(names[i] for i in support) for support in ordered]
+
+
+def _simpler(bench: Bench, support: Support) -> list[Support]:
+    """Return the supports with a term less, or with a special case of a term in its place."""
+    found = [support - {name} for name in sorted(support)]
+    for name in sorted(support):
+        parents = [
+            p for p in bench.candidates[name].effect.parents if p in bench.candidates and p not in support
+        ]
+        found += [support - {name} | {parent} for parent in parents]
+    return found
 
 
 def _next_terms(bench: Bench, support: Support) -> list[str]:
@@ -367,4 +414,5 @@ def _next_terms(bench: Bench, support: Support) -> list[str]:
     projected = replace(bench.projected, base=np.column_stack([bench.projected.base, *inside]))
     left = [name for name in bench.candidates if name not in support]
     shares = [projected.explained(bench.candidates[name].column[:, None])[1] for name in left]
-    return [left[i] for i in np.argsort(shares)[::-1][:_GROWTH]]
+    ranked = np.argsort(shares)[::-1][:_GROWTH]
+    return [left[i] for rank, i in enumerate(ranked) if rank == 0 or shares[i] > _WORTH]

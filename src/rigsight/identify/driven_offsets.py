@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from scipy.stats import norm, t
 
 from rigsight.errors import InputError
-from rigsight.identify.covariance import SMOOTHED, colored_covariance, propagated_covariance
+from rigsight.identify.covariance import SMOOTHED, colored_covariance
 from rigsight.identify.physical import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.records.record import Hold, Record
@@ -31,8 +31,8 @@ def driven_offsets(
 ) -> PhysicalEstimates:
     """Return the offsets of a driven record: the constant beside the motion that the fits explain.
 
-    Motion from before the record may fade within it. y is held against the measured yaw angle, so a yaw motion that is no PT2
-    leaves y_off alone.
+    Small errors of the fits, and motion that fades from before the record, are told from the offset. y is held against the
+    measured yaw angle, so a yaw motion that is no PT2 leaves y_off alone.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def driven_offsets(
 
     Returns
     -------
-    Offsets; their errors hold the colored noise that is left, or motion that the fits do not explain, and those of the fits.
+    Offsets; their errors hold the colored noise that is left, and motion that no such transfer function explains.
 
     Raises
     ------
@@ -63,20 +63,22 @@ def driven_offsets(
     if lateral is not None:
         parts.append(("y_off", lateral, "band_limited"))
     values: dict[str, float] = {}
-    residuals, designs, of_fits = [], [], []
+    residuals, designs = [], []
     for own, fit, hold in parts:
+        held = replace(record, hold=hold)
         found = np.array([fit.values[parameter] for parameter in fit.form.names])
-        design = np.column_stack([np.ones(record.n_samples), _fading(fit, record.n_samples, record.dt)])
-        left = _unexplained(replace(record, hold=hold), fit, found)
+        left = _unexplained(held, fit, found)
+        design = np.column_stack(
+            [np.ones(record.n_samples), _fading(fit, record.n_samples, record.dt), _errors(held, fit, found)]
+        )
         solved = np.linalg.lstsq(design, left, rcond=None)[0]
         values[own] = float(solved[0])
         residuals.append(left - design @ solved)
         designs.append(design)
-        of_fits.append(_variance_by_fit(replace(record, hold=hold), fit, found, design))
     places = np.cumsum([0, *(design.shape[1] for design in designs)])[:-1]
     stacked = block_diag(*designs)
     noise = colored_covariance([(np.concatenate(residuals), stacked)], stacked.shape[1], [len(parts)])
-    covariance = _few_numbers() * noise[np.ix_(places, places)] + np.diag(of_fits)
+    covariance = _few_numbers() * noise[np.ix_(places, places)]
     return PhysicalEstimates(
         tuple(values),
         values,
@@ -110,18 +112,15 @@ def _fading(fit: TransferFit, n_samples: int, dt: float) -> NDArray[np.float64]:
     pulse[0] = 1.0
     first = lfilter([1.0], np.poly(np.exp(poles * dt)).real, pulse)
     shapes = [np.append(np.zeros(late), first[: n_samples - late]) for late in range(poles.size)]
-    return np.column_stack(shapes) / np.max(np.abs(first))
+    return np.asarray(np.column_stack(shapes) / np.max(np.abs(first)))
 
 
-def _variance_by_fit(
-    record: Record, fit: TransferFit, found: NDArray[np.float64], design: NDArray[np.float64]
-) -> float:
-    """Return the variance of the offset that the errors of the fit make."""
-    slopes = []
+def _errors(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what small errors of each parameter leave, shape (n_samples, n_parameters)."""
+    columns = []
     for i, size in enumerate(found):
         step = np.zeros_like(found)
         step[i] = _DIFFERENCE * (record.dt if fit.form.names[i] == "dead_time" else abs(size))
         change = _unexplained(record, fit, found + step) - _unexplained(record, fit, found)
-        slopes.append(np.linalg.lstsq(design, change, rcond=None)[0][0] / step[i])
-    own = fit.covariance_of(*fit.form.names)
-    return float(propagated_covariance(own, np.array([slopes]))[0, 0])
+        columns.append(change / max(float(np.max(np.abs(change))), 1e-300))
+    return np.column_stack(columns)

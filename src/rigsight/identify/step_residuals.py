@@ -13,11 +13,12 @@ takes away from the residuals is accounted for.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, expm, solve_continuous_lyapunov, toeplitz
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, minimize
 
 from rigsight.identify.covariance import colored_covariance, sandwich_covariance
 
@@ -107,11 +108,11 @@ def _noise(
             degrees * math.log(variance) + spread + float(np.linalg.slogdet(information)[1])
         ), variance
 
-    bounds = [_LOG_RATIO_RANGE, tuple(map(math.log, _CORNER_RANGE))]
+    bounds = Bounds(*np.transpose([_LOG_RATIO_RANGE, np.log(_CORNER_RANGE)]))
     starts = [np.array([ratio, math.log(corner)]) for ratio in _LOG_RATIOS for corner in _CORNERS]
     best = min(starts, key=lambda x: cost(x)[0])
     around = best + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.7]])
-    options = {"xatol": 0.05, "fatol": 0.01, "initial_simplex": around}
+    options: Any = {"xatol": 0.05, "fatol": 0.01, "initial_simplex": around}
     found = minimize(lambda x: cost(x)[0], best, method="Nelder-Mead", bounds=bounds, options=options)
     variance = cost(found.x)[1] * scale**2
     return np.asarray(variance * shape(found.x[0], math.exp(found.x[1])))
@@ -135,4 +136,4 @@ def _autocovariance(
     for i in range(count):
         lags[i] = state[0]
         state = step @ state
-    return lags / lags[0]
+    return np.asarray(lags / lags[0])

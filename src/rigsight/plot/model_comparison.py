@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.frequency import FrequencyResponse
-from rigsight.plot.drawing import FLOOR, MEASURED, OTHER, WITH_EFFECT, in_style, new_figure, shown_in
+from rigsight.plot.drawing import (
+    FLOOR,
+    MEASURED,
+    OTHER,
+    WITH_EFFECT,
+    in_style,
+    new_figure,
+    plain_log_ticks,
+    shown_in,
+)
 from rigsight.plot.frequency_responses import (
     TWO_SIDED,
     decibel,
@@ -234,7 +243,10 @@ def _decade_ticks(ax: Axes, left: float, right: float) -> None:
     from matplotlib.ticker import NullLocator
 
     decades = np.arange(np.ceil(np.log10(left)), np.floor(np.log10(right)) + 1.0)
-    shown = 10.0 ** decades[:: -(-decades.size // _MOST_TICKS) or 1]
+    if decades.size < 2:
+        plain_log_ticks(ax, left, right)
+        return
+    shown = 10.0 ** decades[:: -(-decades.size // _MOST_TICKS)]
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_xticks(shown, [f"{tick:g}" for tick in shown])
 

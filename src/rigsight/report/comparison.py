@@ -215,6 +215,8 @@ def _sentences(comparison: Comparison) -> list[str]:
     ]
     return [
         f"All frequency responses, measured and simulated, are from one estimator: {comparison.method.replace('_', ' ')}.",
+        "The noise floor of a frequency response is what no smooth linear response explains. On a nonlinear rig that holds "
+        "distortion, which a model with the nonlinearity repeats: it can come far below.",
         f"Steps are compared for {comparison.step_seconds:g} s, less the mean before them.",
         windows,
         *floors,

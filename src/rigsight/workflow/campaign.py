@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.records import ColumnMapping, Record, read_record
@@ -65,13 +65,15 @@ class Campaign:
         return tuple(record for record in self.records if record.role == "validation")
 
 
-def read_campaign(campaign: str | Path) -> Campaign:
+def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> Campaign:
     """Read a campaign and all its records.
 
     Parameters
     ----------
     campaign
         The toml file or its folder.
+    own_effects
+        Effects that the simulation in question may have beside those of the catalogue.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def read_campaign(campaign: str | Path) -> Campaign:
         )
     rig = RIGS[table.rig.model]
     constants = _constants(path, rig, table.rig.constants)
-    modelled = _modelled(path, rig, table.rig.effects)
+    modelled = _modelled(path, rig, table.rig.effects, own_effects)
     parameters = _parameters(path, compose(rig, modelled), table.rig.parameters)
     if all(record.role != "estimation" for record in table.records):
         raise InputError(
@@ -129,14 +131,14 @@ def _constants(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, fl
     return {constant.name: checked[constant.name] for constant in rig.constants}
 
 
-def _modelled(path: Path, rig: Rig, names: Iterable[str]) -> tuple[Effect, ...]:
-    known = [effect.name for effect in CATALOGUE]
+def _modelled(path: Path, rig: Rig, names: Iterable[str], own: Iterable[Effect]) -> tuple[Effect, ...]:
+    known = {effect.name: effect for effect in (*CATALOGUE, *own)}
     for name in names:
         if name not in known:
             raise InputError(
                 f"{path.name}: rig.effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
             )
-    modelled = tuple(effect_named(name) for name in names)
+    modelled = tuple(known[name] for name in names)
     try:
         compose(rig, modelled)
     except InputError as error:

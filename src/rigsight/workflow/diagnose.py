@@ -31,6 +31,7 @@ def run_diagnose(
     out: str | Path | None = None,
     *,
     effects: Sequence[Effect] = CATALOGUE,
+    own_effects: Sequence[Effect] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
@@ -46,6 +47,8 @@ def run_diagnose(
         Folder for ``diagnosis.json``, ``model.json`` and ``report.html``; None writes nothing.
     effects
         Candidates.
+    own_effects
+        Effects beside those of the catalogue that the simulation in question may have already.
     seed
         Seed of the resampling behind probabilities.
     n_jobs
@@ -65,7 +68,7 @@ def run_diagnose(
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    read = read_campaign(campaign)
+    read = read_campaign(campaign, own_effects)
     candidates = [effect for effect in effects if read.rig.offers(effect) and effect not in read.modelled]
     prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)

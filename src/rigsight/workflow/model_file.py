@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rigsight.discover.monomials import known_terms
-from rigsight.effects import effect_named
+from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, nearest
 from rigsight.records import Hold
 from rigsight.rigs import RIGS
@@ -39,13 +40,15 @@ class ModelTable(BaseModel):
     units: dict[str, str] = {}
 
 
-def read_model(model: str | Path) -> Model:
+def read_model(model: str | Path, own_effects: Iterable[Effect] = ()) -> Model:
     """Read a model.
 
     Parameters
     ----------
     model
         A ``model.json`` or the folder that holds one.
+    own_effects
+        Effects that the model may name beside those known to everybody.
 
     Raises
     ------
@@ -54,7 +57,7 @@ def read_model(model: str | Path) -> Model:
     """
     path = _locate(Path(model))
     table = _checked_table(path, _data(path))
-    structure = _structure(path, table)
+    structure = _structure(path, table, own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 
 
@@ -169,16 +172,17 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
     return f"{start}{message[0].lower()}{message[1:]}, got {got!r}."
 
 
-def _structure(path: Path, table: ModelTable) -> Structure:
+def _structure(path: Path, table: ModelTable, own_effects: Iterable[Effect]) -> Structure:
     if table.rig not in RIGS:
         raise InputError(
             f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, RIGS)} Allowed: {', '.join(RIGS)}."
         )
-    known = known_terms()
+    known = {**known_terms(), **{effect.name: effect for effect in own_effects}}
     for name in table.effects:
         if name not in known:
             raise InputError(
-                f"{path.name}: effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
+                f"{path.name}: effects: '{name}' is unknown.{nearest(name, known)} If it is an effect of your own, name the file "
+                f"that declares it: rigsight simulate MODEL RECORD --effects FILE. Known: {', '.join(known)}."
             )
     try:
         return compose(RIGS[table.rig], [known[name] for name in table.effects])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
@@ -30,6 +31,7 @@ def run_simulate(
     *,
     columns: Mapping[str, ColumnMapping] | None = None,
     initial_state: Mapping[str, float] | Literal["estimated"] | None = None,
+    own_effects: Sequence[Effect] = (),
 ) -> Record:
     """Simulate a model for the input of a record.
 
@@ -46,6 +48,8 @@ def run_simulate(
     initial_state
         States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
         input sample; "estimated" fits all of them to the outputs measured in the record, and nothing else.
+    own_effects
+        Effects that the model may name beside those of the catalogue.
 
     Raises
     ------
@@ -54,7 +58,7 @@ def run_simulate(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    read = read_model(model)
+    read = read_model(model, own_effects)
     rig = read.structure.rig
     columns = columns or {}
     known = [TIME, *(signal.name for signal in rig.inputs)]

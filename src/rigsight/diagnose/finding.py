@@ -1,0 +1,101 @@
+"""What a look at the records themselves found, before any effect is tried."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+FindingKind = Literal["hold", "time_shift", "clipping", "stuck", "quantization", "jump"]
+Answer = Literal["yes", "no", "cannot tell"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is, or may be, wrong with the records.
+
+    Attributes
+    ----------
+    kind
+        What it is.
+    sentence
+        What was seen, with numbers.
+    mend
+        What to do about it.
+    serious
+        True if it is a fault of the data that the gap may come from; False for what an effect may just as well explain.
+    record, signal
+        Where it was seen; None for all records.
+    explained
+        Share of the gap of the equations without an effect, above the noise floor and as power, that goes with it; None
+        where that was not measured.
+    """
+
+    kind: FindingKind
+    sentence: str
+    mend: str
+    serious: bool = True
+    record: str | None = None
+    signal: str | None = None
+    explained: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the finding as it stands in ``diagnosis.json``."""
+        return {
+            "kind": self.kind,
+            "sentence": self.sentence,
+            "mend": self.mend,
+            "serious": self.serious,
+            "record": self.record,
+            "signal": self.signal,
+            "explained": self.explained,
+        }
+
+
+@dataclass(frozen=True)
+class AmplitudeDependence:
+    """Whether the frequency response changes with the amplitude.
+
+    Attributes
+    ----------
+    answer
+        ``"yes"``: a nonlinear effect takes part; ``"no"``: only linear causes are left; or ``"cannot tell"``.
+    sentence
+        The answer with numbers.
+    records
+        The two records that were compared.
+    """
+
+    answer: Answer
+    sentence: str
+    records: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class DataQuality:
+    """What the records themselves say.
+
+    Attributes
+    ----------
+    findings
+        In the order in which they are worth reading; empty where the records are healthy.
+    amplitude
+        Whether the frequency response changes with the amplitude.
+    """
+
+    findings: tuple[Finding, ...]
+    amplitude: AmplitudeDependence
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One sentence per finding with its mend, and the answer about the amplitude."""
+        return (*(f"{finding.sentence} {finding.mend}" for finding in self.findings), self.amplitude.sentence)
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return the list ``data_quality`` of ``diagnosis.json``; the last entry is the answer about the amplitude."""
+        answer = {
+            "kind": "amplitude_dependence",
+            "answer": self.amplitude.answer,
+            "sentence": self.amplitude.sentence,
+            "records": list(self.amplitude.records),
+        }
+        return [*(finding.to_json() for finding in self.findings), answer]

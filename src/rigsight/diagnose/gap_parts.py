@@ -1,0 +1,185 @@
+"""What is a part of the gap? Shares of the squared residual by record, amplitude, time, band, state and signal path, as data."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+NOISE_SHAPE = "white"
+"""Spectrum that the noise floor is given over bands: one number per output says how much noise there is, not where."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GapPart:
+    """What the simulations leave of one output in one part of the records.
+
+    Attributes
+    ----------
+    output
+        Name of the output.
+    before, reidentified, after, noise_floor
+        NRMSE; what it is relative to stands at each kind of part. `after` is NaN where it cannot be formed.
+    share
+        This part's share of the squared residual that the re-identified equations leave of this output.
+    noise_share
+        How much of all that squared residual is this part's noise; the rest of `share` is gap.
+    units
+        Unit of each key by which the gap is split, where it has one.
+    """
+
+    output: str
+    before: float
+    reidentified: float
+    after: float
+    noise_floor: float
+    share: float
+    noise_share: float
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a plain object; numbers that are not finite become None."""
+        return {key: _plain(value) for key, value in dataclasses.asdict(self).items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordPart(GapPart):
+    """One record, relative to its own measured RMS about the mean.
+
+    Records that were fitted (`scored` is False) stand beside those that were scored, and their shares are among the fitted
+    ones. `interval` holds 95 % limits by stage, see `quantify`.
+    """
+
+    record: str
+    role: str
+    kind: str
+    amplitude: float | None
+    scored: bool
+    n_samples: int
+    interval: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AmplitudePart(GapPart):
+    """All records of one input amplitude and role, relative to their own measured RMS about the mean."""
+
+    amplitude: float
+    role: str
+    scored: bool
+    records: tuple[str, ...]
+    measured_rms: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class BandPart(GapPart):
+    """One band of frequency of all scored records, relative to their measured RMS: squares add up to that of the gap.
+
+    `excited` is False for the rest above what the input and the rig's answer reach.
+    """
+
+    omega_low: float
+    omega_high: float
+    excited: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatePart(GapPart):
+    """One cell of the plane of displacement and velocity, relative to the measured RMS of all scored records.
+
+    Attributes
+    ----------
+    x_low, x_high, v_low, v_high
+        Limits of the cell.
+    n_samples
+        Samples in it.
+    force_mean, force_rms, force_noise
+        Force (torque) that the re-identified equations lack there: mean, RMS, and the standard deviation that the sensor's noise
+        gives it. NaN where it does not stand out of the noise anywhere, and for an output that no force acts on directly.
+    """
+
+    x_low: float
+    x_high: float
+    v_low: float
+    v_high: float
+    n_samples: int
+    force_mean: float
+    force_rms: float
+    force_noise: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimePart(GapPart):
+    """One stretch of a scored record, relative to the measured RMS of all scored records.
+
+    `omega` is the frequency at which the input has its power in this stretch (NaN where it rests); `mean` the mean residual of the
+    re-identified equations on the same scale: a drift shows in it.
+    """
+
+    record: str
+    t_start: float
+    t_end: float
+    omega: float
+    mean: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathPart(GapPart):
+    """One leg of the signal path with its input as measured, relative to the measured RMS of its output.
+
+    Attributes
+    ----------
+    path
+        As in ``"psi -> y"``.
+    source
+        The signal that drives it, as measured.
+    shift, shift_std
+        How much earlier the source must have come for the best fit [s]; NaN where that was not asked.
+    shifted
+        What the re-identified leg leaves with its source shifted by that; NaN where that was not asked.
+    """
+
+    path: str
+    source: str
+    shift: float = math.nan
+    shift_std: float = math.nan
+    shifted: float = math.nan
+
+
+@dataclass(frozen=True)
+class Localization:
+    """The gap split by record, amplitude, band, state, time and signal path; `sentence` says what the paths tell."""
+
+    by_record: tuple[RecordPart, ...] = ()
+    by_amplitude: tuple[AmplitudePart, ...] = ()
+    by_band: tuple[BandPart, ...] = ()
+    by_state: tuple[StatePart, ...] = ()
+    by_time: tuple[TimePart, ...] = ()
+    by_path: tuple[PathPart, ...] = ()
+    sentence: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fields of ``diagnosis.json`` that begin with ``gap_by_``, and the sentence."""
+        parts = {
+            "gap_by_record": self.by_record,
+            "gap_by_band": self.by_band,
+            "gap_by_amplitude": self.by_amplitude,
+            "gap_by_state": self.by_state,
+            "gap_by_time": self.by_time,
+            "gap_by_path": self.by_path,
+        }
+        lists: dict[str, Any] = {
+            name: [part.to_json() for part in entries] for name, entries in parts.items()
+        }
+        return {**lists, "path_evidence": self.sentence, "noise_floor_shape": NOISE_SHAPE}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return value

@@ -1,0 +1,312 @@
+"""Does a simulated effect do what every effect promises: vanish at null, stay finite, give no energy, be found again?
+
+Measured on one mass with a spring (lateral effects on the running gear). Each function returns a sentence that says what is
+broken, or None.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect, Energy, Place
+from rigsight.errors import SimulationError
+from rigsight.excitation import linear_sweep
+from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
+from rigsight.rigs.rig import Signal
+from rigsight.simulate import compose, simulate
+from rigsight.units import characteristic_value
+
+PER_PERIOD = 200
+"""Samples per period of a sine test."""
+RESONANCE = 10.0
+"""Angular frequency of the axis of the sine tests [rad/s]."""
+FULL, SMALL = 1.0, 0.3
+"""Amplitudes of sine tests."""
+_NEAR_NULL = 1e-6
+_CONTINUOUS = 1e-3
+"""Largest change of the response that far from null, in sizes of the motion."""
+_STEADY = 1e-3
+_ENERGY = 5e-3
+_NOISE = 1e-3
+"""Noise in shares of the motion: small enough for an effect to be seen, far above the integrator's error."""
+_LEVELS = (1.0, 50.0)
+"""Drive levels of the sweeps; the second is for effects that show at large angles only."""
+_WRONG = 1.05
+_SIGMAS = 4.5
+_SEEN = 0.3
+"""Largest standard error of a parameter that counts as determined, in sizes of the parameter."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A rig with numbers on which an effect is tried.
+
+    Attributes
+    ----------
+    rig, values
+        The rig and its numbers.
+    output
+        The output that the effect acts on.
+    swept
+        The rig's numbers in the sweeps in which the effect is to be found again.
+    free
+        Parameters of the rig that are found again with the effect's.
+    """
+
+    rig: Rig
+    values: dict[str, float]
+    output: str
+    swept: dict[str, float]
+    free: tuple[str, ...]
+
+
+AXIS_BENCH = Bench(
+    AXIS,
+    {"gain": 1.0, "m": 1.0, "d": 2.0, "k": RESONANCE**2, "x_off": 0.0, "force_off": 0.0},
+    "x",
+    {"gain": 2.0, "m": 1.5, "d": 4.0, "k": 300.0, "x_off": 1e-4, "force_off": 0.0},
+    ("m", "d", "k", "x_off"),
+)
+_GEAR_VALUES = {
+    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98,
+    "psi_off": 1e-4, "y_off": 1e-4,
+}  # fmt: skip
+GEAR_BENCH = Bench(
+    RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
+)
+
+
+def bench_of(effect: Effect) -> Bench:
+    """Return the bench on which an effect is tried."""
+    return AXIS_BENCH if AXIS.offers(effect) else GEAR_BENCH
+
+
+def sine_record(amplitude: float, n_periods: int, omega: float = 0.25 * RESONANCE) -> Record:
+    """Return the input of a sine test; by default so low that the third harmonic stays below the resonance."""
+    dt = 2.0 * np.pi / omega / PER_PERIOD
+    time = dt * np.arange(n_periods * PER_PERIOD + 1)
+    return Record("sine", dt, {"u": amplitude * np.sin(omega * time)}, {"u": "input"})
+
+
+def sizes(bench: Bench, record: Record) -> dict[str, float]:
+    """Return the size of each base quantity when the rig without the effect runs a record."""
+    return characteristic_scales(
+        bench.rig, [simulate(compose(bench.rig), bench.values, record)], bench.values
+    )
+
+
+def start_values(effect: Effect) -> list[dict[str, float]]:
+    """Return the bench's values with all combinations of the effect's first two start values."""
+    bench = bench_of(effect)
+    scales = sizes(bench, sine_record(FULL, 3))
+    choices = []
+    for p in effect.parameters:
+        size = characteristic_value(p.dimension, scales)
+        starts = [start * size for start in p.starts[:2]] if p.starts else [p.default or 0.0]
+        choices.append([(p.name, value) for value in starts])
+    return [{**bench.values, **dict(choice)} for choice in itertools.product(*choices)]
+
+
+def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float]]:
+    """Return the bench's values with the corners of the search box and random points in it, as far as a search goes there."""
+    bench = bench_of(effect)
+    scales = sizes(bench, sine_record(FULL, 3))
+    fitted = [p for p in effect.parameters if p.fitted]
+    corners = list(itertools.product(*[p.search for p in fitted]))
+    inside = [tuple(rng.uniform(*p.search) for p in fitted) for _ in range(5)]
+    points = []
+    for point in corners + inside:
+        own = {
+            p.name: c * characteristic_value(p.dimension, scales) for p, c in zip(fitted, point, strict=True)
+        }
+        own |= {p.name: p.default or 0.0 for p in effect.parameters if not p.fitted}
+        # A negative sum lets a memory grow without end; a search moves the sum itself, from zero upwards.
+        if all(own[pair.first] + own[pair.second] >= 0.0 for pair in effect.searched_as):
+            points.append({**bench.values, **own})
+    return points
+
+
+def null_gives_the_rig(effect: Effect) -> str | None:
+    """Check that its null values leave the rig exactly as it is."""
+    bench, record = bench_of(effect), sine_record(FULL, 3)
+    null = effect.null_values()
+    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
+    with_effect = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **null}, record)
+    if np.array_equal(with_effect[bench.output], plain):
+        return None
+    return f"with {_told(null)} the simulation differs from the rig's: {_difference(with_effect[bench.output], plain)}."
+
+
+def vanishes_continuously(effect: Effect) -> str | None:
+    """Check that close to its null values the response is close to the rig's."""
+    bench, record = bench_of(effect), sine_record(FULL, 3)
+    start = start_values(effect)[0]
+    near = {
+        name: null / 2.0 if abs(null) > 1e3 * abs(start[name]) else _close(null, start[name])
+        for name, null in effect.null_values().items()
+    }
+    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
+    with_effect = simulate(compose(bench.rig, [effect]), {**start, **near}, record)[bench.output]
+    if np.max(np.abs(with_effect - plain)) <= _CONTINUOUS * np.max(np.abs(plain)):
+        return None
+    return (
+        f"close to its null values ({_told(near)}) the simulation is not close to the rig's: "
+        f"{_difference(with_effect, plain)}. Null must be where the effect fades away."
+    )
+
+
+def _close(null: float, start: float) -> float:
+    return 1e-4 * start if null == 0.0 else null + _NEAR_NULL * (start - null)
+
+
+def gives_no_energy(effect: Effect) -> str | None:
+    """Check that in a steady cycle a dissipative effect takes energy, and a conservative one neither takes nor gives."""
+    if effect.place is not Place.DYNAMICS or effect.energy is Energy.ACTIVE:
+        return None
+    for omega in (0.4 * RESONANCE, 0.9 * RESONANCE):
+        record = sine_record(SMALL, 40, omega)
+        for values in start_values(effect):
+            x = simulate(compose(AXIS, [effect]), values, record)["x"]
+            cycle, before = last_period(x), x[-2 * PER_PERIOD - 1 : -PER_PERIOD - 1]
+            still = np.ptp(cycle) == 0.0
+            if still or np.max(np.abs(cycle - before)) > _STEADY * np.ptp(cycle):
+                continue
+            step = np.diff(np.append(cycle, cycle[0]))
+            force = last_period(record["u"])
+            work = float(np.sum(0.5 * (force + np.roll(force, -1)) * step))
+            damper = values["d"] * float(np.sum(step**2)) / record.dt
+            size = abs(work) + damper
+            taken = (work - damper) / size
+            if taken < -_ENERGY or (effect.energy is Energy.CONSERVATIVE and taken > _ENERGY):
+                verb = "gives" if taken < 0.0 else "takes"
+                return (
+                    f"it is declared {effect.energy.value}, but {verb} {abs(taken):.1%} of the work of a cycle "
+                    f"({_told({p.name: values[p.name] for p in effect.parameters})}). Mind the sign: a torque resists the motion."
+                )
+    return None
+
+
+def last_period(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the last full period of a sine test, shape (PER_PERIOD,)."""
+    return samples[-PER_PERIOD - 1 : -1]
+
+
+def finite_where_searched(effect: Effect) -> str | None:
+    """Check that the simulation stays finite wherever a search may go."""
+    bench, record = bench_of(effect), sine_record(FULL, 3)
+    may_escape = effect.energy is Energy.CONSERVATIVE and any(
+        p.null is not None and p.search[0] < p.null for p in effect.parameters
+    )
+    for values in box_values(effect, np.random.default_rng(11)):
+        try:
+            finite = bool(
+                np.all(np.isfinite(simulate(compose(bench.rig, [effect]), values, record)[bench.output]))
+            )
+        except SimulationError:
+            # A spring that softens to nothing lets the mass go: allowed only where the sign is free.
+            finite = may_escape
+        if not finite:
+            own = {p.name: values[p.name] for p in effect.parameters}
+            return f"it cannot be simulated at {_told(own)}, inside its search ranges; narrow them."
+    return None
+
+
+def is_found_again(effect: Effect) -> str | None:
+    """Check that a fit to its own noisy simulation returns its parameters."""
+    bench = bench_of(effect)
+    told = None
+    for amplitude in _LEVELS:
+        told = _recovered(effect, bench, amplitude)
+        if told is None:
+            return None
+    return told
+
+
+def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
+    rng = np.random.default_rng(4)
+    t = 0.01 * np.arange(1500)
+    driven = [
+        Record("sweep", 0.01, {"u": linear_sweep(t, share * amplitude, 1.0, 30.0)}, {}, hold="zoh")
+        for share in (0.4, 1.0)
+    ]
+    plain = [simulate(compose(bench.rig), bench.swept, record) for record in driven]
+    scales = characteristic_scales(bench.rig, plain, bench.swept)
+    structure = compose(bench.rig, [effect], effect.special_cases)
+    size = {p.name: characteristic_value(p.dimension, scales) for p in effect.parameters}
+    own = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
+    truth = {
+        **bench.swept,
+        **{p.name: p.default for p in effect.parameters if p.default is not None},
+        **{p.name: p.starts[0] * size[p.name] for p in own},
+    }
+    noise = {signal.name: _NOISE * scales[base] for signal, base in _bases(bench.rig)}
+    records = []
+    for record in driven:
+        simulated = simulate(structure, truth, record)
+        noisy = {
+            name: simulated[name] + rng.normal(scale=s, size=record.n_samples) for name, s in noise.items()
+        }
+        records.append(simulated.with_signals(**noisy))
+    free = [*bench.free, *(p.name for p in own)]
+    start = {name: value * (_WRONG if name in free else 1.0) for name, value in truth.items()}
+    result = GreyBoxFit(structure, records, scales, noise).fit(start, free)
+    if abs(result.weighted_rms - 1.0) > 0.05:
+        return (
+            f"a fit to its own simulation, started {_WRONG - 1.0:.0%} off, leaves {result.weighted_rms:.2f} times the noise; "
+            "the equation is too rough in its parameters, or starts and search do not suit it."
+        )
+    for p in own:
+        error = result.standard_errors[p.name]
+        if not error < _SEEN * (abs(truth[p.name]) or size[p.name]):
+            return (
+                f"records do not determine {p.name}: {truth[p.name]:.3g} comes back with a standard error of {error:.2g}. "
+                "Fix it (fitted=False with a default), or choose starts at which the effect is strong."
+            )
+        if abs(result.values[p.name] - truth[p.name]) >= _SIGMAS * error:
+            return (
+                f"a fit to its own simulation returns {p.name} = {result.values[p.name]:.4g} +- {error:.2g} "
+                f"instead of {truth[p.name]:.4g}."
+            )
+    return None
+
+
+def _bases(rig: Rig) -> list[tuple[Signal, str]]:
+    return list(zip(rig.outputs, ("x", "length"), strict=False))
+
+
+PROMISES: tuple[Callable[[Effect], str | None], ...] = (
+    null_gives_the_rig,
+    vanishes_continuously,
+    gives_no_energy,
+    finite_where_searched,
+    is_found_again,
+)
+"""In the order in which they are worth reading."""
+
+
+def broken_promises(effect: Effect) -> tuple[str, ...]:
+    """Return what an effect with a sound declaration does not keep, one sentence each."""
+    found: list[str] = []
+    for promise in PROMISES:
+        try:
+            told = promise(effect)
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            told = f"it cannot be simulated or fitted at its start values: {error}"
+        if told is not None:
+            found.append(told)
+    return tuple(found)
+
+
+def _told(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+
+
+def _difference(samples: NDArray[np.float64], plain: NDArray[np.float64]) -> str:
+    return f"by {float(np.max(np.abs(samples - plain)) / np.max(np.abs(plain))):.2g} of the motion"

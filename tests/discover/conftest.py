@@ -1,0 +1,83 @@
+"""Records of axes whose governing equations are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rigsight.discover import Task, known_terms
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+DT = 5e-3
+LINEAR = {"gain": 0.8, "m": 0.5, "d": 1.5, "k": 120.0, "x_off": 0.0, "force_off": 0.0}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The effects of an axis and their parameters; a stiffness given here replaces the linear one."""
+
+    effects: tuple[str, ...]
+    values: dict[str, float]
+
+
+TRUTHS = {
+    "linear": Truth((), {}),
+    "cubic": Truth(("cubic_stiffness",), {"k_3": 4e5}),
+    "Coulomb": Truth(("coulomb_friction",), {"T_c": 0.06}),
+    "quadratic": Truth(("quadratic_damping",), {"c_2": 12.0}),
+    "Bouc-Wen, n = 1": Truth(
+        ("bouc_wen_hysteresis",), {"k": 300.0, "a": 0.25, "A": 1.0, "beta": 1200.0, "gamma": 500.0, "n": 1.0}
+    ),
+    # beta and gamma of the same loop height as for n = 1.
+    "Bouc-Wen, n = 1.5": Truth(
+        ("bouc_wen_hysteresis",),
+        {"k": 300.0, "a": 0.25, "A": 1.0, "beta": 1200.0 * 1700**0.5, "gamma": 500.0 * 1700**0.5, "n": 1.5},
+    ),
+    "monomial": Truth(("monomial_x1_v1",), {"c_11": 200.0}),
+}
+
+
+def _sweep(amplitude: float, seconds: float) -> np.ndarray:
+    t = DT * np.arange(round(seconds / DT))
+    ratio = 60.0
+    return amplitude * np.sin(seconds / np.log(ratio) * (ratio ** (t / seconds) - 1.0))
+
+
+def _multisine(amplitude: float, seconds: float, rng: np.random.Generator) -> np.ndarray:
+    t = DT * np.arange(round(seconds / DT))
+    omega = 2.0 * np.pi * np.arange(1, int(60.0 * seconds / (2.0 * np.pi))) / seconds
+    u = np.sum(np.cos(np.outer(t, omega) + rng.uniform(0.0, 2.0 * np.pi, omega.size)), axis=1)
+    return amplitude * u / np.std(u)
+
+
+@pytest.fixture
+def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
+    """Return the true values and the task of an axis: sweeps of several amplitudes, and a multisine that is held out."""
+
+    def make(
+        truth: str,
+        noise: float,
+        amplitudes: tuple[float, ...] = (0.3, 0.6, 1.0),
+        seconds: float = 15.0,
+        seed: int = 0,
+        validation: bool = True,
+    ) -> tuple[dict[str, float], Task]:
+        rng = np.random.default_rng(seed)
+        known = known_terms()
+        structure = compose(AXIS, [known[name] for name in TRUTHS[truth].effects])
+        values = {**LINEAR, **TRUTHS[truth].values}
+        inputs = [(f"sweep_{a}", "estimation", _sweep(a, seconds)) for a in amplitudes]
+        if validation:
+            inputs.append(("multisine", "validation", _multisine(0.45, 0.6 * seconds, rng)))
+        records = []
+        for name, role, u in inputs:
+            record = simulate(structure, values, Record(name=name, dt=DT, signals={"u": u}, units={}, role=role))
+            records.append(record.with_signals(x=record["x"] + rng.normal(scale=noise, size=u.size)))
+        return values, Task("axis", AXIS, {"gain": 0.8}, tuple(records), {"x": noise})
+
+    return make

@@ -1,0 +1,98 @@
+"""Are the equations behind synthetic records found again, with honest intervals, and nothing that is not there?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rigsight.discover import Task, discover
+
+Make = Callable[..., tuple[dict[str, float], Task]]
+Z_MAX = 4.5
+"""Standard errors by which an estimate may be off: one in 10^5 by chance."""
+
+# The effect, and how far its coefficients may be off at 2e-5 m of noise, where the displacement is a few millimeters.
+CASES = {
+    "linear": (set(), 0.001),
+    "cubic": ({"cubic_stiffness"}, 0.005),
+    "Coulomb": ({"coulomb_friction"}, 0.005),
+    "quadratic": ({"quadratic_damping"}, 0.01),
+    "Bouc-Wen, n = 1": ({"bouc_wen_hysteresis"}, 0.05),
+    "Bouc-Wen, n = 1.5": ({"bouc_wen_hysteresis"}, 0.3),
+    "monomial": ({"monomial_x1_v1"}, 0.05),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [2e-5, 2e-4])
+@pytest.mark.parametrize("truth", CASES)
+def test_support_and_coefficients_are_recovered(truth: str, noise: float, make_task: Make) -> None:
+    effects, tolerance = CASES[truth]
+    values, task = make_task(truth, noise)
+    found = discover(task)
+    assert {term.name for term in found.kept} == effects
+    assert found.held_out_error < 1.1
+    coefficients = dict(found.rig_parameters)
+    for term in found.kept:
+        coefficients |= term.coefficients
+        assert term.inclusion > 0.9
+    assert {"m", "d", "k"} <= set(coefficients)
+    for name, coefficient in coefficients.items():
+        assert abs(coefficient.value - values[name]) < Z_MAX * coefficient.std, name
+        if noise <= 2e-5 and values[name] != 0.0:
+            assert coefficient.value == pytest.approx(values[name], rel=tolerance), name
+    for term in found.terms:
+        if not term.kept:
+            assert term.inclusion < 0.5, term.name
+
+
+def test_too_much_noise_to_decide_is_said(make_task: Make) -> None:
+    # A friction of a hundredth of the drive, in noise as large as the motion at the smallest amplitude.
+    _, task = make_task("Coulomb", 5e-3, seconds=5.0)
+    found = discover(task)
+    assert any("decide" in warning or "In doubt" in warning for warning in found.warnings) or not found.kept
+    assert found.kept == () or any(term.doubt for term in found.kept)
+
+
+def test_one_amplitude_is_warned_of(make_task: Make) -> None:
+    _, task = make_task("linear", 2e-5, amplitudes=(0.6,))
+    assert any("one amplitude" in warning for warning in discover(task).warnings)
+
+
+def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None:
+    values, task = make_task("linear", 2e-5)
+    found = discover(task, "full")
+    inclusion = {term.name: term.inclusion for term in found.terms}
+    assert inclusion["d"] > 0.9
+    assert inclusion["k"] > 0.9
+    assert found.rig_parameters["d"].value == pytest.approx(values["d"], rel=1e-3)
+
+
+def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_task: Make) -> None:
+    values, task = make_task("cubic", 2e-6)
+    found = discover(task, pointwise=True)
+    assert [term.name for term in found.kept] == ["cubic_stiffness"]
+    assert found.kept[0].coefficients["k_3"].value == pytest.approx(values["k_3"], rel=1e-3)
+
+
+def test_terms_that_the_records_cannot_tell_apart_are_named(make_task: Make) -> None:
+    _, task = make_task("cubic", 2e-5)
+    found = discover(task)
+    assert any("gravity_pendulum" in warning for warning in found.warnings)
+
+
+def test_without_validation_a_record_is_set_aside_and_this_is_said(make_task: Make) -> None:
+    _, task = make_task("cubic", 2e-5, validation=False)
+    found = discover(task)
+    assert found.held_out == ("sweep_0.6",)
+    assert any("set aside" in warning for warning in found.warnings)
+    assert [term.name for term in found.kept] == ["cubic_stiffness"]
+
+
+def test_the_same_seed_gives_the_same_discovery(make_task: Make) -> None:
+    _, task = make_task("linear", 2e-5, seconds=8.0)
+    first, second = discover(task, seed=3), discover(task, seed=3)
+    assert first.to_json() == second.to_json()
+    assert np.isfinite(first.held_out_error)

@@ -1,0 +1,86 @@
+"""What does `rigsight discover` leave, and can the model be simulated?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigsight.cli import app
+from rigsight.discover import MONOMIALS
+from rigsight.errors import InputError
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose
+from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.discover import run_discover
+from rigsight.workflow.model_file import read_model
+from rigsight.workflow.progress import Step
+from rigsight.workflow.simulate import run_simulate
+
+
+def test_a_discovery_is_written_whole_and_its_model_simulates(axis_campaign: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    steps: list[Step] = []
+    found = run_discover(axis_campaign, out, n_jobs=1, listener=steps.append)
+    assert {path.name for path in out.iterdir()} == {"discovery.json", "model.json", "discovery.svg"}
+    written = json.loads((out / "discovery.json").read_text())
+    assert written == json.loads(json.dumps(found.to_json()))
+    assert written["schema_version"] == 1
+    kept = [term for term in written["terms"] if term["kept"]]
+    assert [term["name"] for term in kept] == ["cubic_stiffness"]
+    k_3 = kept[0]["coefficients"]["k_3"]
+    assert k_3["unit"] == "N/m^3"
+    assert k_3["interval_95"][0] < 5e6 < k_3["interval_95"][1]
+    assert all(0.0 <= term["inclusion_probability"] <= 1.0 for term in written["terms"])
+    assert "k_3" in written["equations"][0]
+    assert "k_{3}" in written["latex"][0]
+    assert steps[-1].done <= steps[-1].total
+
+    campaign = read_campaign(axis_campaign)
+    validation = campaign.validation[0]
+    assert validation.source is not None
+    simulated = run_simulate(out, validation.source, tmp_path / "predicted.csv")
+    error = validation["x"] - simulated["x"]
+    assert np.sqrt(np.mean(error**2)) < 3.0 * found.noise_floor * np.std(validation["x"])
+
+
+def test_each_record_alone_is_reported_beside_all_together(axis_campaign: Path) -> None:
+    found = run_discover(axis_campaign, one_by_one=True, n_jobs=1)
+    campaign = read_campaign(axis_campaign)
+    assert [name for name, _ in found.by_record] == [record.name for record in campaign.estimation]
+    assert set(found.to_json()["by_record"]) == {record.name for record in campaign.estimation}
+
+
+def test_an_unknown_method_is_told_with_those_allowed(axis_campaign: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'fulll'.*Did you mean 'full'.*'discrepancy'"):
+        run_discover(axis_campaign, tmp_path / "out", method="fulll")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_says_the_equation_and_where_it_is(axis_campaign: Path, tmp_path: Path) -> None:
+    from typer.testing import CliRunner
+
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["discover", str(axis_campaign), "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert "m x'' =" in result.output
+    assert "k_3" in result.output
+    assert "model.json" in result.output
+
+
+@pytest.mark.parametrize("effect", MONOMIALS, ids=lambda effect: effect.name)
+def test_a_model_may_hold_a_monomial_that_no_effect_is(effect: Any, write_model: Callable[..., Path]) -> None:
+    name = effect.parameters[0].name
+    unit = {p.name: p.unit for p in compose(AXIS, [effect]).parameters}[name]
+
+    def change(model: dict[str, Any]) -> None:
+        model.update(effects=[effect.name], effect_parameters={name: 2.0}, units={name: unit})
+
+    model = read_model(write_model(change))
+    assert model.structure.effect_names == (effect.name,)
+    assert model.values[name] == 2.0
+    assert model.to_json()["effects"] == [effect.name]
