@@ -63,7 +63,7 @@ def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
         truth: str,
         noise: float,
         amplitudes: tuple[float, ...] = (0.3, 0.6, 1.0),
-        seconds: float = 15.0,
+        seconds: float = 10.0,
         seed: int = 0,
         validation: bool = True,
     ) -> tuple[dict[str, float], Task]:
@@ -76,8 +76,16 @@ def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
             inputs.append(("multisine", "validation", _multisine(0.45, 0.6 * seconds, rng)))
         records = []
         for name, role, u in inputs:
-            record = simulate(structure, values, Record(name=name, dt=DT, signals={"u": u}, units={}, role=role))
+            record = simulate(
+                structure, values, Record(name=name, dt=DT, signals={"u": u}, units={}, role=role)
+            )
             records.append(record.with_signals(x=record["x"] + rng.normal(scale=noise, size=u.size)))
         return values, Task("axis", AXIS, {"gain": 0.8}, tuple(records), {"x": noise})
 
     return make
+
+
+@pytest.fixture
+def sweep() -> Callable[[float, float], np.ndarray]:
+    """Return a logarithmic sweep of an amplitude and a duration [s]."""
+    return _sweep

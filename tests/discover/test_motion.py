@@ -22,7 +22,9 @@ def test_the_missing_force_is_seen_through_the_noise(noise: float, make_task: Ma
     x = clean.records[0]["x"]
     motion = motion_of(task.rig, record, values, noise)
     assert np.std(motion.x - x) < 0.6 * noise
-    force = values["m"] * motion.acceleration + values["d"] * motion.v + values["k"] * motion.x - 0.8 * motion.u
+    force = (
+        values["m"] * motion.acceleration + values["d"] * motion.v + values["k"] * motion.x - 0.8 * motion.u
+    )
     missing = -values["k_3"] * x**3
     inner = slice(50, -50)
     assert np.corrcoef(force[inner], missing[inner])[0, 1] > (0.99 if noise < 1e-4 else 0.9)
@@ -35,7 +37,9 @@ def test_windows_give_the_derivatives_of_a_sine() -> None:
     assert rows.weights is not None
     middle = t[rows.weights.shape[1] // 2 :][: t.size - rows.weights.shape[1] + 1][:: rows.step]
     # A window averages the sine; value and rate are averaged alike.
-    shrunk = rows.of(np.sin(omega * t)) / np.where(np.abs(np.sin(omega * middle)) > 0.1, np.sin(omega * middle), np.nan)
+    shrunk = rows.of(np.sin(omega * t)) / np.where(
+        np.abs(np.sin(omega * middle)) > 0.1, np.sin(omega * middle), np.nan
+    )
     factor = np.nanmedian(shrunk)
     rate = rows.rate_of(np.sin(omega * t), dt)
     np.testing.assert_allclose(rate, factor * omega * np.cos(omega * middle), atol=1e-6 * omega)

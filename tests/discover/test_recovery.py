@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 
 from rigsight.discover import Task, discover
+from rigsight.effects import effect_named
+from rigsight.records import Record
+from rigsight.rigs import ELEMENT, RUNNING_GEAR, Rig
+from rigsight.simulate import compose, simulate
 
 Make = Callable[..., tuple[dict[str, float], Task]]
 Z_MAX = 4.5
@@ -96,3 +100,51 @@ def test_the_same_seed_gives_the_same_discovery(make_task: Make) -> None:
     first, second = discover(task, seed=3), discover(task, seed=3)
     assert first.to_json() == second.to_json()
     assert np.isfinite(first.held_out_error)
+
+
+OTHER_RIGS = {
+    "running gear": (
+        RUNNING_GEAR,
+        "bouc_wen_hysteresis",
+        {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27},
+        {"J_z": 0.56, "k_c": 500.0, "k_d": 2.0, "psi_off": 1e-3, "l_0": 0.25, "c_y": 0.98, "y_off": 0.0,
+         "A": 1.0, "a": 0.2, "beta": 1100.0, "gamma": 600.0, "n": 1.0},
+        {"psi": 1e-5, "y": 2e-5},
+        (0.25, 0.5, 1.0),
+    ),
+    "element": (
+        ELEMENT,
+        "quadratic_damping",
+        {},
+        {"d": 20.0, "k": 3e3, "force_off": 1.0, "c_2": 800.0},
+        {"force": 0.05},
+        (0.005, 0.01, 0.02),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", OTHER_RIGS)
+def test_the_other_rigs_are_discovered_too(case: str, sweep: Callable[[float, float], np.ndarray]) -> None:
+    rig: Rig
+    rig, effect, constants, values, noise, amplitudes = OTHER_RIGS[case]
+    rng = np.random.default_rng(0)
+    structure = compose(rig, [effect_named(effect)])
+    records = []
+    for number, amplitude in enumerate((*amplitudes, 0.7 * amplitudes[-1])):
+        role = "estimation" if number < len(amplitudes) else "validation"
+        u = sweep(amplitude, 15.0)
+        driven = Record(
+            name=f"{role}_{amplitude}", dt=5e-3, signals={rig.inputs[0].name: u}, units={}, role=role
+        )
+        record = simulate(structure, {**constants, **values}, driven)
+        seen = {name: record[name] + rng.normal(scale=std, size=u.size) for name, std in noise.items()}
+        records.append(record.with_signals(**seen))
+    found = discover(Task(case, rig, constants, tuple(records), noise))
+    assert [term.name for term in found.kept] == [effect]
+    coefficients = {**found.rig_parameters, **found.kept[0].coefficients}
+    assert set(coefficients) == set(values) - {"A", "n"}
+    for name, coefficient in coefficients.items():
+        assert abs(coefficient.value - values[name]) < Z_MAX * coefficient.std, name
+        if values[name] != 0.0:
+            assert coefficient.value == pytest.approx(values[name], rel=0.03), name

@@ -9,6 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.diagnose.gap_parts import (
+    AmplitudePart,
+    BandPart,
+    Localization,
+    PathPart,
+    RecordPart,
+    StatePart,
+    TimePart,
+)
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, NoiseFloor, OutputGap, Trace
 
 NOISE = {"psi": 4e-4, "y": 3e-5, "force": 12.0}
@@ -59,6 +68,65 @@ def candidate(effects: tuple[str, ...], probability: float, excess: float, **fie
     return Candidate(**{**values, **fields})
 
 
+def figures(output: str, scale: float = 1.0) -> dict[str, Any]:
+    return {
+        "output": output, "before": 0.4 * scale, "reidentified": 0.13 * scale, "after": 0.01 * scale,
+        "noise_floor": 0.009, "share": 0.3, "noise_share": 0.01,
+    }  # fmt: skip
+
+
+def localization() -> Localization:
+    """Parts of every kind, with numbers of the right size and what may be unknown unknown."""
+    limits = {"before": (0.3, 0.5), "reidentified": (0.1, 0.2), "after": (0.008, 0.012)}
+    edges = [0.0, 1.0, 3.0, 10.0, 30.0, 600.0]
+    names = ("sweep_A0.75.csv", "sweep_A0.25.csv")
+    states = [
+        StatePart(
+            **figures("psi", 1.0 + 0.2 * j), x_low=0.02 * i, x_high=0.02 * (i + 1), v_low=0.1 * j, v_high=0.1 * (j + 1),
+            n_samples=50, force_mean=-1.5 if j >= 0 else 1.2, force_rms=1.6, force_noise=0.1,
+            units={"x_low": "rad", "v_low": "rad/s", "force_mean": "N m"},
+        )
+        for i in range(-2, 2)
+        for j in range(-2, 2)
+    ]  # fmt: skip
+    return Localization(
+        by_record=tuple(
+            RecordPart(
+                **figures("psi"), record=name, role=role, kind="sweep", amplitude=0.5, scored=role == "validation",
+                n_samples=2000, interval=limits,
+            )
+            for name, role in zip(names, ("validation", "estimation"), strict=True)
+        ),
+        by_amplitude=tuple(
+            AmplitudePart(
+                **figures("psi", 0.5 / a), amplitude=a, role="validation", scored=a > 0.5, records=names, measured_rms=0.03,
+                units={"amplitude": "A", "measured_rms": "rad"},
+            )
+            for a in (0.75, 0.25)
+        ),
+        by_band=tuple(
+            BandPart(**figures("psi", 1.0 / (1 + i)), omega_low=edges[i], omega_high=edges[i + 1], excited=i < 4)
+            for i in range(5)
+        ),
+        by_state=tuple(states),
+        by_time=tuple(
+            TimePart(
+                **figures("psi", 1.0 + i), record=name, t_start=float(i), t_end=float(i + 1), omega=float("nan"), mean=0.0
+            )
+            for name in names
+            for i in range(6)
+        ),
+        by_path=(
+            PathPart(**figures("psi"), path="u -> psi", source="u"),
+            PathPart(
+                **{**figures("y"), "after": float("nan")}, path="psi -> y", source="psi", shift=-0.004, shift_std=1e-4,
+                shifted=0.011,
+            ),
+        ),
+        sentence="The gap lies before psi is measured.",
+    )  # fmt: skip
+
+
 @pytest.fixture(scope="session")
 def diagnosis() -> Diagnosis:
     """An effect named with a look-alike, two outputs, a record without y, a fit that failed."""
@@ -77,7 +145,10 @@ def diagnosis() -> Diagnosis:
             candidate((), 0.0, 14.4),
             candidate(("end_stop",), 0.0, float("inf"), success=False, message="left the range of numbers"),
         ),
-        gap={"psi": OutputGap(0.42, 0.13, 0.0094, 0.009), "y": OutputGap(0.38, 0.15, 0.0113, 0.011)},
+        gap={
+            "psi": OutputGap(0.42, 0.13, 0.0094, 0.009, {"before": (0.39, 0.45), "closed": (0.95, 0.98)}),
+            "y": OutputGap(0.38, 0.15, 0.0113, 0.011),
+        },
         noise_floors=(
             NoiseFloor("psi", "rad", NOISE["psi"], "stretches in which the input rests"),
             NoiseFloor("y", "m", NOISE["y"], "top of the spectrum (white noise only)"),
@@ -93,6 +164,7 @@ def diagnosis() -> Diagnosis:
             "effect_parameters": {"A": 1.0, "a": 0.0903, "beta": 1203.0, "gamma": 497.0, "n": 1.0},
             "units": {"J_z": "kg m^2"},
         },
+        localization=localization(),
         notes=("Record step_A0.6.csv holds no y.", "With the effect the simulation reaches the noise floor."),
     )
 
@@ -107,6 +179,10 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
         "two effects": {
             "effects": ("coulomb_friction", "cubic_stiffness"),
             "ambiguous_with": (),
+            "effect_shares": {
+                "coulomb_friction": {"psi": 0.8, "y": 0.7},
+                "cubic_stiffness": {"psi": 0.2, "y": 0.3},
+            },
         },
         "own effect": {
             "effects": ("my_gear",),
@@ -127,6 +203,7 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
             "noise_floors": (),
             "traces": (),
             "notes": (),
+            "localization": Localization(),
         },
         "unknown": {**nothing, "verdict": "unknown", "where": ("yaw_dynamics",)},
         "not finite": {"gap": {"psi": OutputGap(float("nan"), float("inf"), 0.01, 0.009)}},
@@ -151,6 +228,12 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
             "notes": (hostile,),
             "candidates": (candidate(("x<y>",), 0.9, 1.0, message=hostile, success=False),),
             "traces": (trace(hostile, "validation", ("psi",)),),
+            "localization": replace(
+                diagnosis.localization,
+                by_record=tuple(replace(part, record=hostile) for part in diagnosis.localization.by_record),
+                by_time=tuple(replace(part, record=hostile) for part in diagnosis.localization.by_time),
+                sentence=hostile,
+            ),
         },
         "long": {
             "traces": tuple(

@@ -42,14 +42,16 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
     if pair is None:
         return AmplitudeDependence(
             "cannot tell",
-            "The records have one amplitude, so they cannot tell whether the frequency response changes with it. "
+            "The sound records have one amplitude, so they cannot tell whether the frequency response changes with it. "
             "Record another one.",
         )
     names = (pair[0].name, pair[1].name)
     try:
         low, high = (local_rational_response(r, source, response, hold=r.hold) for r in pair)
     except InputError as error:
-        return AmplitudeDependence("cannot tell", f"The frequency responses cannot be compared: {error}", names)
+        return AmplitudeDependence(
+            "cannot tell", f"The frequency responses cannot be compared: {error}", names
+        )
     omega, first, second, variance = _common(low, high)
     if omega.size < _FEWEST_LINES:
         return AmplitudeDependence(
@@ -62,13 +64,14 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
     freedom = 2.0 * min(low.noise_freedom, high.noise_freedom)
     chance = f_distribution.sf(np.abs(second - first) ** 2 / variance, 2.0, freedom)
     changed = (chance < _LINE_CHANCE) & (relative > _MATTERS)
-    span = f"{_amplitude(pair[0], source):.3g} and {_amplitude(pair[1], source):.3g} {rig.inputs[0].unit}"
+    unit = rig.inputs[0].unit if rig.inputs[0].unit != "input" else ""
+    span = f"{_amplitude(pair[0], source):.3g} and {_amplitude(pair[1], source):.3g} {unit}".rstrip()
     if np.mean(changed) >= _LINES_CHANGED:
         worst = int(np.argmax(np.where(changed, relative, 0.0)))
         return AmplitudeDependence(
             "yes",
             f"The frequency response {source} -> {response} changes with the amplitude: between {span} by up to "
-            f"{relative[worst]:.0%} (at {omega[worst]:.3g} rad/s), so a nonlinear effect takes part.",
+            f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect takes part.",
             names,
         )
     seen = float(np.median(3.0 * np.sqrt(variance) / size))

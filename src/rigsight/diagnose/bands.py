@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 _BANDS = 8
 _SEGMENTS = 8
 _FEWEST_SAMPLES = 64
-_EXCITED = 1e-3
+_EXCITED = 1e-2
 """Share of the input's power that may lie on either side of the excited range."""
+_RINGS = 1e-3
+"""Share of the answer's power that may lie above it: after a step the rig rings where the input has little power."""
 _STANDS_OUT = 4.0
 """Power of an answer over that of the noise at which a frequency counts as answered."""
 _RESTS = 1e-3
@@ -59,9 +61,9 @@ def band_edges(
     for source, response, dt in records:
         omega, drive = spectrum(source - np.mean(source), dt)
         answer = spectrum(response - np.mean(response), dt)[1]
-        share = np.cumsum(drive) / (float(np.sum(drive)) or 1.0)
+        driven, rings = (np.cumsum(power) / (float(np.sum(power)) or 1.0) for power in (drive, answer))
         answered = answer > _STANDS_OUT * noise**2 / omega.size
-        kept = answered & (share >= _EXCITED) & (share <= 1.0 - _EXCITED)
+        kept = answered & (driven >= _EXCITED) & ((driven <= 1.0 - _EXCITED) | (rings <= 1.0 - _RINGS))
         kept[0] = False
         lines = np.flatnonzero(kept) if np.any(kept) else np.array([1, omega.size - 1])
         lows.append(float(omega[lines[0]]))

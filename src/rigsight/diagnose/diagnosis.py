@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.advise import advise
 from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
+from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.grow import Prepare, grown
 from rigsight.diagnose.localize import localize
@@ -136,6 +138,7 @@ def diagnose(
     say("re-identified")
     before = _before(task, bench, estimation, linear)
     say("given simulation")
+    quality = data_quality(bench, task.records, linear)
     singles = fit_candidates(bench, linear, effects, n_jobs, progress)
 
     lower_bound = any(floor.lower_bound for floor in floors)
@@ -150,8 +153,12 @@ def diagnose(
         judgement = judge(before.excess, linear, ranking.order[0], lower_bound)
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
-    notes.append(judgement.reason)
-    return _assembled(task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on, rng)
+    quality = with_best_model(quality, bench, judgement.model)
+    notes += [*quality.notes, judgement.reason]
+    diagnosis = _assembled(
+        task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on, rng
+    )
+    return replace(diagnosis, data_quality=quality)
 
 
 def _no_spring(task: Task) -> bool:
@@ -276,6 +283,9 @@ def _assembled(
         notes=tuple(notes),
         windows=length,
         scored_on=scored_on,
+        advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
+        if is_effect
+        else (),
         localization=localize(bench, traces, scored_on, before, linear, after, rng),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}

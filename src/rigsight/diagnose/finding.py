@@ -87,8 +87,9 @@ class DataQuality:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """One sentence per finding with its mend, and the answer about the amplitude."""
-        return (*(f"{finding.sentence} {finding.mend}" for finding in self.findings), self.amplitude.sentence)
+        """Sentences with mends, and the answer about the amplitude; clipping is told where a record is read."""
+        told = [f"{f.sentence} {f.mend}" for f in self.findings if f.kind != "clipping"]
+        return (*told, self.amplitude.sentence)
 
     def to_json(self) -> list[dict[str, Any]]:
         """Return the list ``data_quality`` of ``diagnosis.json``; the last entry is the answer about the amplitude."""

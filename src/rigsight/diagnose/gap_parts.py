@@ -113,8 +113,8 @@ class StatePart(GapPart):
 class TimePart(GapPart):
     """One stretch of a scored record, relative to the measured RMS of all scored records.
 
-    `omega` is the frequency at which the input has its power in this stretch (NaN where it rests); `mean` the mean residual of the
-    re-identified equations on the same scale: a drift shows in it.
+    `omega` is the frequency at which the input has its power in this stretch (NaN where it rests); `mean` the mean residual of
+    the re-identified equations on the same scale: a drift shows in it.
     """
 
     record: str

@@ -6,6 +6,7 @@ the outputs are paired with inputs some samples earlier, so that a fitted delay 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import get_args
@@ -20,15 +21,16 @@ from rigsight.records.record import Hold, Record
 
 _EVALUATIONS = 10
 _TOLERANCE = 1e-3
-_ACCURACY = 1e-3
-_LEAD = 10
-"""Samples by which outputs may come too early and still be told."""
+_MOST_LEAD = 10
+"""Samples by which outputs may come too early and still be told, where a search for a delay reaches that far."""
 _GAP = 1.1
 """RMS in units of the noise floor above which there is something to explain."""
 _GOOD_PART = 0.5
-"""Share of the gap, as power, that a hypothesis must explain to be told; an assumption."""
-_AS_GOOD = 0.1
-"""Difference of such shares at which the plainer hypothesis, a hold, is preferred to a shift."""
+"""Share of the gap, as power, that a hold must explain to be told; an assumption."""
+_NEARLY_ALL = 0.8
+"""The same for a shift: where hysteresis delays the answer, a shift was seen to explain half."""
+_ALIKE = 1.1
+"""Ratio of what two hypotheses leave at which the records do not tell them apart; a hold is then preferred to a shift."""
 _LEAST_SHIFT = 0.2
 """Shift in sample times below which it is taken for none."""
 _DELAYS = ("input_delay", "sensor_delay")
@@ -70,25 +72,29 @@ class InputTiming:
         """Return the hypotheses that explain a good part of what the model leaves."""
         if not self.as_given > _GAP:
             return []
-        best = min(self.with_hold, key=lambda hold: self.with_hold[hold])
-        by_hold = self.explained(self.with_hold[best])
-        by_shift = 0.0 if self.with_shift is None else self.explained(self.with_shift)
-        if by_hold >= _GOOD_PART and by_hold >= by_shift - _AS_GOOD:
-            return [self._hold_finding(best, by_hold, by_shift)]
-        if by_shift >= _GOOD_PART and self.shift is not None and abs(self.shift) > _LEAST_SHIFT * self.dt:
+        least = min(self.with_hold.values())
+        alike = [hold for hold, excess in self.with_hold.items() if excess <= _ALIKE * least]
+        shifted = math.inf if self.with_shift is None else self.with_shift
+        by_hold, by_shift = self.explained(least), self.explained(shifted)
+        if by_hold >= _GOOD_PART and least <= _ALIKE * shifted:
+            return [self._hold_finding(alike, least, shifted)]
+        if by_shift >= _NEARLY_ALL and self.shift is not None and abs(self.shift) > _LEAST_SHIFT * self.dt:
             return [self._shift_finding(self.shift, by_shift)]
         return []
 
-    def _hold_finding(self, best: Hold, by_hold: float, by_shift: float) -> Finding:
+    def _hold_finding(self, holds: Sequence[Hold], least: float, shifted: float) -> Finding:
+        told = " or ".join(f'"{hold}"' for hold in holds)
         rival = ""
-        if self.shift is not None and by_shift >= by_hold - _AS_GOOD:
-            rival = f" A shift of the time base by {1e3 * self.shift:.3g} ms would explain {by_shift:.0%}."
+        if self.shift is not None and shifted <= _ALIKE * least:
+            rival = f" So would a shift of the time base by {1e3 * self.shift:.3g} ms"
+            rival += ", or a delay in the rig." if self.shift > 0.0 else "."
         return Finding(
             "hold",
-            f'Between its samples the input runs as hold = "{best}" rather than "{self.given}": that alone explains '
-            f"{by_hold:.0%} of the gap ({self.as_given:.3g} -> {self.with_hold[best]:.3g} times the noise floor).{rival}",
-            f'Set hold = "{best}" for the records in campaign.toml, if the drive can work like that.',
-            explained=by_hold,
+            f'Between its samples the input runs as hold = {told} rather than "{self.given}": that alone explains '
+            f"{self.explained(least):.0%} of the gap ({self.as_given:.3g} -> {least:.3g} times the noise floor).{rival}",
+            f"Set hold = {told} for the records in campaign.toml, if that is how the drive works.",
+            serious=not (rival and self.shift is not None and self.shift > 0.0),
+            explained=self.explained(least),
         )
 
     def _shift_finding(self, shift: float, by_shift: float) -> Finding:
@@ -103,14 +109,16 @@ class InputTiming:
         return Finding(
             "time_shift",
             f"The outputs come {1e3 * shift:.3g} ms late: a shift of the time base would explain {by_shift:.0%} of the gap "
-            f"({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor), and so would a delay or a short lag in the rig.",
+            f"({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor). So would a delay or a short lag in the rig.",
             "Make sure that input and outputs share one clock before an effect is blamed.",
             serious=False,
             explained=by_shift,
         )
 
 
-def input_timing(bench: Workbench, effects: tuple[Effect, ...], base: FitResult) -> InputTiming | None:
+def input_timing(
+    bench: Workbench, effects: tuple[Effect, ...], base: FitResult, with_shift: bool = True
+) -> InputTiming | None:
     """Fit a model to the liveliest stretches with every hold, and with a shift of the time base.
 
     Parameters
@@ -121,6 +129,8 @@ def input_timing(bench: Workbench, effects: tuple[Effect, ...], base: FitResult)
         Effects of the model beside those that the simulation has.
     base
         Fit of the model to the records with the hold as declared.
+    with_shift
+        False to try the holds alone.
 
     Returns
     -------
@@ -134,7 +144,7 @@ def input_timing(bench: Workbench, effects: tuple[Effect, ...], base: FitResult)
     if not np.isfinite(as_given):
         return None
     others: tuple[Hold, ...] = tuple(hold for hold in get_args(Hold) if hold != declared)
-    shift, with_shift = _shifted(bench, effects, base)
+    shift, shifted = _shifted(bench, effects, base) if with_shift else (None, None)
     return InputTiming(
         given=declared,
         as_given=as_given,
@@ -142,7 +152,7 @@ def input_timing(bench: Workbench, effects: tuple[Effect, ...], base: FitResult)
             hold: _excess(bench, base, [replace(record, hold=hold) for record in bench.look])
             for hold in others
         },
-        with_shift=with_shift,
+        with_shift=shifted,
         shift=shift,
         dt=max(record.dt for record in bench.look),
     )
@@ -159,7 +169,7 @@ def _refitted(
     free: Sequence[str],
     records: Sequence[Record],
 ) -> FitResult:
-    fit = GreyBoxFit(base.structure, records, bench.scales, bench.noise, _ACCURACY)
+    fit = GreyBoxFit(base.structure, records, bench.scales, bench.noise)
     return fit.fit(start, free, max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
 
 
@@ -168,13 +178,18 @@ def _shifted(
 ) -> tuple[float | None, float | None]:
     """Return the fitted shift and what is left with it."""
     names = {effect.name for effect in (*bench.modelled, *effects)}
-    if names & set(_DELAYS) or any(record.n_samples <= 10 * _LEAD for record in bench.look):
+    dt = bench.look[0].dt
+    if names & set(_DELAYS) or any(not math.isclose(record.dt, dt, rel_tol=1e-6) for record in bench.look):
         return None, None
     delay = effect_named("input_delay")
+    # The start, a shift of zero, lies in the middle of what the search for a delay explores.
+    reach = 0.5 * delay.parameters[0].search[1] * bench.scales["time"]
+    n_lead = int(np.clip(reach / dt, 1, _MOST_LEAD))
     structure = bench.composed((*effects, delay), dict(base.structure.fixed))
     name = structure.parameter_name(delay, delay.parameters[0].name)
-    paired = [_outputs_later(record, [s.name for s in bench.rig.outputs]) for record in bench.look]
-    lead = _LEAD * max(record.dt for record in bench.look)
+    outputs = [signal.name for signal in bench.rig.outputs]
+    paired = [_outputs_later(record, outputs, n_lead) for record in bench.look]
+    lead = n_lead * dt
     result = _refitted(
         bench, replace(base, structure=structure), {**base.values, name: lead}, (*base.free, name), paired
     )
@@ -183,10 +198,10 @@ def _shifted(
     return result.values[name] - lead, result.weighted_rms
 
 
-def _outputs_later(record: Record, outputs: Sequence[str]) -> Record:
-    """Return the record with its outputs moved to later times by `_LEAD` samples."""
+def _outputs_later(record: Record, outputs: Sequence[str], count: int) -> Record:
+    """Return the record with its outputs moved to later times by `count` samples."""
     signals = {
-        name: samples[:-_LEAD] if name in outputs else samples[_LEAD:]
+        name: samples[:-count] if name in outputs else samples[count:]
         for name, samples in record.signals.items()
     }
     return replace(record, signals=signals)

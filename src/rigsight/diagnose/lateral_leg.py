@@ -1,6 +1,6 @@
-"""Does the lateral part follow from the motion as it was measured? Its linear equation fitted with the measured motion as input.
+"""Does the lateral part follow from the motion as it was measured? Its linear equation fitted with that as input.
 
-``y' = b (c + g x(t + shift) - y)`` with the hold of a sampled analogue signal; for each rate b and shift, gain, offset and initial
+``y' = b (c + g x(t + shift) - y)`` with x joined by straight lines. For each rate b and shift, gain g, offset c and initial
 values follow by linear least squares, so that the search has two dimensions at most. Errors of what moves x do not enter.
 """
 
@@ -92,10 +92,11 @@ def fit_lateral_leg(bench: Workbench, given: Mapping[str, float]) -> LateralLeg 
         [plain.x[0], 0.0],
         bounds=([lowest, -reach], [highest, reach]),
         x_scale=[0.1, 1.0],
-        diff_step=1e-4,
+        diff_step=[1e-4, 1e-4],
     )
     best, moved = (_solved(fitted_to, names, solution.x) for solution in (plain, free))
-    curvature = np.linalg.pinv(free.jac.T @ free.jac)
+    slopes = np.asarray(free.jac)
+    curvature = np.linalg.pinv(slopes.T @ slopes)
     scatter = 2.0 * free.cost / max(1, free.fun.size - 2)
     return LateralLeg(
         given=tuple(_left(r, names, start) for r in scored_on),

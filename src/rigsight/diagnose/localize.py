@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -166,7 +167,7 @@ def _by_time(scored: Sequence[Trace], noise: Mapping[str, float]) -> list[TimePa
         for output in trace.measured:
             holding = [other for other in scored if output in other.measured]
             spread, total = _spread(holding, output), _total(holding, output)
-            for start, stop in zip(edges[:-1], edges[1:], strict=True):
+            for start, stop in pairwise(edges):
                 own = {stage: trace.residual(stage, output)[start:stop] for stage in STAGES}
                 parts.append(
                     TimePart(
@@ -192,7 +193,7 @@ def _figures(group: Sequence[Trace], output: str, noise: float, alike: Sequence[
     """Return what a group of records leaves relative to its own motion, and its share among records of its kind."""
     spread = _spread(group, output)
     stages = {
-        stage: rms(np.concatenate([trace.residual(stage, output) for trace in group])) / spread
+        str(stage): rms(np.concatenate([trace.residual(stage, output) for trace in group])) / spread
         for stage in STAGES
     }
     total = _total([trace for trace in alike if output in trace.measured], output)

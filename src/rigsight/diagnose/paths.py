@@ -42,7 +42,6 @@ def path_parts(bench: Workbench, before: Scored, linear: Scored, after: Scored) 
     own = _motion_alone(bench, linear)
     parts = [
         _part(
-            bench,
             bench.scoring,
             motion,
             source,
@@ -133,14 +132,13 @@ def _column(model: Scored, index: int) -> list[NDArray[np.float64]]:
 def _lateral_part(bench: Workbench, leg: LateralLeg, motion: str, output: str) -> PathPart:
     records = [record for record in bench.scoring if output in record]
     noise = float(np.hypot(bench.noise[output], leg.noise_gain * bench.noise[motion]))
-    part = _part(bench, records, output, motion, {"before": leg.given, "reidentified": leg.fitted}, noise)
+    part = _part(records, output, motion, {"before": leg.given, "reidentified": leg.fitted}, noise)
     spread = float(np.std(np.concatenate([record[output] for record in records]))) or 1.0
     shifted = rms(np.concatenate(leg.shifted)) / spread
     return replace(part, shift=leg.shift, shift_std=leg.shift_std, shifted=shifted)
 
 
 def _part(
-    bench: Workbench,
     records: Sequence[Record],
     output: str,
     source: str,

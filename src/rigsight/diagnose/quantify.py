@@ -26,7 +26,7 @@ def budget_intervals(
 ) -> dict[str, Interval]:
     """Return 95 % intervals of the gap budget of an output over the records that hold it, see `gap_intervals`."""
     holding = [trace for trace in traces if output in trace.measured]
-    residuals = {stage: [trace.residual(stage, output) for trace in holding] for stage in STAGES}
+    residuals = {str(stage): [trace.residual(stage, output) for trace in holding] for stage in STAGES}
     return gap_intervals(residuals, [trace.measured[output] for trace in holding], noise_floor, rng)
 
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.gap_parts import Localization
 
 Verdict = Literal["effect", "parameters", "none", "unknown"]
@@ -89,6 +90,39 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Advice:
+    """The experiment that would tell a rival from the named effects.
+
+    Attributes
+    ----------
+    rival
+        Names of the rival's effects.
+    waveform, amplitude, band
+        What to drive with: amplitude in the unit of the input, band [rad/s] where the waveform has one.
+    output, separation
+        Where the two differ most, and the RMS difference of their predictions there in standard deviations of the noise.
+    """
+
+    rival: tuple[str, ...]
+    waveform: str
+    amplitude: float
+    band: tuple[float, float] | None
+    output: str
+    separation: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of ``advice`` in ``diagnosis.json``."""
+        return {
+            "rival": list(self.rival),
+            "waveform": self.waveform,
+            "amplitude": _number(self.amplitude),
+            "band": None if self.band is None else [_number(omega) for omega in self.band],
+            "output": self.output,
+            "separation": _number(self.separation),
+        }
+
+
+@dataclass(frozen=True)
 class NoiseFloor:
     """Standard deviation of what no model can explain in an output, and how it was found.
 
@@ -162,6 +196,10 @@ class Diagnosis:
         Length [s] of the windows scored with their own initial states, None where whole records are.
     scored_on
         ``"validation"``, or ``"estimation"`` where the campaign has no validation records.
+    data_quality
+        What the records themselves say; None where they were not asked.
+    advice
+        For each rival that the records cannot tell apart, the experiment that would.
     localization
         The gap split by record, amplitude, band, state, time and signal path.
     effect_shares
@@ -183,6 +221,8 @@ class Diagnosis:
     notes: tuple[str, ...]
     windows: float | None = None
     scored_on: str = "validation"
+    advice: tuple[Advice, ...] = ()
+    data_quality: DataQuality | None = None
     localization: Localization = field(default_factory=Localization)
     effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
@@ -224,6 +264,8 @@ class Diagnosis:
             },
             "window": self.windows,
             "scored_on": self.scored_on,
+            "data_quality": [] if self.data_quality is None else self.data_quality.to_json(),
+            "advice": [advice.to_json() for advice in self.advice],
             "notes": list(self.notes),
         }
 

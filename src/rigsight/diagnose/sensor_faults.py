@@ -39,7 +39,8 @@ def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
         found += coarse
         # A coarse channel stands still and jumps by itself; the force of an element may do both.
         if not coarse and rig.is_driven:
-            found += [*_stuck(record, name), *_jumping(record, name, signals[name])]
+            # A stuck channel jumps where it comes loose.
+            found += _stuck(record, name) or _jumping(record, name, signals[name])
     return found
 
 

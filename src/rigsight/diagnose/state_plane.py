@@ -24,7 +24,6 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 
 _CELLS = 9
 """Cells along each axis of the plane."""
-_FEWEST_SAMPLES = 5
 _STANDS_OUT = 4.0
 _MARGIN = 1.5
 _HIGHEST_CUTOFF = 0.8
@@ -81,8 +80,6 @@ def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tu
         for i in np.unique(own_cell):
             inside = own_cell == i
             n_samples = int(np.count_nonzero(inside))
-            if n_samples < _FEWEST_SAMPLES:
-                continue
             lacking = own_force[inside] if index == 0 else np.array([_NOTHING])
             column, row = divmod(int(i), _CELLS)
             parts.append(

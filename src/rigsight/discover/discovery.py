@@ -24,7 +24,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure
+from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
 
 Method = Literal["full", "discrepancy"]
@@ -37,7 +37,9 @@ _SAME_COLUMN = 0.999
 _FINAL_EVALUATIONS = 150
 _CLEARLY_OFF = 3.0
 """Standard errors from its special value at which an exponent is released."""
-_ENSEMBLE_TERMS = 8
+_ENSEMBLE_TERMS = 6
+_SAME_REST = 1e-5
+"""Shift of the rest position, in units of the motion, that changes no column."""
 _MOST_POINTS = 20_000
 
 
@@ -308,23 +310,23 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
             start, [name for name in structure.names if name in moved], max_evaluations=_FINAL_EVALUATIONS
         )
 
-    fit = fitted(chosen.fit.structure, chosen.fit.values, free)
+    special = {name: value for e in chosen.fit.structure.effects for name, value in e.special_cases.items()}
+    start = {**special, **dict(chosen.fit.structure.fixed), **chosen.fit.values}
+    fit = fitted(bench.structure(chosen.support, frozenset(special)), start, free | set(special))
     if not math.isfinite(fit.cost):
-        raise SimulationError(f"The discovered equations cannot be fitted to all records: {fit.message}")
-    special = dict(chosen.fit.structure.fixed)
-    if not special:
+        fit = fitted(chosen.fit.structure, chosen.fit.values, free)
+        if not math.isfinite(fit.cost):
+            raise SimulationError(f"The discovered equations cannot be fitted to all records: {fit.message}")
         return fit, ""
-    released = fitted(
-        bench.structure(chosen.support, frozenset(special)), {**fit.values, **special}, free | set(special)
-    )
-    if not math.isfinite(released.cost):
+    known = {name: (fit.values[name], fit.standard_errors[name]) for name in special}
+    if not special or any(abs(v - special[n]) > _CLEARLY_OFF * error for n, (v, error) in known.items()):
         return fit, ""
-    known = {name: (released.values[name], released.standard_errors[name]) for name in special}
-    if any(abs(value - special[name]) > _CLEARLY_OFF * error for name, (value, error) in known.items()):
-        return released, ""
-    told = ", ".join(f"{name} = {value:.3g} +/- {error:.2g}" for name, (value, error) in known.items())
-    held = ", ".join(f"{name} = {value:g}" for name, value in special.items())
-    return fit, f"{held} is held; released, the fit says {told}, and the other coefficients move with it."
+    held = fitted(compose(rig, chosen.fit.structure.effects, special), fit.values, free - set(special))
+    if not math.isfinite(held.cost):
+        return fit, ""
+    told = ", ".join(f"{name} = {value:.4g} +/- {error:.2g}" for name, (value, error) in known.items())
+    kept = ", ".join(f"{name} = {value:g}" for name, value in special.items())
+    return held, f"{kept} is held; released, the fit says {told}, and the other coefficients move with it."
 
 
 def _inclusion(
@@ -353,11 +355,17 @@ def _inclusion(
     ]
     names = offered_terms[:_ENSEMBLE_TERMS]
     shift = _rest_shift(bench, final)
+    if abs(shift) < _SAME_REST * bench.scales["x"]:
+        shift = 0.0
     moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
     projected = _projected(task, moved, rows) if shift else bench.projected
     own_terms = _own_terms(task, projected) if bench.own_terms else {}
-    effects = [bench.candidates[name].effect for name in names]
-    library = candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
+    library = [bench.candidates[name] for name in names]
+    if shift:
+        # The loop does not know where rest is.
+        loops = [candidate for candidate in library if candidate.name == LOOP]
+        effects = [candidate.effect for candidate in library if candidate.name != LOOP]
+        library = loops + candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
     again = replace(
         bench,
         candidates={candidate.name: candidate for candidate in library},

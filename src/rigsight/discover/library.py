@@ -11,6 +11,7 @@ import itertools
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -274,7 +275,15 @@ def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) ->
 
 
 def _evaluated(expression: sp.Expr, inner: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
-    numbers = {sp.Symbol(name, real=True): value for name, value in inner.items()}
-    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2).subs(numbers)
-    compiled = sp.lambdify((canonical.x, canonical.v, canonical.u), plain, "numpy", cse=True)
-    return np.broadcast_to(compiled(motion.x, motion.v, motion.u), motion.x.shape).astype(np.float64)
+    function = _compiled(expression, tuple(inner))
+    return np.broadcast_to(function(motion.x, motion.v, motion.u, *inner.values()), motion.x.shape).astype(
+        np.float64
+    )
+
+
+@lru_cache(maxsize=256)
+def _compiled(expression: sp.Expr, names: tuple[str, ...]) -> Any:
+    """Return an expression as a function of displacement, velocity, input and named parameters."""
+    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2)
+    own = [sp.Symbol(name, real=True) for name in names]
+    return sp.lambdify((canonical.x, canonical.v, canonical.u, *own), plain, "numpy", cse=True)

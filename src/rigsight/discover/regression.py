@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-N_ENSEMBLE = 50
+N_ENSEMBLE = 40
 _BLOCKS = 40
 """Contiguous stretches of rows that an ensemble draws from: neighboring rows share their noise."""
 _CLEARLY = 1.1

@@ -18,7 +18,7 @@ from rigsight.discover.regression import Projected, information_criterion, spars
 from rigsight.identify import FitResult, GreyBoxFit
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure, carried_over, compose
 
 STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
@@ -213,17 +213,36 @@ class Bench:
         """
         key = support, release, left_out
         if key not in self.trials:
-            structure = self.structure(support, release)
-            values = dict(start) if start is not None else self.start(structure, support)
-            fit = GreyBoxFit(structure, self.estimation, self.scales, self.noise).fit(
-                values,
-                self.free_parameters(structure, left_out),
-                max_evaluations=_EVALUATIONS,
-                tolerance=_TOLERANCE,
-                finish=False,
-            )
-            self.trials[key] = self.scored(support, fit)
+            self.trials[key] = self._polished(support, release, start, left_out)
         return self.trials[key]
+
+    def shortened(self, support: Support, longer: Trial) -> Trial:
+        """Polish a support once more from the values that a longer one ended at, and keep the better of both."""
+        kept = {name for name, _ in longer.fit.structure.fixed}
+        special = {name for n in support for name in self.candidates[n].effect.special_cases}
+        release = frozenset(special - kept)
+        structure = self.structure(support, release)
+        start = {
+            **self.start(structure, support),
+            **carried_over(longer.fit.values, longer.fit.structure, structure),
+        }
+        before = self.trial(support)
+        again = self._polished(support, release, start, frozenset())
+        return again if again.excess < before.excess else before
+
+    def _polished(
+        self, support: Support, release: Support, start: Mapping[str, float] | None, left_out: Support
+    ) -> Trial:
+        structure = self.structure(support, release)
+        values = dict(start) if start is not None else self.start(structure, support)
+        fit = GreyBoxFit(structure, self.estimation, self.scales, self.noise).fit(
+            values,
+            self.free_parameters(structure, left_out),
+            max_evaluations=_EVALUATIONS,
+            tolerance=_TOLERANCE,
+            finish=False,
+        )
+        return self.scored(support, fit)
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
         """Simulate the held-out records with a fit; only their initial states are estimated."""
@@ -349,8 +368,9 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         longer = [best.support | {name} for name in _next_terms(bench, best.support)]
         if len(best.support) >= _MOST_TERMS or at_floor(best):
             longer = []
-        around = [tried(frozenset(support)) for support in (*shorter, *longer)]
-        pool += around
+        pool += [tried(frozenset(support)) for support in (*shorter, *longer)]
+        # What stopped short from the regression's values may go on from those of the longer equation.
+        pool += [bench.shortened(frozenset(support), best) for support in shorter if support]
         finest = min(pool, key=lambda t: t.excess)
         independent = independent_samples(finest.residuals)
         found = _fewest(pool, cost)

@@ -8,6 +8,16 @@ from rigsight.identify.driven_offsets import driven_offsets as driven_offsets
 from rigsight.identify.effect_start import EffectRegression as EffectRegression
 from rigsight.identify.fit_result import FitResult as FitResult
 from rigsight.identify.grey_box import GreyBoxFit as GreyBoxFit
+from rigsight.identify.hysteresis import Calibration as Calibration
+from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
+from rigsight.identify.hysteresis import LoopArea as LoopArea
+from rigsight.identify.hysteresis import SpectralRatio as SpectralRatio
+from rigsight.identify.hysteresis import SteadyResponse as SteadyResponse
+from rigsight.identify.hysteresis import SweptResponse as SweptResponse
+from rigsight.identify.hysteresis import calibrate_to_records as calibrate_to_records
+from rigsight.identify.hysteresis import calibrate_to_responses as calibrate_to_responses
+from rigsight.identify.hysteresis import derived_quantities as derived_quantities
+from rigsight.identify.hysteresis import loop_area as loop_area
 from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
@@ -24,19 +34,28 @@ from rigsight.identify.transfer_function import fit_frequency_response as fit_fr
 from rigsight.identify.transfer_step import fit_step as fit_step
 
 __all__ = [
+    "Calibration",
     "ConicityEstimate",
+    "DerivedQuantities",
     "EffectRegression",
     "FitResult",
     "GreyBoxFit",
     "JointFit",
     "KindFit",
+    "LoopArea",
     "PhysicalEstimates",
     "RecordResidual",
+    "SpectralRatio",
+    "SteadyResponse",
+    "SweptResponse",
     "TransferFit",
     "TransferForm",
+    "calibrate_to_records",
+    "calibrate_to_responses",
     "characteristic_scales",
     "conicity_slope",
     "creep_error_of_sine",
+    "derived_quantities",
     "driven_offsets",
     "estimate_conicity",
     "fit_frequency_response",
@@ -44,6 +63,7 @@ __all__ = [
     "fit_step",
     "lateral_parameters",
     "linear_start",
+    "loop_area",
     "offsets",
     "yaw_parameters",
 ]

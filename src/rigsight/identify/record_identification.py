@@ -97,9 +97,10 @@ def identify_record(
 
 
 def input_peak(record: Record, rig: Rig) -> float:
-    """Return the largest deviation of the input from its median, in its unit."""
-    samples = record[rig.inputs[0].name]
-    return float(np.max(np.abs(samples - np.median(samples))))
+    """Return the height of a step, or half the range of another input, in its unit."""
+    spanned = float(np.ptp(record[rig.inputs[0].name]))
+    # Not the deviation from mean or median: a sweep that begins slowly has both off zero.
+    return spanned if record.kind == "step" else 0.5 * spanned
 
 
 def _driven_forward(record: Record, gain: float) -> Record:
@@ -258,14 +259,25 @@ def _judged(
     of_velocity = fit.response != path.response
     if not fit.success and not of_velocity:
         return replace(path, problem=fit.message)
+    gain = fit.values["gain"]
+    if not of_velocity and not fit.standard_errors["gain"] < _POORLY_KNOWN * abs(gain):
+        # Its sign would be blamed on a sensor.
+        return replace(path, problem=_undetermined(["the gain"]))
     # The break frequency of a velocity is often too low to be seen; mass and damping show in the slope all the same.
     found = physical(fit)
     errors = found.standard_errors
     poor = [name for name in found.names if not errors[name] < _POORLY_KNOWN * abs(found.values[name])]
     if len(poor) > 1 or (poor and fit.form.order == "pt1"):
         # A damping near zero alone is a result; the others are positive by nature.
-        return replace(path, problem=f"the record does not determine {', '.join(poor)}.")
+        return replace(path, problem=_undetermined(poor))
     return replace(path, fit=fit, physical=found)
+
+
+def _undetermined(names: list[str]) -> str:
+    return (
+        f"the record does not determine {', '.join(names)}: it is too short, or its input leaves out the frequencies around the "
+        "break. Record for longer, over a wider band, or at a larger amplitude."
+    )
 
 
 def _resolution_warning(motion: PathIdentification, seen: RecordResponse | None, record: Record) -> list[str]:

@@ -110,10 +110,12 @@ def _noise(
 
     bounds = Bounds(*np.transpose([_LOG_RATIO_RANGE, np.log(_CORNER_RANGE)]))
     starts = [np.array([ratio, math.log(corner)]) for ratio in _LOG_RATIOS for corner in _CORNERS]
-    best = min(starts, key=lambda x: cost(x)[0])
+    best: Any = min(starts, key=lambda x: cost(x)[0])
     around = best + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.7]])
     options: Any = {"xatol": 0.05, "fatol": 0.01, "initial_simplex": around}
-    found = minimize(lambda x: cost(x)[0], best, method="Nelder-Mead", bounds=bounds, options=options)
+    found = minimize(  # type: ignore[call-overload]
+        lambda x: cost(x)[0], best, method="Nelder-Mead", bounds=bounds, options=options
+    )
     variance = cost(found.x)[1] * scale**2
     return np.asarray(variance * shape(found.x[0], math.exp(found.x[1])))
 

@@ -16,6 +16,11 @@ from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
 from rigsight.plot.frequency_responses import Panel as Panel
 from rigsight.plot.frequency_responses import bode as bode
 from rigsight.plot.frequency_responses import overlaid_responses as overlaid_responses
+from rigsight.plot.gap_maps import gap_amplitudes as gap_amplitudes
+from rigsight.plot.gap_maps import gap_bands as gap_bands
+from rigsight.plot.gap_maps import gap_records as gap_records
+from rigsight.plot.gap_maps import gap_states as gap_states
+from rigsight.plot.gap_maps import gap_times as gap_times
 from rigsight.plot.model_comparison import ErrorPanel as ErrorPanel
 from rigsight.plot.model_comparison import ResponsesPanel as ResponsesPanel
 from rigsight.plot.model_comparison import StepPanel as StepPanel
@@ -39,7 +44,12 @@ __all__ = [
     "detail_window",
     "display_scale",
     "envelope",
+    "gap_amplitudes",
+    "gap_bands",
     "gap_budget",
+    "gap_records",
+    "gap_states",
+    "gap_times",
     "model_errors",
     "model_responses",
     "model_steps",

@@ -74,12 +74,16 @@ def _numbers(found: Discovery) -> list[tuple[str, float]]:
 
 
 def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
-    """Draw 95 % intervals relative to the values, each cut at the edge of the picture."""
+    """Draw 95 % intervals relative to the values; of one that holds zero only that is said."""
     places = np.arange(len(numbers))
-    known = [1.96 * error for _, error in numbers if math.isfinite(error)]
-    reach = min(max([*known, 1e-4]), 1.0) * 1.2
+    known = [1.96 * error for _, error in numbers if 1.96 * error < 1.0]
+    reach = max([*known, 1e-4]) * 1.2
     for place, (_, error) in zip(places, numbers, strict=True):
-        width = min(1.96 * error, reach) if math.isfinite(error) else reach
+        width = 1.96 * error
+        if not width < 1.0:
+            words = "cannot be told from zero" if math.isfinite(width) else "not determined"
+            ax.text(0.02 * reach * 100, place, words, va="center", fontsize=8, color=MEASURED)
+            continue
         ax.plot([-100 * width, 100 * width], [place, place], color=WITH_EFFECT, linewidth=2.0)
         ax.plot(0.0, place, "o", color=WITH_EFFECT, markersize=4)
     ax.axvline(0.0, color=MEASURED, linewidth=0.8, linestyle=":")

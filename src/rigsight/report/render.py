@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report import sections
+from rigsight.report import location, sections
 from rigsight.report.quantities import Written
 from rigsight.report.wording import (
     after_label,
@@ -61,6 +61,10 @@ def render_report(
             else "",
             budget=sections.budget_figure(diagnosis),
             budget_rows=sections.budget_rows(diagnosis),
+            path_sentence=diagnosis.localization.sentence.replace("->", "\u2192"),
+            path_rows=location.path_rows(diagnosis),
+            maps=location.output_maps(diagnosis),
+            share_rows=location.share_rows(diagnosis),
             ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
             ranking_rows=sections.ranking_rows(diagnosis),
             outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],

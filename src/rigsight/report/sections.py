@@ -93,7 +93,7 @@ def budget_figure(diagnosis: Diagnosis) -> PageFigure:
     )
 
 
-def budget_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
+def budget_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the gap budget as text, one row per output."""
     return [
         {
@@ -103,9 +103,18 @@ def budget_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
             "after": gap_percent(gap.after),
             "noise_floor": gap_percent(gap.noise_floor),
             "closed": percent(gap.closed),
+            "intervals": {stage: interval_text(limits, stage) for stage, limits in gap.intervals.items()},
         }
         for output, gap in diagnosis.gap.items()
     ]
+
+
+def interval_text(limits: tuple[float, float], stage: str) -> str:
+    """Return a 95 % interval of a stage as text, ``"9.1 % to 9.9 %"``; empty where it is not finite."""
+    if not all(map(math.isfinite, limits)):
+        return ""
+    low, high = map(percent if stage == "closed" else gap_percent, limits)
+    return f"{low} to {high}"
 
 
 def ranking_figure(diagnosis: Diagnosis) -> PageFigure:

@@ -15,6 +15,7 @@ from rigsight.diagnose.result import Candidate, Diagnosis
 from rigsight.report.quantities import estimate_text, gap_percent
 from rigsight.report.wording import (
     TIMES,
+    advice_sentences,
     after_label,
     ambiguity_sentence,
     basis_sentence,
@@ -46,6 +47,8 @@ class Summary:
         yield text(verdict_sentence(diagnosis))
         if diagnosis.ambiguous_with:
             yield text(ambiguity_sentence(diagnosis))
+        for sentence in advice_sentences(diagnosis):
+            yield text(sentence)
         table = Table.grid(padding=(0, 2))
         for subject, words in _rows(diagnosis):
             table.add_row(text(subject, "bold"), text(words))

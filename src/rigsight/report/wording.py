@@ -11,6 +11,8 @@ from rigsight.diagnose.verdict import AT_FLOOR
 TIMES = "\u00d7"
 _WITHOUT_EFFECT = "no effect, better numbers"
 _PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
+_SEPARATES = 1.0
+"""RMS difference in standard deviations of the noise below which an experiment is no help."""
 _PLACES = {
     "actuator": "at the actuator",
     "sensor": "at the sensor",
@@ -168,6 +170,30 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
         return ""
     rivals = listed((effects_label(effects) for effects in diagnosis.ambiguous_with), "or")
     return f"These records cannot tell {effects_label(diagnosis.effects)} from {rivals}."
+
+
+def advice_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return, for each rival, the experiment that would tell it from the named effects."""
+    unit = next(iter(diagnosis.units.values()), "")
+    sentences = []
+    for advice in diagnosis.advice:
+        size = f"{advice.amplitude:.3g} {unit}".strip()
+        band = ""
+        if advice.band is not None:
+            low, high = advice.band
+            band = f" at {low:.3g} rad/s" if low == high else f" from {low:.3g} to {high:.3g} rad/s"
+        rival = effects_label(advice.rival)
+        if advice.separation < _SEPARATES:
+            sentences.append(
+                f"No experiment of the menu separates {rival}: the most, {advice.separation:.1f} standard deviations of the noise "
+                f"in {advice.output}, by a {advice.waveform} of {size}{band}."
+            )
+        else:
+            sentences.append(
+                f"To tell {rival} apart, drive a {advice.waveform} of {size}{band}: the two predictions then differ in "
+                f"{advice.output} by {advice.separation:.3g} standard deviations of the noise."
+            )
+    return sentences
 
 
 def basis_sentence(diagnosis: Diagnosis) -> str:

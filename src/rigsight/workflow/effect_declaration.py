@@ -9,8 +9,9 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 
 import sympy as sp
+from sympy.core.function import Application
 
-from rigsight.effects import Effect, Energy, Place, Signature
+from rigsight.effects import Effect, Energy, Place, Signature, State
 from rigsight.effects import symbols as canonical
 from rigsight.errors import nearest
 from rigsight.parameters import Parameter
@@ -71,15 +72,17 @@ def _type_faults(effect: Effect) -> Iterator[str]:
     for field, wanted in (("name", str), ("summary", str), ("place", Place), ("energy", Energy)):
         if not isinstance(getattr(effect, field), wanted):
             yield f"{field} is {getattr(effect, field)!r}; give a {wanted.__name__}{_options(wanted)}."
-    if not isinstance(effect.signature, Signature):
-        yield f"signature is {effect.signature!r}; give a Signature, for instance Signature(GainTrend.FALLS)."
+    signature: object = effect.signature
+    if not isinstance(signature, Signature):
+        yield f"signature is {signature!r}; give a Signature, for instance Signature(GainTrend.FALLS)."
     for field in ("parameters", "states", "starts", "searched_as"):
         if not isinstance(getattr(effect, field), tuple):
-            yield f"{field} is a {type(getattr(effect, field)).__name__}; give a tuple: ({field[:-1]},)."
-    if isinstance(effect.parameters, tuple):
-        for parameter in effect.parameters:
-            if not isinstance(parameter, Parameter):
-                yield f"parameters holds {parameter!r}; give a Parameter."
+            yield f"{field} is a {type(getattr(effect, field)).__name__}; give a tuple (with a comma behind a single one)."
+            return
+    for field, member_type in (("parameters", Parameter), ("states", State)):
+        for member in getattr(effect, field):
+            if not isinstance(member, member_type):
+                yield f"{field} holds {member!r}; give a {member_type.__name__}."
     for field, expression in equations(effect).items():
         if not isinstance(expression, sp.Expr):
             yield f"{field} is {expression!r}; give an expression of sympy symbols."
@@ -199,7 +202,7 @@ def _expression_faults(
             continue
         known = [*own, *map(str, states), *readable]
         yield f"{what}: {symbol} is no parameter, state or signal here.{nearest(symbol.name, known)} Known: {', '.join(known)}."
-    for function in sorted(expression.atoms(sp.Function), key=str):
+    for function in sorted(expression.atoms(Application), key=str):
         if not isinstance(function, (*_KINKS, *_SMOOTH)):
             yield (
                 f"{what}: {type(function).__name__} cannot be simulated; write kinks with Abs, sign or positive_part "

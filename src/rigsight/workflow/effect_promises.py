@@ -231,7 +231,7 @@ def is_found_again(effect: Effect) -> str | None:
 
 def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
     rng = np.random.default_rng(4)
-    t = 0.01 * np.arange(1500)
+    t = 0.01 * np.arange(1500, dtype=np.float64)
     driven = [
         Record("sweep", 0.01, {"u": linear_sweep(t, share * amplitude, 1.0, 30.0)}, {}, hold="zoh")
         for share in (0.4, 1.0)
@@ -269,10 +269,12 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
                 f"records do not determine {p.name}: {truth[p.name]:.3g} comes back with a standard error of {error:.2g}. "
                 "Fix it (fitted=False with a default), or choose starts at which the effect is strong."
             )
-        if abs(result.values[p.name] - truth[p.name]) >= _SIGMAS * error:
+    for name in free:
+        error = result.standard_errors[name]
+        if abs(result.values[name] - truth[name]) >= _SIGMAS * error:
             return (
-                f"a fit to its own simulation returns {p.name} = {result.values[p.name]:.4g} +- {error:.2g} "
-                f"instead of {truth[p.name]:.4g}."
+                f"a fit to its own simulation returns {name} = {result.values[name]:.4g} +- {error:.2g} "
+                f"instead of {truth[name]:.4g}."
             )
     return None
 

@@ -184,9 +184,11 @@ def _assignments(tree: ast.Module) -> dict[str, int]:
     """Return the line in which each name of the top level is given its value last."""
     lines = {}
     for statement in tree.body:
-        targets = statement.targets if isinstance(statement, ast.Assign) else ()
-        if isinstance(statement, ast.AnnAssign):
-            targets = (statement.target,)
+        targets: list[ast.expr] = []
+        if isinstance(statement, ast.Assign):
+            targets = statement.targets
+        elif isinstance(statement, ast.AnnAssign):
+            targets = [statement.target]
         for target in targets:
             for node in ast.walk(target):
                 if isinstance(node, ast.Name):

@@ -1,0 +1,109 @@
+"""Which experiment would tell the rivals of an ambiguous verdict apart? Both are simulated on a small menu of drives.
+
+References
+----------
+W. G. Hunter and A. M. Reiner, Technometrics 7 (1965) 307, for choosing the experiment where rival models differ most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.result import Advice
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.errors import SimulationError
+from rigsight.excitation import linear_sweep, step
+from rigsight.records.record import Hold, Record
+from rigsight.simulate import simulate
+
+_AMPLITUDES = (0.3, 1.0, 1.5)
+"""In units of the largest input that was recorded: beyond one and a half of it, a rig may not survive the advice."""
+_PERIODS = 40.0
+"""Length of an experiment in periods of the rig's motion."""
+_SLOW, _FAST = 0.1, 5.0
+"""Band of the menu in units of the rig's angular frequency."""
+
+
+@dataclass(frozen=True)
+class _Experiment:
+    waveform: str
+    amplitude: float
+    band: tuple[float, float] | None
+    u: NDArray[np.float64]
+
+
+def advise(
+    bench: Workbench, chosen: Scored, rivals: Sequence[Scored], noise: Mapping[str, float]
+) -> tuple[Advice, ...]:
+    """Return, for each rival, the experiment of the menu that would separate it most from the chosen model.
+
+    The separation is the RMS difference of what the two predict, in standard deviations of the noise, at the output where it is
+    largest. Both models keep the numbers that these records gave them, so that it is an upper bound: a new fit may close some.
+
+    Parameters
+    ----------
+    bench
+        Records and scales.
+    chosen
+        The named model.
+    rivals
+        The models that the records cannot tell from it.
+    noise
+        Noise floor of each output.
+    """
+    found = []
+    menu = list(_menu(bench))
+    for rival in rivals:
+        scored = [
+            (separation, experiment)
+            for experiment in menu
+            for separation in _separations(bench, chosen, rival, experiment, noise)
+        ]
+        if scored:
+            (output, size), experiment = max(scored, key=lambda pair: pair[0][1])
+            found.append(
+                Advice(rival.names, experiment.waveform, experiment.amplitude, experiment.band, output, size)
+            )
+    return tuple(found)
+
+
+def _separations(
+    bench: Workbench, chosen: Scored, rival: Scored, experiment: _Experiment, noise: Mapping[str, float]
+) -> Iterator[tuple[str, float]]:
+    hold: Hold = bench.estimation[0].hold
+    source = bench.rig.inputs[0]
+    record = Record(
+        "advice", bench.estimation[0].dt, {source.name: experiment.u}, {source.name: source.unit}, hold=hold
+    )
+    try:
+        one, other = (simulate(m.fit.structure, m.fit.values, record, accuracy=1e-5) for m in (chosen, rival))
+    except SimulationError:
+        return
+    for output, size in noise.items():
+        yield output, float(np.sqrt(np.mean((one[output] - other[output]) ** 2)) / size)
+
+
+def _menu(bench: Workbench) -> Iterator[_Experiment]:
+    source = bench.rig.inputs[0].name
+    dt = bench.estimation[0].dt
+    omega = 1.0 / bench.scales["time"]
+    n_samples = max(200, min(40_000, round(_PERIODS * 2.0 * math.pi / omega / dt)))
+    t = dt * np.arange(n_samples)
+    middle = float(np.median(np.concatenate([record[source] for record in bench.estimation])))
+    largest = max(float(np.max(np.abs(record[source] - middle))) for record in bench.estimation)
+    fast = min(_FAST * omega, 0.4 * math.pi / dt)
+    drives: tuple[tuple[str, tuple[float, float] | None, Callable[[float], NDArray[np.float64]]], ...] = (
+        ("sweep", (_SLOW * omega, fast), lambda a: linear_sweep(t, a, _SLOW * omega, fast)),
+        ("slow sine", (_SLOW * omega, _SLOW * omega), lambda a: a * np.sin(_SLOW * omega * t)),
+        ("sine at resonance", (omega, omega), lambda a: a * np.sin(omega * t)),
+    )
+    if bench.rig.is_driven:
+        drives += (("step", None, lambda a: step(t, a, 0.1 * t[-1])),)
+    for share in _AMPLITUDES:
+        for waveform, band, drive in drives:
+            yield _Experiment(waveform, share * largest, band, middle + drive(share * largest))

@@ -1,0 +1,283 @@
+"""Which figures show where the gap lies: over frequency, amplitude, records, time and the plane of states?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigsight.diagnose.gap_parts import AmplitudePart, BandPart, GapPart, RecordPart, StatePart, TimePart
+from rigsight.plot.drawing import (
+    FLOOR,
+    GIVEN,
+    MEASURED,
+    REIDENTIFIED,
+    WITH_EFFECT,
+    in_style,
+    new_figure,
+    shown_in,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WIDTH = 5.8
+_DASHES = (0, (4, 2))
+_PERCENT = 100.0
+_SHADES = 15
+"""Few enough to be drawn as areas; a smooth scale would become an image of its own. Odd, so that zero has a shade."""
+_FLOOR_LABEL = "noise floor"
+
+
+def _bars(ax: Axes, parts: Sequence[GapPart], after_label: str | None) -> None:
+    """Draw the stages of each part beside each other on a logarithmic axis, the noise floor as a line over each group."""
+    stages = [("before", "given simulation", GIVEN), ("reidentified", "re-identified", REIDENTIFIED)]
+    if after_label is not None:
+        stages.append(("after", after_label, WITH_EFFECT))
+    width = 0.8 / len(stages)
+    values = [
+        getattr(part, stage) for part in parts for stage in ("before", "reidentified", "after", "noise_floor")
+    ]
+    finite = [_PERCENT * v for v in values if np.isfinite(v) and v > 0.0]
+    top = max(finite, default=1.0)
+    # Three and a half decades: what lies lower is of no consequence, and would press the rest together.
+    bottom = max(0.6 * min(finite, default=0.1), top / 3e3)
+    index = np.arange(len(parts))
+    for i, (stage, label, color) in enumerate(stages):
+        heights = [_PERCENT * getattr(part, stage) for part in parts]
+        shown = [max(h, bottom) - bottom if np.isfinite(h) else 0.0 for h in heights]
+        ax.bar(
+            index + (i - (len(stages) - 1) / 2.0) * width,
+            shown,
+            width,
+            bottom=bottom,
+            color=color,
+            label=label,
+        )
+    for i, part in enumerate(parts):
+        if np.isfinite(part.noise_floor):
+            level = max(_PERCENT * part.noise_floor, bottom)
+            named = _FLOOR_LABEL if i == 0 else None
+            ax.plot(
+                [i - 0.44, i + 0.44],
+                [level, level],
+                color=FLOOR,
+                linestyle=_DASHES,
+                linewidth=1.3,
+                label=named,
+            )
+    ax.set_yscale("log")
+    ax.set_ylim(bottom, 1.5 * top)
+    ax.set_xlim(-0.6, len(parts) - 0.4)
+    _percent_ticks(ax, bottom, top)
+    ax.tick_params(axis="x", length=0)
+    ax.grid(axis="y")
+    ax.set_axisbelow(True)
+
+
+def _percent_ticks(ax: Axes, bottom: float, top: float) -> None:
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    decades = range(int(np.floor(np.log10(bottom))), int(np.ceil(np.log10(top))) + 1)
+    multiples = (1,) if np.log10(top / bottom) > 2.0 else (1, 2, 5)
+    ticks = [m * 10.0**d for d in decades for m in multiples if bottom <= m * 10.0**d <= 1.5 * top]
+    ax.yaxis.set_major_locator(FixedLocator(ticks))
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+
+
+def _legend(figure: Figure, ax: Axes) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda i: labels[i] == _FLOOR_LABEL)
+    figure.legend(
+        [handles[i] for i in order], [labels[i] for i in order], loc="outside upper left", ncols=4, fontsize=8.5,
+        handlelength=1.8, columnspacing=1.4,
+    )  # fmt: skip
+
+
+@in_style
+def gap_bands(parts: Sequence[BandPart], after_label: str | None) -> Figure:
+    """Draw what each stage leaves in each band of frequency; squares add up to that of the whole gap.
+
+    Parameters
+    ----------
+    parts
+        Bands of one output.
+    after_label
+        What the last stage is called; None leaves it out.
+    """
+    figure = new_figure(_WIDTH, 2.9)
+    ax = figure.subplots()
+    _bars(ax, parts, after_label)
+    labels = [_band_label(part) for part in parts]
+    ax.set_xticks(range(len(parts)), labels, fontsize=8)
+    ax.set_xlabel("frequency [rad/s]")
+    ax.set_ylabel("gap in the band [%]")
+    _legend(figure, ax)
+    return figure
+
+
+def _band_label(part: BandPart) -> str:
+    if not part.excited:
+        return f"above\n{part.omega_low:.3g}"
+    low = "up" if part.omega_low == 0.0 else f"{part.omega_low:.3g}"
+    return f"{low}\nto {part.omega_high:.3g}"
+
+
+@in_style
+def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], after_label: str | None) -> Figure:
+    """Draw what each stage leaves of each record, relative to the record's own motion.
+
+    Parameters
+    ----------
+    parts
+        Records of one output.
+    labels
+        What each is called.
+    after_label
+        What the last stage is called; None leaves it out.
+    """
+    figure = new_figure(_WIDTH, 2.9)
+    ax = figure.subplots()
+    _bars(ax, parts, after_label)
+    ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
+    ax.set_xlabel("record")
+    ax.set_ylabel("NRMSE [%]")
+    _legend(figure, ax)
+    return figure
+
+
+@in_style
+def gap_amplitudes(parts: Sequence[AmplitudePart], labels: Sequence[str], after_label: str | None) -> Figure:
+    """Draw what each stage leaves at each amplitude of the input, relative to the motion there.
+
+    Parameters
+    ----------
+    parts
+        Amplitudes of one output, in ascending order.
+    labels
+        What each is called.
+    after_label
+        What the last stage is called; None leaves it out.
+    """
+    figure = new_figure(_WIDTH, 2.9)
+    ax = figure.subplots()
+    _bars(ax, parts, after_label)
+    ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
+    ax.set_xlabel("amplitude of the input")
+    ax.set_ylabel("NRMSE [%]")
+    _legend(figure, ax)
+    return figure
+
+
+@in_style
+def gap_times(parts: Sequence[TimePart], after_label: str | None) -> Figure:
+    """Draw what each stage leaves over time, one panel per scored record, with the noise floor.
+
+    Parameters
+    ----------
+    parts
+        Stretches of one output, record by record.
+    after_label
+        What the last stage is called; None leaves it out.
+    """
+    records = list(dict.fromkeys(part.record for part in parts))
+    figure = new_figure(_WIDTH, 0.5 + 1.6 * len(records))
+    axes = figure.subplots(len(records), 1, squeeze=False)[:, 0]
+    stages: list[tuple[str, str, dict[str, Any]]] = [
+        ("before", "given simulation", {"color": GIVEN, "linestyle": (0, (5, 1.6))}),
+        ("reidentified", "re-identified", {"color": REIDENTIFIED, "linestyle": (0, (2, 1))}),
+    ]
+    if after_label is not None:
+        stages.append(("after", after_label, {"color": WITH_EFFECT}))
+    for ax, record in zip(axes, records, strict=True):
+        own = [part for part in parts if part.record == record]
+        edges = [*(part.t_start for part in own), own[-1].t_end]
+        for stage, label, style in stages:
+            levels = [_PERCENT * getattr(part, stage) for part in own]
+            ax.stairs(levels, edges, label=label, linewidth=1.4, baseline=None, **style)
+        ax.axhline(
+            _PERCENT * own[0].noise_floor, color=FLOOR, linestyle=_DASHES, linewidth=1.2, label=_FLOOR_LABEL
+        )
+        ax.set_yscale("log")
+        ax.set_title(record, fontsize=8.5)
+        ax.set_ylabel("gap [%]")
+        ax.grid(axis="y")
+        ax.margins(x=0.0)
+        low, high = ax.get_ylim()
+        _percent_ticks(ax, low, high / 1.5)
+        ax.set_ylim(low, high)
+    axes[-1].set_xlabel("time [s]")
+    _legend(figure, axes[0])
+    return figure
+
+
+@in_style
+def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
+    """Draw the residual over the plane of displacement and velocity and, where it is known, the force that is lacking.
+
+    Parameters
+    ----------
+    parts
+        Cells of one output.
+    output
+        What the residual is of.
+    motion
+        Symbol of the displacement.
+    """
+    with_force = any(np.isfinite(part.force_mean) for part in parts)
+    figure = new_figure(_WIDTH, 3.0)
+    axes = figure.subplots(1, 2 if with_force else 1, squeeze=False, sharey=True)[0]
+    _plane(axes[0], parts, [_PERCENT * part.reidentified for part in parts], "viridis", False, "residual [%]")
+    axes[0].set_title(f"residual of {output}")
+    if with_force:
+        force_unit = parts[0].units["force_mean"]
+        forces = np.array([part.force_mean for part in parts])
+        factor, shown = shown_in(force_unit, forces)
+        _plane(axes[1], parts, list(forces * factor), "RdBu_r", True, f"[{shown}]" if shown != "1" else "")
+        axes[1].set_title("what the equations lack")
+    x_unit, v_unit = parts[0].units["x_low"], parts[0].units["v_low"]
+    factor, shown = _axis_scale(parts, x_unit)
+    for ax in axes:
+        ax.set_xlabel(f"{motion} [{shown}]")
+        ticks = [
+            t for t in ax.get_xticks() if min(p.x_low for p in parts) <= t <= max(p.x_high for p in parts)
+        ]
+        ax.set_xticks(ticks, [f"{t * factor:.3g}" for t in ticks])
+    axes[0].set_ylabel(f"rate of {motion} [{v_unit}]")
+    return figure
+
+
+def _axis_scale(parts: Sequence[StatePart], unit: str) -> tuple[float, str]:
+    return shown_in(unit, np.array([edge for part in parts for edge in (part.x_low, part.x_high)]))
+
+
+def _plane(
+    ax: Axes, parts: Sequence[StatePart], values: Sequence[float], colors: str, signed: bool, label: str
+) -> None:
+    from matplotlib import colormaps
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Rectangle
+
+    cells = [
+        Rectangle((part.x_low, part.v_low), part.x_high - part.x_low, part.v_high - part.v_low)
+        for part in parts
+    ]
+    collection = PatchCollection(
+        cells, cmap=colormaps[colors].resampled(_SHADES), edgecolor="white", linewidth=0.6
+    )
+    numbers = np.asarray(values, dtype=np.float64)
+    collection.set_array(np.ma.masked_invalid(numbers))
+    size = float(np.max(np.abs(numbers[np.isfinite(numbers)]), initial=0.0)) or 1.0
+    collection.set_clim(-size if signed else 0.0, size)
+    ax.add_collection(collection)
+    ax.set_xlim(min(p.x_low for p in parts), max(p.x_high for p in parts))
+    ax.set_ylim(min(p.v_low for p in parts), max(p.v_high for p in parts))
+    ax.locator_params(nbins=5)
+    ax.set_facecolor("#f1f3f4")
+    bar = ax.figure.colorbar(collection, ax=ax, shrink=0.9, pad=0.02)
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(color=MEASURED)

@@ -1,0 +1,207 @@
+"""Where the gap lies, for people: the rows and figures of that section."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigsight import plot
+from rigsight.diagnose.gap_parts import AmplitudePart, GapPart, StatePart
+from rigsight.diagnose.result import Diagnosis
+from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.quantities import gap_percent
+from rigsight.report.sections import output_label
+from rigsight.report.wording import TIMES, after_label, effect_label, listed, percent, sentence_case
+from rigsight.rigs import RIGS
+
+
+@dataclass(frozen=True)
+class OutputMaps:
+    """The figures of one output: its name for people, and its anchor."""
+
+    key: str
+    title: str
+    figures: list[PageFigure]
+
+
+def path_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """Return the legs of the signal path as text."""
+    rows = []
+    for part in diagnosis.localization.by_path:
+        shift = ""
+        if math.isfinite(part.shift):
+            shift = (
+                f"{1e3 * part.shift:.3g} ± {1e3 * part.shift_std:.1g} ms, then {gap_percent(part.shifted)}"
+            )
+        rows.append(
+            {
+                "path": part.path.replace("->", "\u2192"),
+                "before": gap_percent(part.before),
+                "reidentified": gap_percent(part.reidentified),
+                "noise_floor": gap_percent(part.noise_floor),
+                "noise_share": percent(part.noise_share),
+                "times": f"{part.reidentified / part.noise_floor:.3g} {TIMES}",
+                "shift": shift.replace("-", "\u2212"),
+            }
+        )
+    return rows
+
+
+def share_rows(diagnosis: Diagnosis) -> list[tuple[str, list[str]]]:
+    """Return the share of the closed gap that each of several effects explains, by output."""
+    return [
+        (sentence_case(effect_label(effect)), [percent(shares[output]) for output in diagnosis.gap])
+        for effect, shares in diagnosis.effect_shares.items()
+    ]
+
+
+def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
+    """Return the figures that show where the gap of each output lies."""
+    maps = []
+    for number, output in enumerate(diagnosis.gap, start=1):
+        figures = _figures(diagnosis, output, f"where-{number}")
+        if figures:
+            maps.append(
+                OutputMaps(f"where-{number}", sentence_case(output_label(diagnosis, output)), figures)
+            )
+    return maps
+
+
+def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
+    where = diagnosis.localization
+    last = after_label(diagnosis) if diagnosis.effects else None
+    bands = [part for part in where.by_band if part.output == output]
+    states = [part for part in where.by_state if part.output == output]
+    times = [part for part in where.by_time if part.output == output]
+    records = [part for part in where.by_record if part.output == output]
+    amplitudes = sorted(
+        (part for part in where.by_amplitude if part.output == output), key=lambda p: (p.amplitude, p.scored)
+    )
+    figures = []
+    if bands:
+        said = [
+            (
+                f"above {p.omega_low:.3g} rad/s"
+                if not p.excited
+                else f"{p.omega_low:.3g} to {p.omega_high:.3g} rad/s",
+                p,
+            )
+            for p in bands
+        ]
+        figures.append(
+            page_figure(
+                plot.gap_bands(bands, last),
+                f"{key}-bands",
+                f"Bars of the gap by band of frequency. {_told(said, last)}",
+                f"By frequency. {_largest(said)} The squares of the bars add up to the square of the gap; the noise floor is "
+                "taken to be spread evenly over frequency.",
+            )
+        )
+    if states:
+        motion = _motion(diagnosis)
+        worst = max(states, key=lambda p: p.reidentified)
+        place = _place(worst, motion)
+        lacking = any(math.isfinite(p.force_mean) for p in states)
+        figures.append(
+            page_figure(
+                plot.gap_states(states, output, motion),
+                f"{key}-states",
+                f"Map of the re-identified residual over the plane of states, largest with {gap_percent(worst.reidentified)} at "
+                f"{place}; noise floor {gap_percent(worst.noise_floor)}. {_lacking(states)}",
+                f"By state of the measured motion; the residual is largest at {place}; the noise floor is at "
+                f"{gap_percent(worst.noise_floor)}."
+                + (
+                    " Right: the mean force that the re-identified equations lack there, with its sign."
+                    if lacking
+                    else ""
+                ),
+            )
+        )
+    if len({p.amplitude for p in amplitudes}) > 1:
+        labels = [_amplitude_label(p) for p in amplitudes]
+        said_of = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
+        figures.append(
+            page_figure(
+                plot.gap_amplitudes(amplitudes, labels, last),
+                f"{key}-amplitudes",
+                f"Bars of the gap by amplitude of the input. {_told(said_of, last)}",
+                "By amplitude of the input, each relative to the motion there.",
+            )
+        )
+    if len(records) > 1:
+        labels = [str(i) for i, _ in enumerate(records, start=1)]
+        figures.append(
+            page_figure(
+                plot.gap_records(records, labels, last),
+                f"{key}-records",
+                f"Bars of the gap by record. {_told([(p.record, p) for p in records], last)}",
+                "By record, each relative to its own motion: "
+                + "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
+                + ".",
+            )
+        )
+    if times:
+        worst_time = max(times, key=lambda p: p.reidentified)
+        figures.append(
+            page_figure(
+                plot.gap_times(times, last),
+                f"{key}-times",
+                f"Steps of the gap over time, largest after re-identification with {gap_percent(worst_time.reidentified)} from "
+                f"{worst_time.t_start:.4g} s to {worst_time.t_end:.4g} s of {worst_time.record}; noise floor "
+                f"{gap_percent(worst_time.noise_floor)}.",
+                "Over time within each scored record, relative to the motion of all of them.",
+            )
+        )
+    return figures
+
+
+def _told(parts: Sequence[tuple[str, GapPart]], last: str | None) -> str:
+    """Return the bars in words, for who cannot see them."""
+    sentences = []
+    for name, part in parts:
+        after = f", {last} {gap_percent(part.after)}" if last is not None else ""
+        sentences.append(
+            f"{sentence_case(name)}: given {gap_percent(part.before)}, re-identified {gap_percent(part.reidentified)}{after}, "
+            f"noise floor {gap_percent(part.noise_floor)}."
+        )
+    return " ".join(sentences)
+
+
+def _largest(parts: Sequence[tuple[str, GapPart]]) -> str:
+    name, part = max(parts, key=lambda entry: entry[1].share)
+    return f"{percent(part.share)} of what is left after re-identification lies at {name}."
+
+
+def _lacking(states: Sequence[StatePart]) -> str:
+    """Return the force that the equations lack, in words for who cannot see the map."""
+    known = [part for part in states if math.isfinite(part.force_mean)]
+    if not known:
+        return ""
+    forward = [part for part in known if part.v_low + part.v_high > 0.0]
+    back = [part for part in known if part.v_low + part.v_high <= 0.0]
+    unit = known[0].units["force_mean"]
+    means = [
+        f"{sum(p.force_mean * p.n_samples for p in half) / sum(p.n_samples for p in half):.3g} {unit} {words}"
+        for half, words in ((forward, "forward"), (back, "backward"))
+        if half
+    ]
+    return f"Mean force that the equations lack while moving: {listed(means)}."
+
+
+def _motion(diagnosis: Diagnosis) -> str:
+    """Return the name of the signal that is the displacement."""
+    rig = RIGS.get(diagnosis.rig)
+    return "x" if rig is None else (rig.outputs if rig.is_driven else rig.inputs)[0].name
+
+
+def _place(part: StatePart, motion: str) -> str:
+    scale = plot.display_scale(part.units["x_low"], max(abs(part.x_low), abs(part.x_high)))
+    low, high = part.x_low * scale.factor, part.x_high * scale.factor
+    place = f"{motion} {low:.3g} to {high:.3g} {scale.unit} and rate {part.v_low:.3g} to {part.v_high:.3g} {part.units['v_low']}"
+    return place.replace(" -", " \u2212")
+
+
+def _amplitude_label(part: AmplitudePart) -> str:
+    scale = plot.display_scale(part.units["amplitude"], part.amplitude)
+    return f"{part.amplitude * scale.factor:.4g} {scale.unit}\n{'scored' if part.scored else 'fitted'}"

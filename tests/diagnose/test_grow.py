@@ -1,0 +1,61 @@
+"""Two effects at once: found, put in order, and not invented where one is enough."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose import Task, diagnose
+from rigsight.effects import effect_named
+from rigsight.excitation import linear_sweep, step
+from rigsight.records.record import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+DT = 0.01
+NOISE = 2e-5
+TRIED = ("cubic_stiffness", "coulomb_friction", "actuator_lag", "quadratic_damping")
+
+
+def measured(effects: dict[str, dict[str, float]], seed: int) -> Task:
+    rng = np.random.default_rng(seed)
+    structure = compose(AXIS, [effect_named(name) for name in effects])
+    truth = {**VALUES, **{name: value for own in effects.values() for name, value in own.items()}}
+    t = DT * np.arange(2000)
+    runs = [
+        ("low", "estimation", linear_sweep(t, 0.4, 1.0, 30.0)),
+        ("high", "estimation", linear_sweep(t, 1.0, 1.0, 30.0)),
+        ("middle", "validation", linear_sweep(t, 0.7, 1.0, 30.0)),
+        ("step", "validation", step(t, 0.6, 5.0)),
+    ]
+    records = []
+    for name, role, u in runs:
+        clean = simulate(structure, truth, Record(name, DT, {"u": u}, {}, role=role, hold="zoh"))
+        records.append(clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size)))
+    given = {name: VALUES[name] * 1.05 for name in ("m", "d", "k")}
+    return Task("two", AXIS, {"gain": 1.0}, given, tuple(records))
+
+
+@pytest.mark.slow
+def test_two_effects_are_found_and_the_stronger_comes_first():
+    task = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0)
+    found = diagnose(task, [effect_named(name) for name in TRIED])
+    assert found.verdict == "effect"
+    assert found.effects == ("cubic_stiffness", "actuator_lag")
+    assert found.where == ("dynamics", "actuator")
+    assert found.gap["x"].after < 1.1 * found.gap["x"].noise_floor
+    best = found.candidates[0]
+    assert best.parameters["k_3"].value == pytest.approx(4e5, abs=4.5 * best.parameters["k_3"].std)
+    assert best.parameters["T_a"].value == pytest.approx(0.01, abs=4.5 * best.parameters["T_a"].std)
+    # Each of the two alone stays among the candidates and leaves more.
+    alone = {c.effects: c.excess for c in found.candidates if len(c.effects) == 1}
+    assert alone["cubic_stiffness",] > 2.0
+    assert alone["actuator_lag",] > alone["cubic_stiffness",]
+
+
+def test_one_effect_stays_one():
+    task = measured({"coulomb_friction": {"T_c": 0.1}}, seed=1)
+    found = diagnose(task, [effect_named(name) for name in TRIED])
+    assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
+    assert all(len(candidate.effects) < 2 for candidate in found.candidates)

@@ -1,0 +1,52 @@
+"""What one record shows by itself: its amplitude where none is given, and in words what it cannot tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.excitation import log_sweep, step
+from rigsight.identify.record_identification import Wishes, identify_record, input_peak
+from rigsight.records import Record
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.simulate import compose, simulate
+
+CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
+VALUES = {
+    **CONSTANTS, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98, "psi_off": -1.3e-3, "y_off": 4e-4,
+}  # fmt: skip
+DT = 5e-3
+
+
+def measured(u: np.ndarray, kind: str) -> Record:
+    rng = np.random.default_rng(3)
+    driven = Record("own", DT, {"u": u}, {"u": "A", "psi": "rad", "y": "m"}, kind=kind)  # type: ignore[arg-type]
+    clean = simulate(compose(RUNNING_GEAR), VALUES, driven)
+    return clean.with_signals(**{name: clean[name] + rng.normal(0.0, 2e-5, u.size) for name in ("psi", "y")})
+
+
+def test_the_amplitude_is_that_of_the_sweep_also_if_it_begins_slowly() -> None:
+    t = DT * np.arange(6000)
+    sweep = measured(log_sweep(t, 0.5, 0.05, 60.0), "sweep")
+    assert abs(np.median(sweep["u"])) > 0.02
+    assert input_peak(sweep, RUNNING_GEAR) == pytest.approx(0.5, rel=0.01)
+    for start in (5.0, 25.0):
+        assert input_peak(measured(step(t, 0.6, start), "step"), RUNNING_GEAR) == pytest.approx(0.6)
+
+
+def test_offsets_of_a_sweep_are_known_far_better_than_its_motion_is_large() -> None:
+    record = measured(log_sweep(DT * np.arange(8000), 0.5, 0.5, 60.0), "sweep")
+    found = identify_record(record, RUNNING_GEAR, CONSTANTS, False, Wishes()).offsets
+    assert found is not None
+    for name in ("psi_off", "y_off"):
+        assert abs(found.values[name] - VALUES[name]) < 4.0 * found.standard_errors[name]
+        assert found.standard_errors[name] < 2e-6
+
+
+def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
+    record = measured(log_sweep(DT * np.arange(600), 3e-3, 0.6, 60.0), "sweep")
+    motion = identify_record(record, RUNNING_GEAR, CONSTANTS, False, Wishes()).paths[0]
+    assert motion.fit is None
+    assert motion.problem is not None
+    assert "does not determine" in motion.problem
+    assert "Record for longer" in motion.problem

@@ -1,0 +1,73 @@
+"""The page says where the gap lies, with the noise floor beside it, in words as well as in pictures."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+from rigsight.diagnose.gap_parts import Localization
+from rigsight.diagnose.result import Diagnosis
+from rigsight.report import render_report
+from rigsight.report.location import output_maps, path_rows
+
+
+def render(diagnosis: Diagnosis) -> str:
+    return render_report(diagnosis, "rigsight diagnose", {"rigsight": "0.1.0"})
+
+
+def words(html: str) -> str:
+    return " ".join(re.sub(r"<[^>]+>", " ", html).split())
+
+
+def test_the_page_says_on_which_leg_the_gap_lies(diagnosis: Diagnosis) -> None:
+    page = words(render(diagnosis))
+    assert "The gap lies before psi is measured." in page
+    assert "u → psi 40 % 13 % 0.9 %" in page
+    assert "−4 ± 0.1 ms, then 1.1 %" in page
+
+
+def test_every_map_is_there_and_told_in_words(diagnosis: Diagnosis) -> None:
+    (maps,) = output_maps(diagnosis)
+    assert [figure.key.split("-")[-1] for figure in maps.figures] == [
+        "bands", "states", "amplitudes", "records", "times",
+    ]  # fmt: skip
+    for figure in maps.figures:
+        label = re.search(r'aria-label="([^"]+)"', str(figure.image))
+        assert label is not None
+        assert "noise floor 0.9 %" in label[1]
+    bands = str(maps.figures[0].image)
+    assert "Above 30 rad/s: given 8 %, re-identified 2.6 %, with effect 0.2 %, noise floor 0.9 %." in bands
+    assert "-1.5 N m forward and 1.2 N m backward" in str(maps.figures[1].image)
+
+
+def test_without_a_force_the_map_of_states_shows_the_residual_alone(diagnosis: Diagnosis) -> None:
+    blind = tuple(replace(part, force_mean=math.nan) for part in diagnosis.localization.by_state)
+    where = replace(diagnosis.localization, by_state=blind)
+    (maps,) = output_maps(replace(diagnosis, localization=where))
+    assert "what the equations lack" in str(output_maps(diagnosis)[0].figures[1].image)
+    assert "what the equations lack" not in str(maps.figures[1].image)
+
+
+def test_the_budget_shows_its_intervals(diagnosis: Diagnosis) -> None:
+    page = words(render(diagnosis))
+    assert "39 % to 45 %" in page
+    assert "95 % to 98 %" in page
+
+
+def test_two_effects_share_the_gap(variant: Callable[[str], Diagnosis]) -> None:
+    assert "Coulomb friction 80 % 70 %" in words(render(variant("two effects")))
+
+
+def test_without_a_shift_nothing_is_said_of_it(diagnosis: Diagnosis) -> None:
+    alone = replace(diagnosis.localization, by_path=diagnosis.localization.by_path[:1])
+    only = replace(diagnosis, localization=alone)
+    assert [row["shift"] for row in path_rows(only)] == [""]
+    assert "input earlier by" not in render(only)
+
+
+def test_a_result_without_places_has_no_such_section(diagnosis: Diagnosis) -> None:
+    html = render(replace(diagnosis, localization=Localization()))
+    assert 'id="where"' not in html
+    assert 'href="#where"' not in html

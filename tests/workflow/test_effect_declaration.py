@@ -1,0 +1,81 @@
+"""A declaration that a simulation or a fit would trip over is refused with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import sympy as sp
+
+from rigsight.discover import MONOMIALS
+from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import u, v, x
+from rigsight.parameters import Parameter
+from rigsight.workflow.effect_declaration import declaration_faults
+
+c = sp.Symbol("c", real=True)
+z = sp.Symbol("z", real=True)
+PARAMETER = Parameter("c", "strength", "force x^-1", null=0.0, starts=(0.3,), search=(0.0, 10.0))
+SOUND = Effect(
+    name="extra_spring",
+    place=Place.DYNAMICS,
+    summary="A second spring.",
+    parameters=(PARAMETER,),
+    energy=Energy.CONSERVATIVE,
+    signature=Signature(GainTrend.STEADY),
+    torque=c * x,
+)
+
+
+def changed_parameter(**changes: Any) -> dict[str, Any]:
+    return {"parameters": (replace(PARAMETER, **changes),)}
+
+
+def test_sound_declarations_have_no_fault():
+    for effect in (SOUND, *MONOMIALS):
+        assert declaration_faults(effect) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"name": "Extra spring"}, "lower-case"),
+        ({"summary": " "}, "summary is empty"),
+        ({"place": "dynamics"}, "Place.DYNAMICS"),
+        ({"torque": "c*x"}, "give an expression of sympy symbols"),
+        ({"parameters": PARAMETER}, "give a tuple"),
+        ({"parameters": ("c",)}, "parameters holds 'c'; give a Parameter"),
+        ({"torque": None}, "there is none; at dynamics that is torque or spring or deflection"),
+        ({"spring": c * x}, "there are torque, spring"),
+        ({"place": Place.SENSOR}, "torque does not belong to the place sensor"),
+        ({"torque": c * sp.Symbol("x")}, "from rigsight.effects.symbols import x"),
+        ({"torque": c * u}, "u is no parameter, state or signal here"),
+        ({"torque": c * sp.Max(x, 0)}, "Max cannot be simulated"),
+        ({"torque": c * sp.Piecewise((x, x > 0), (0, True))}, "cannot be simulated"),
+        (
+            {"torque": None, "place": Place.ACTUATOR, "delay": c, "states": (State(z, -z, "x"),)},
+            "delay cannot have states",
+        ),
+        (
+            {"states": (State(z, u - z, "x"),), "torque": c * z},
+            "the rate of z: u is no parameter, state or signal",
+        ),
+        (changed_parameter(name="cc"), "parameter cc is declared but stands in no equation. Did you mean 'c'?"),
+        (changed_parameter(description=""), "parameter c is not explained"),
+        (changed_parameter(null=None), "no parameter has a null value"),
+        (changed_parameter(lower=2.0, upper=1.0, null=None), "lower 2 must be below upper 1"),
+        (changed_parameter(lower=1.0), "null 0 lies outside"),
+        (changed_parameter(search=(-float("inf"), 1.0)), "give two finite numbers"),
+        (changed_parameter(starts=()), "starts is empty"),
+        (changed_parameter(starts=(20.0,)), "the start 20 lies outside search"),
+        (changed_parameter(fitted=False), "give it a default"),
+        (changed_parameter(dimension="force x^three"), "cannot be read"),
+        (changed_parameter(dimension="force angle^-1"), "unknown quantity angle"),
+        ({**changed_parameter(name="v"), "torque": v * x}, "has the name of a signal"),
+        ({"special_cases": {"n": 1.0}}, "special_cases names n"),
+    ],
+)
+def test_each_fault_is_told(changes, told):
+    faults = declaration_faults(replace(SOUND, **changes))
+    assert any(told in fault for fault in faults), faults
