@@ -238,7 +238,19 @@ def test_json_follows_the_contract(cubic: Diagnosis) -> None:
         "gap", "gap_by_record", "gap_by_band", "gap_by_amplitude", "gap_by_state",
     }  # fmt: skip
     assert contract <= set(content)
-    assert set(content["gap"]["x"]) == {"before", "reidentified", "after", "noise_floor", "closed"}
+    assert set(content["gap"]["x"]) == {
+        "before",
+        "reidentified",
+        "after",
+        "noise_floor",
+        "closed",
+        "interval",
+    }
+    # These records name no amplitude of their input.
+    assert all(
+        content[name]
+        for name in ("gap_by_record", "gap_by_band", "gap_by_state", "gap_by_path", "gap_by_time")
+    )
     for candidate in content["candidates"]:
         assert {"effects", "probability", "validation_nrmse", "parameters"} <= set(candidate)
         assert set(candidate["validation_nrmse"]) == {"x"}

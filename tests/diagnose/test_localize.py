@@ -218,6 +218,17 @@ def test_the_path_tells_a_late_input_from_a_late_sensor(
         assert lateral.reidentified < 1.1 * lateral.noise_floor
 
 
+def test_the_path_tells_a_gap_of_the_lateral_part_from_a_late_sensor() -> None:
+    records = measured(RUNNING_GEAR, ["creep_saturation"], {**GEAR, "s": 0.03}, 30.0)
+    bench = workbench(RUNNING_GEAR, records, GEAR)
+    linear = fit_linear(bench, GEAR)
+    where, _ = localized(bench, as_given(bench, GEAR), linear, linear)
+    motion, lateral = where.by_path
+    assert motion.reidentified < 1.1 * motion.noise_floor
+    assert lateral.reidentified > 2.0 * lateral.noise_floor
+    assert "The lateral part or a sensor has a gap of its own" in where.sentence
+
+
 def test_a_clean_path_says_so() -> None:
     bench = workbench(RUNNING_GEAR, measured(RUNNING_GEAR, [], GEAR, 30.0), GEAR)
     true = as_given(bench, GEAR)

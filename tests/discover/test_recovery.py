@@ -53,11 +53,16 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, make_t
 
 
 def test_too_much_noise_to_decide_is_said(make_task: Make) -> None:
-    # A friction of a hundredth of the drive, in noise as large as the motion at the smallest amplitude.
+    # Noise as large as the motion at the middle amplitude hides the friction.
     _, task = make_task("Coulomb", 5e-3, seconds=5.0)
     found = discover(task)
-    assert any("decide" in warning or "In doubt" in warning for warning in found.warnings) or not found.kept
-    assert found.kept == () or any(term.doubt for term in found.kept)
+    assert found.kept == ()
+    assert any("too high to decide" in warning and "in doubt" in warning for warning in found.warnings)
+    # Less of it shows the friction, and that its size is vague.
+    _, task = make_task("Coulomb", 2e-3, seconds=5.0)
+    (friction,) = discover(task).kept
+    assert friction.name == "coulomb_friction"
+    assert "T_c is known to" in friction.doubt
 
 
 def test_one_amplitude_is_warned_of(make_task: Make) -> None:

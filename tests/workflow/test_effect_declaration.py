@@ -61,7 +61,10 @@ def test_sound_declarations_have_no_fault():
             {"states": (State(z, u - z, "x"),), "torque": c * z},
             "the rate of z: u is no parameter, state or signal",
         ),
-        (changed_parameter(name="cc"), "parameter cc is declared but stands in no equation. Did you mean 'c'?"),
+        (
+            changed_parameter(name="cc"),
+            "parameter cc is declared but stands in no equation. Did you mean 'c'?",
+        ),
         (changed_parameter(description=""), "parameter c is not explained"),
         (changed_parameter(null=None), "no parameter has a null value"),
         (changed_parameter(lower=2.0, upper=1.0, null=None), "lower 2 must be below upper 1"),

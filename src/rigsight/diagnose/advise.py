@@ -93,7 +93,7 @@ def _menu(bench: Workbench) -> Iterator[_Experiment]:
     dt = bench.estimation[0].dt
     omega = 1.0 / bench.scales["time"]
     n_samples = max(200, min(40_000, round(_PERIODS * 2.0 * math.pi / omega / dt)))
-    t = dt * np.arange(n_samples)
+    t = dt * np.arange(n_samples, dtype=np.float64)
     middle = float(np.median(np.concatenate([record[source] for record in bench.estimation])))
     largest = max(float(np.max(np.abs(record[source] - middle))) for record in bench.estimation)
     fast = min(_FAST * omega, 0.4 * math.pi / dt)
@@ -103,7 +103,7 @@ def _menu(bench: Workbench) -> Iterator[_Experiment]:
         ("sine at resonance", (omega, omega), lambda a: a * np.sin(omega * t)),
     )
     if bench.rig.is_driven:
-        drives += (("step", None, lambda a: step(t, a, 0.1 * t[-1])),)
+        drives += (("step", None, lambda a: step(t, a, 0.1 * float(t[-1]))),)
     for share in _AMPLITUDES:
         for waveform, band, drive in drives:
             yield _Experiment(waveform, share * largest, band, middle + drive(share * largest))

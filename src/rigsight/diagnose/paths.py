@@ -79,15 +79,17 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
         )
     if clean:
         return f"No leg of the path has a gap worth the name: {motion}, {said}."
-    if moved:
+    shifted = _times(lateral.shifted, lateral)
+    if moved and lateral.shifted <= AT_FLOOR * lateral.noise_floor:
         late, early = (
             (lateral.source, lateral.output) if lateral.shift > 0.0 else (lateral.output, lateral.source)
         )
         return (
-            f"The sensors disagree: {said}, and {_times(lateral.shifted, lateral)} if {late} were measured "
-            f"{1e3 * abs(lateral.shift):.3g} ms too late against {early}. {_capital(motion)}."
+            f"The sensors disagree: {said}, and {shifted} if {late} were measured {1e3 * abs(lateral.shift):.3g} ms too late "
+            f"against {early}; {motion}."
         )
-    return f"The lateral part or a sensor has a gap of its own: {said}; {motion}."
+    better = f" ({shifted} with {lateral.source} shifted by {1e3 * lateral.shift:.3g} ms)" if moved else ""
+    return f"The lateral part or a sensor has a gap of its own: {said}{better}; {motion}."
 
 
 def _times(value: float, part: PathPart) -> str:
@@ -96,10 +98,6 @@ def _times(value: float, part: PathPart) -> str:
 
 def _words(rig: Rig) -> str:
     return rig.dynamics_name.replace("_", " ")
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _motion_alone(bench: Workbench, linear: Scored) -> Scored:

@@ -67,7 +67,7 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])
-    prior = _PRIOR_PER_EFFECT ** np.array([len(m.effects) for m in usable])
+    prior = _PRIOR_PER_EFFECT ** np.array([len(m.effects) + _likened(m, usable) for m in usable])
     # In each resample the models with the fewest numbers within the tolerance of the best share the win.
     within = resampled <= floor * (1.0 + tolerance)
     fewest = np.min(np.where(within, n_free, np.iinfo(np.int64).max), axis=1, keepdims=True)
@@ -88,6 +88,16 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
         order=(*(usable[i] for i in order), *failed),
         probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
         tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
+    )
+
+
+def _likened(model: Scored, others: Sequence[Scored]) -> bool:
+    """Return True if an effect of this model is only another shape of one that a model with as many numbers has."""
+    return any(
+        other.n_free == model.n_free
+        and len(other.effects) == len(model.effects)
+        and any(set(effect.parents) & (set(other.names) - set(model.names)) for effect in model.effects)
+        for other in others
     )
 
 

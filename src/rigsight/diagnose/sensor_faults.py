@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.finding import Finding
@@ -128,21 +127,23 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     places = [
         group[np.argmax(size[group])] for group in np.split(large, np.flatnonzero(np.diff(large) > 4) + 1)
     ]
-    told = ", ".join(f"{record.t[place + 2]:.4g} s" for place in places[:_FIRST_TOLD])
+    # A third difference reaches over four samples; the jump lies at the largest step among them.
+    steps = [np.abs(np.diff(samples[place : place + 4])) for place in places]
+    told = ", ".join(
+        f"{record.t[place + 1 + np.argmax(step)]:.4g} s"
+        for place, step in zip(places[:_FIRST_TOLD], steps, strict=False)
+    )
+    largest = max(float(np.max(step)) for step in steps)
     return [
         Finding(
             "jump",
-            f"Record {record.name}: {name} jumps by about {_largest_step(samples, places):.3g} {unit} at {told}"
+            f"Record {record.name}: {name} jumps by about {largest:.3g} {unit} at {told}"
             f"{_more(len(places))}; no mass does that.",
             "Look for interference or lost counts; repair the samples or leave the record out.",
             record=record.name,
             signal=name,
         )
     ]
-
-
-def _largest_step(samples: NDArray[np.float64], places: list[np.intp]) -> float:
-    return max(float(np.max(np.abs(np.diff(samples[max(place - 1, 0) : place + 5])))) for place in places)
 
 
 def _more(count: int) -> str:

@@ -1,7 +1,9 @@
 """In which states does the gap arise? Residuals, and the force that the equations lack, over displacement and velocity.
 
 The force that the re-identified equations lack is ``m e'' + d e' + k e`` of their residual e: the initial transient and the
-drive obey the equations and cancel. It is formed from the residual up to the frequency at which that stands out of the noise.
+drive obey the equations and cancel. Effects that the simulation has already are linearized away: beside them the map shows the
+shape of what is lacking, not its exact size. It is formed from the residual up to the frequency
+at which that stands out of the noise.
 """
 
 from __future__ import annotations

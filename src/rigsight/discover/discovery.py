@@ -437,7 +437,16 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
     measured = np.concatenate([record[output] for record in found.held_out])
     size = float(np.std(measured)) or 1.0
     warnings = warnings_of(
-        task, found.estimation, found.how, selection, found.chosen, terms, found.held, found.force
+        task,
+        found.estimation,
+        found.how,
+        selection,
+        found.chosen,
+        terms,
+        found.held,
+        found.force,
+        task.noise[output] / size,
+        _likeliest(bench, terms),
     )
     return Discovery(
         title=task.title,
@@ -461,6 +470,17 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
         model=Model.of(structure, final.values, found.estimation[0].hold).to_json(),
         warnings=warnings,
     )
+
+
+def _likeliest(bench: Bench, terms: Sequence[Term]) -> str:
+    """Return the term outside the equation that alone explains most of the regression."""
+    kept = {term.name for term in terms if term.kept}
+    shares = {
+        name: bench.projected.explained(candidate.column[:, None])[1]
+        for name, candidate in bench.candidates.items()
+        if name not in kept
+    }
+    return max(shares, key=lambda name: shares[name], default="")
 
 
 def _terms(bench: Bench, found: _Found, coefficients: Mapping[str, Coefficient]) -> tuple[Term, ...]:

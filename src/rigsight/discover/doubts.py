@@ -21,6 +21,8 @@ _SURE = 0.9
 _ZERO = 3.0
 _VAGUE = 0.05
 _FLOOR = 1.5
+_NOISY = 0.1
+"""Noise floor, relative to the motion, from which terms may well hide in it."""
 _FORCE_TERMS_OF = {"beta": "|x'| |F|^(n-1) F", "gamma": "x' |F|^n"}
 
 
@@ -63,6 +65,8 @@ def warnings_of(
     terms: Sequence[Term],
     held: str,
     force: ForceEquation | None,
+    floor: float,
+    likeliest: str,
 ) -> tuple[str, ...]:
     """Return what a user should know, one sentence each."""
     found = [note for note in (how, held) if note]
@@ -96,6 +100,11 @@ def warnings_of(
     if extra:
         found.append(
             f"In doubt: {', '.join(extra)}. With it the held-out error is lower, but not by enough to tell it from chance."
+        )
+    if floor > _NOISY and likeliest:
+        found.append(
+            f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change it by less; "
+            f"in doubt is {likeliest} first."
         )
     if chosen.excess > _FLOOR:
         found.append(

@@ -31,6 +31,8 @@ _SATURATIONS = np.geomspace(0.3, 100.0, 7)
 _SKEWS = np.geomspace(0.3, 300.0, 6)
 _EXPONENTS = (1.0, 1.5, 2.0)
 _SUBSTEPS = 2
+_RUNAWAY = 1e6
+"""Loop in units of the displacement beyond which its shape is unstable, and no column."""
 _REFINEMENTS = 40
 _STEP = 1e-3
 """In the logarithm: it moves the column by more than the integrator's error."""
@@ -161,6 +163,7 @@ def _columns(
         start = np.zeros((1, len(thetas)))
         with np.errstate(all="ignore"):
             z = simulate_sets(structure, held, p, start, motion.x.size, _SUBSTEPS)[:, 0, :]
+            z = np.where(np.abs(z) < _RUNAWAY * x_size, z, np.nan)
         blocks.append(np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(thetas))]))
     return np.concatenate(blocks)
 

@@ -377,7 +377,10 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         if found is best:
             break
         best = found
-    ordered = sorted(set(pool), key=cost)
+    by_support: dict[Support, Trial] = {}
+    for trial in sorted(pool, key=cost):
+        by_support.setdefault(trial.support, trial)
+    ordered = list(by_support.values())
     return Selection(best, tuple(ordered), tuple(cost(trial) for trial in ordered), independent)
 
 

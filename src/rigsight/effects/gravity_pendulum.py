@@ -16,11 +16,11 @@ References: A. H. Nayfeh and D. T. Mook, *Nonlinear Oscillations* (Wiley 1979), 
 
 import sympy as sp
 
-from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
-from rigsight.effects.symbols import x
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.symbols import k, x
 from rigsight.parameters import Parameter
 
-k_g = sp.Symbol("k_g", real=True)
+k_g, k_3 = sp.symbols("k_g k_3", real=True)
 
 GRAVITY_PENDULUM = Effect(
     name="gravity_pendulum",
@@ -41,4 +41,9 @@ GRAVITY_PENDULUM = Effect(
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),
     torque=k_g * (sp.sin(x) - x),
+    starts=(
+        Start({"k_g": -6 * k_3}, parent="cubic_stiffness"),
+        Start({"k_g": k}),
+        Start({"k_g": 20 * k}),
+    ),
 )

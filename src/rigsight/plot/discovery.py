@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rigsight.discover.result import Discovery, Run, Term
 from rigsight.plot.drawing import MEASURED, OTHER, WITH_EFFECT, in_style, line, new_figure, shown_in
 
@@ -75,7 +73,7 @@ def _numbers(found: Discovery) -> list[tuple[str, float]]:
 
 def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
     """Draw 95 % intervals relative to the values; of one that holds zero only that is said."""
-    places = np.arange(len(numbers))
+    places = list(range(len(numbers)))
     known = [1.96 * error for _, error in numbers if 1.96 * error < 1.0]
     reach = max([*known, 1e-4]) * 1.2
     for place, (_, error) in zip(places, numbers, strict=True):

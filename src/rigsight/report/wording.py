@@ -185,7 +185,7 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
         rival = effects_label(advice.rival)
         if advice.separation < _SEPARATES:
             sentences.append(
-                f"No experiment of the menu separates {rival}: the most, {advice.separation:.1f} standard deviations of the noise "
+                f"No experiment of the menu separates {rival}: at most {advice.separation:.1f} standard deviations of noise "
                 f"in {advice.output}, by a {advice.waveform} of {size}{band}."
             )
         else:

@@ -120,7 +120,9 @@ class Rig:
     @property
     def downstream(self) -> dict[sp.Symbol, sp.Expr]:
         """Further states driven by the motion, with their rates without effects."""
-        return {} if self.lateral is None else {self.lateral.symbol: self.lateral.gain * self.lateral.creepage}
+        return (
+            {} if self.lateral is None else {self.lateral.symbol: self.lateral.gain * self.lateral.creepage}
+        )
 
     @property
     def downstream_parameters(self) -> frozenset[str]:

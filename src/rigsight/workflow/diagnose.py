@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from rigsight.diagnose import Diagnosis, Task, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
@@ -72,14 +74,16 @@ def run_diagnose(
     candidates = [effect for effect in effects if read.rig.offers(effect) and effect not in read.modelled]
     prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
-    diagnosis = diagnose(
-        task_of(read),
-        candidates,
-        seed=seed,
-        n_jobs=jobs,
-        progress=stage.finished,
-        prepare=lambda structures: prepare_kernels(structures, jobs, listener, for_looks=True),
-    )
+    # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        diagnosis = diagnose(
+            task_of(read),
+            candidates,
+            seed=seed,
+            n_jobs=jobs,
+            progress=stage.finished,
+            prepare=lambda structures: prepare_kernels(structures, jobs, listener, for_looks=True),
+        )
     if out is not None:
         write_diagnosis(
             diagnosis, Path(out), command or f"rigsight diagnose {shlex.quote(str(campaign))}", seed

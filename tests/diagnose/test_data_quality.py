@@ -1,0 +1,301 @@
+"""Faults of the data are told with their mend, and sound records of any rig are left in peace."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rigsight.diagnose.characterize import fit_candidate, fit_linear
+from rigsight.diagnose.data_quality import data_quality, with_best_model
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.finding import DataQuality
+from rigsight.diagnose.sensor_faults import sensor_faults
+from rigsight.diagnose.workbench import Scored, Workbench, liveliest
+from rigsight.effects import effect_named
+from rigsight.excitation import linear_sweep
+from rigsight.identify import characteristic_scales, linear_start
+from rigsight.records import Hold, Record
+from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig
+from rigsight.simulate import compose, simulate
+from rigsight.workflow.campaign import read_campaign
+
+CONSTANTS = {"gain": 1.0}
+VALUES = {**CONSTANTS, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+GEAR_CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
+GEAR_VALUES = {
+    **GEAR_CONSTANTS, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98, "psi_off": 1e-3, "y_off": 2e-4
+}  # fmt: skip
+DT, NOISE = 5e-3, 2e-5
+SHIFTED = 2
+CUBIC = ("cubic_stiffness", {"k_3": 5e6})
+
+
+def sweeps(
+    rig: Rig = AXIS,
+    values: dict[str, float] = VALUES,
+    effect: tuple[str, dict[str, float]] | None = None,
+    hold: Hold = "foh",
+    seed: int = 0,
+    highest: float = 60.0,
+) -> list[Record]:
+    """Two sweeps to fit and one to score, of three amplitudes, with sensor noise."""
+    rng = np.random.default_rng(seed)
+    t = DT * np.arange(4000)
+    structure = compose(rig, [] if effect is None else [effect_named(effect[0])])
+    records = []
+    for amplitude, role in ((1.0, "estimation"), (3.0, "estimation"), (2.0, "validation")):
+        u = linear_sweep(t, amplitude, 2.0, highest)
+        driven = Record(
+            f"sweep_{amplitude:g}", DT, {"u": u}, {}, kind="sweep", amplitude=amplitude, hold=hold, role=role
+        )
+        clean = simulate(structure, {**values, **(effect[1] if effect else {})}, driven)
+        outputs = [signal.name for signal in rig.outputs]
+        records.append(
+            clean.with_signals(
+                **{name: clean[name] + rng.normal(scale=NOISE, size=t.size) for name in outputs}
+            )
+        )
+    return records
+
+
+def prepared(
+    records: Sequence[Record], rig: Rig = AXIS, constants: dict[str, float] = CONSTANTS
+) -> tuple[Workbench, Scored]:
+    estimation = [record for record in records if record.role == "estimation"]
+    start = {**constants, **linear_start(rig, estimation, constants, {})}
+    bench = Workbench(
+        rig=rig,
+        estimation=tuple(estimation),
+        scoring=tuple(record for record in records if record.role == "validation"),
+        look=liveliest(estimation, rig.outputs[0].name),
+        scales=characteristic_scales(rig, estimation, start),
+        noise={floor.output: floor.std for floor in noise_floors(rig, records)},
+        held=frozenset(),
+    )
+    return bench, fit_linear(bench, start)
+
+
+def looked_at(
+    records: Sequence[Record], rig: Rig = AXIS, constants: dict[str, float] = CONSTANTS
+) -> DataQuality:
+    bench, linear = prepared(records, rig, constants)
+    return data_quality(bench, records, linear)
+
+
+def misdeclared(records: Sequence[Record], hold: Hold) -> list[Record]:
+    return [replace(record, hold=hold) for record in records]
+
+
+def with_first(records: list[Record], change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Record:
+    return records[0].with_signals(x=change(np.array(records[0]["x"])))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("hold", ["zoh", "foh", "band_limited"])
+def test_sound_records_are_left_in_peace(hold: Hold, seed: int):
+    quality = looked_at(sweeps(hold=hold, seed=seed))
+    assert quality.findings == ()
+    assert quality.amplitude.answer == "no"
+
+
+def test_sound_records_of_the_running_gear_are_left_in_peace():
+    quality = looked_at(sweeps(RUNNING_GEAR, GEAR_VALUES), RUNNING_GEAR, GEAR_CONSTANTS)
+    assert quality.findings == ()
+    assert quality.amplitude.answer == "no"
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        CUBIC,
+        ("coulomb_friction", {"T_c": 0.3}),
+        ("bouc_wen_hysteresis", {"A": 1.0, "a": 0.4, "beta": 500.0, "gamma": -100.0, "n": 1.0}),
+        ("quadratic_damping", {"c_2": 100.0}),
+    ],
+    ids=lambda effect: effect[0],
+)
+def test_a_nonlinear_effect_is_no_fault_of_the_data(effect):
+    quality = looked_at(sweeps(effect=effect))
+    assert quality.findings == ()
+    assert quality.amplitude.answer == "yes"
+    assert "a nonlinear effect takes part" in quality.notes[-1]
+
+
+def test_what_scatters_too_much_is_not_called_linear():
+    """Play scatters the response from line to line by more than it changes with the amplitude."""
+    quality = looked_at(sweeps(effect=("backlash", {"g": 5e-4})))
+    assert quality.findings == ()
+    assert quality.amplitude.answer == "cannot tell"
+
+
+def test_a_flexible_mode_is_linear():
+    quality = looked_at(sweeps(effect=("flexible_mode", {"m_a": 0.3, "w_a": 35.0, "zeta_a": 0.03})))
+    assert quality.findings == ()
+    assert quality.amplitude.answer == "no"
+
+
+@pytest.mark.parametrize(("true", "given"), [("foh", "zoh"), ("band_limited", "zoh")])
+def test_a_wrong_hold_that_no_delay_explains_is_serious(true: Hold, given: Hold):
+    (finding,) = looked_at(misdeclared(sweeps(hold=true), given)).findings
+    assert (finding.kind, finding.serious) == ("hold", True)
+    assert finding.explained == pytest.approx(1.0, abs=0.01)
+    assert f'"{true}"' in finding.mend
+    assert "campaign.toml" in finding.mend
+
+
+def test_a_hold_that_a_delay_explains_as_well_is_told_with_its_rival():
+    (finding,) = looked_at(misdeclared(sweeps(hold="zoh"), "foh")).findings
+    assert (finding.kind, finding.serious) == ("hold", False)
+    assert 'hold = "zoh"' in finding.mend
+    assert "a shift of the time base by 2.5" in finding.sentence
+
+
+@pytest.mark.parametrize(("sign", "serious"), [(-1, True), (1, False)])
+def test_a_shift_of_the_time_base_is_measured(sign: int, serious: bool):
+    """Outputs ahead of their cause are a fault of the data; late ones may be a delay."""
+    cut = {
+        -1: (slice(None, -SHIFTED), slice(SHIFTED, None)),
+        1: (slice(SHIFTED, None), slice(None, -SHIFTED)),
+    }
+    inputs, outputs = cut[sign]
+    records = [replace(r, signals={"u": r["u"][inputs], "x": r["x"][outputs]}) for r in sweeps()]
+    (finding,) = looked_at(records).findings
+    assert (finding.kind, finding.serious) == ("time_shift", serious)
+    told = re.search(r"come (\S+) ms", finding.sentence)
+    assert told is not None
+    assert float(told.group(1)) == pytest.approx(1e3 * SHIFTED * DT, abs=0.05)
+    assert finding.explained == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_hold_hidden_by_an_effect_shows_with_the_effect_in_the_model():
+    bench, linear = prepared(misdeclared(sweeps(effect=CUBIC, hold="foh"), "zoh"))
+    quality = data_quality(bench, (*bench.estimation, *bench.scoring), linear)
+    assert quality.findings == ()
+    model = fit_candidate(bench, (effect_named("cubic_stiffness"),), linear.fit)
+    (finding,) = with_best_model(quality, bench, model).findings
+    assert finding.kind == "hold"
+    assert finding.sentence.startswith("With cubic_stiffness in the model: ")
+    assert '"foh"' in finding.mend
+    assert finding.explained == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_right_hold_stays_right_with_the_effect_in_the_model():
+    bench, linear = prepared(sweeps(effect=CUBIC))
+    quality = data_quality(bench, (*bench.estimation, *bench.scoring), linear)
+    model = fit_candidate(bench, (effect_named("cubic_stiffness"),), linear.fit)
+    assert with_best_model(quality, bench, model) is quality
+
+
+def clipped(x):
+    return np.clip(x, -0.7 * np.max(x), 0.7 * np.max(x))
+
+
+def stuck(x):
+    x[1500:1600] = x[1500]
+    return x
+
+
+def coarse(x):
+    return np.round(x / (np.ptp(x) / 60)) * (np.ptp(x) / 60)
+
+
+def with_spike(x):
+    x[2000] += np.std(x)
+    return x
+
+
+def with_lost_counts(x):
+    x[2000:] += 0.5 * np.std(x)
+    return x
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind", "told"),
+    [
+        (clipped, "clipping", "is cut off at"),
+        (stuck, "stuck", "stands exactly still from 7.5 to 7.995 s"),
+        (coarse, "quantization", "61 levels"),
+        (with_spike, "jump", "at 10 s"),
+        (with_lost_counts, "jump", "at 10 s"),
+    ],
+)
+def test_a_channel_at_fault_is_told_with_its_place(fault, kind, told):
+    records = sweeps()
+    found = sensor_faults(AXIS, with_first(records, fault))
+    assert {finding.kind for finding in found} == {kind}
+    assert told in found[0].sentence
+    assert {(finding.record, finding.signal) for finding in found} == {("sweep_1", "x")}
+    for record in records:
+        assert sensor_faults(AXIS, record) == []
+
+
+def test_a_channel_at_fault_does_not_speak_of_amplitude():
+    """Clipping makes the gain fall with amplitude as a nonlinear effect does."""
+    records = sweeps()
+    quality = looked_at([with_first(records, clipped), *records[1:]])
+    assert {finding.kind for finding in quality.findings} == {"clipping"}
+    assert quality.amplitude.answer == "no"
+    assert "sweep_1" not in quality.amplitude.records
+
+
+def test_a_rig_at_rest_and_dry_friction_are_not_stuck():
+    """Without noise a sticking mass stands exactly still; it comes to rest and leaves it without a jump."""
+    t = DT * np.arange(3000)
+    u = np.where(t > 5.0, 1.0, 0.0) * np.sin(3.0 * t)
+    record = Record("rest", DT, {"u": u}, {})
+    moving = simulate(
+        compose(AXIS, [effect_named("coulomb_friction")]), {**VALUES, "d": 60.0, "T_c": 0.6}, record
+    )
+    assert np.count_nonzero(np.diff(moving["x"]) == 0.0) > 500
+    assert sensor_faults(AXIS, moving) == []
+
+
+def test_one_amplitude_cannot_tell():
+    record = sweeps()[0]
+    quality = looked_at([record, replace(record, name="again", role="validation")])
+    assert quality.amplitude.answer == "cannot tell"
+    assert "Record another one" in quality.amplitude.sentence
+
+
+def test_the_list_of_the_file_says_the_same():
+    quality = looked_at(misdeclared(sweeps(), "zoh"))
+    content = json.loads(json.dumps(quality.to_json()))
+    assert [entry["kind"] for entry in content] == ["hold", "amplitude_dependence"]
+    assert content[0]["mend"] == quality.findings[0].mend
+    assert content[1]["answer"] == "no"
+
+
+def measured(folder: Path, hold: Hold | None = None) -> tuple[Workbench, Scored, DataQuality]:
+    campaign = read_campaign(folder)
+    records = campaign.records if hold is None else misdeclared(campaign.records, hold)
+    bench, linear = prepared(records, campaign.rig, campaign.constants)
+    return bench, linear, data_quality(bench, records, linear)
+
+
+def test_measured_oscillator_shows_its_hold_once_the_cubic_spring_is_in(shared_data: Path):
+    bench, linear, quality = measured(shared_data / "silverbox", "foh")
+    assert quality.findings == ()
+    model = fit_candidate(bench, (effect_named("cubic_stiffness"),), linear.fit)
+    (finding,) = with_best_model(quality, bench, model).findings
+    assert (finding.kind, finding.serious) == ("hold", True)
+    assert '"band_limited"' in finding.mend
+    assert finding.explained is not None
+    assert finding.explained > 0.8
+
+
+@pytest.mark.parametrize("campaign", ["silverbox", "boucwen", "mr_damper/campaign_off.toml"])
+def test_measured_campaigns_as_they_are_declared_have_no_fault(shared_data: Path, campaign: str):
+    assert measured(shared_data / campaign)[2].findings == ()
+
+
+def test_an_element_has_no_frequency_response(shared_data: Path):
+    _, _, quality = measured(shared_data / "mr_damper/campaign_on.toml")
+    assert ELEMENT.is_driven is False
+    assert quality.amplitude.answer == "cannot tell"
