@@ -122,6 +122,23 @@ def written(title: str, constants: dict[str, float], records: list[Record], fold
     return folder
 
 
+def with_unit_gain(values: dict[str, float]) -> dict[str, float]:
+    """Return the same gear with A = 1: motion and input know only the product of A and the loop's share of the stiffness."""
+    if "A" not in values:
+        return values
+    gain, share = values["A"], values["a"]
+    stiffness = values["k_c"] * (share + (1.0 - share) * gain)
+    power = gain ** (values["n"] - 1.0)
+    return {
+        **values,
+        "A": 1.0,
+        "k_c": stiffness,
+        "a": share * values["k_c"] / stiffness,
+        "beta": values["beta"] * power,
+        "gamma": values["gamma"] * power,
+    }
+
+
 def main(name: str, noise: float, seed: int) -> None:
     case = CASES[name]
     folder = OUT / f"{name}_{noise:g}_{seed}"
@@ -135,11 +152,11 @@ def main(name: str, noise: float, seed: int) -> None:
     print(
         f"\n| {name}, noise {noise:g} rad, seed {seed} | true | found | error | standard error |\n|---|---|---|---|---|"
     )
-    coefficients = dict(found.rig_parameters)
+    coefficients, truth = dict(found.rig_parameters), with_unit_gain(case.values)
     for term in found.kept:
         coefficients |= term.coefficients
     for parameter, c in coefficients.items():
-        true = case.values.get(parameter, 0.0)
+        true = truth.get(parameter, 0.0)
         error = f"{100.0 * (c.value / true - 1.0):+.2f} %" if true else f"{c.value:+.2g}"
         size = f"{100.0 * c.std / abs(true):.2f} %" if true else f"{c.std:.2g}"
         print(f"| {parameter} | {true:.6g} | {c.value:.6g} | {error} | {size} |")

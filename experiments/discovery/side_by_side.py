@@ -57,7 +57,7 @@ def derivatives() -> dict[str, Callable[[], ps.BaseDifferentiation]]:
     }
     for width in (7, 15, 31):
         found[f"Savitzky-Golay, {width}"] = lambda width=width: ps.SmoothedFiniteDifference(
-            smoother_kws={"window_length": width, "polyorder": 5, "axis": 0}
+            order=6, smoother_kws={"window_length": width, "polyorder": 5, "axis": 0}
         )
     return found
 

@@ -39,7 +39,7 @@ def test_a_missing_cubic_spring_is_found_and_written_as_the_contract_says(
         assert isinstance(written[later], list)
     assert set(written["gap"]) == {"x"}
     gap = written["gap"]["x"]
-    assert set(gap) == {"before", "reidentified", "after", "noise_floor", "closed"}
+    assert set(gap) == {"before", "reidentified", "after", "noise_floor", "closed", "interval"}
     assert gap["after"] < 1.1 * gap["noise_floor"] < gap["reidentified"] < gap["before"]
     assert gap["closed"] == pytest.approx(
         (gap["before"] - gap["after"]) / (gap["before"] - gap["noise_floor"])

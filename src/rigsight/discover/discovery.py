@@ -133,11 +133,15 @@ def discover(
         )
     chosen = _without_damper(bench, selection, say)
     final, held = _polished(task, bench, chosen)
+    # A record that was set aside is fitted by the polish as well: only the equation before it has not seen it.
+    judged = chosen if how else bench.scored(chosen.support, final)
+    if not math.isfinite(judged.excess):
+        raise SimulationError("The polished equations cannot be simulated on the held-out records.")
     say("polished")
     inclusion = _inclusion(task, bench, selection, final, motions, rows, rng)
     force = _force_equation(bench, final, motions, rows, rng)
     say("ensembles")
-    found = _Found(estimation, held_out, how, selection, chosen, final, inclusion, force, same, held)
+    found = _Found(estimation, held_out, how, selection, chosen, judged, final, inclusion, force, same, held)
     return _assembled(task, method, pointwise, bench, found)
 
 
@@ -285,6 +289,7 @@ class _Found:
     how: str
     selection: Selection
     chosen: Trial
+    judged: Trial
     final: FitResult
     inclusion: Mapping[str, float]
     force: ForceEquation | None
@@ -442,6 +447,7 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
         found.how,
         selection,
         found.chosen,
+        found.judged.excess,
         terms,
         found.held,
         found.force,
@@ -460,8 +466,8 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
         alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
         force_equation={} if found.force is None else dict(found.force.inclusion),
         held_out=tuple(record.name for record in found.held_out),
-        held_out_error=found.chosen.excess,
-        held_out_nrmse=found.chosen.excess * task.noise[output] / size,
+        held_out_error=found.judged.excess,
+        held_out_nrmse=found.judged.excess * task.noise[output] / size,
         noise_floor=task.noise[output] / size,
         independent=selection.independent,
         runs=_runs(bench, found, output),
@@ -514,7 +520,7 @@ def _alternative(trial: Trial, selection: Selection) -> Alternative:
 def _runs(bench: Bench, found: _Found, output: str) -> tuple[Run, ...]:
     """Return the free runs of the chosen model on the held-out records."""
     ends = np.cumsum([record.n_samples for record in found.held_out])
-    parts = np.split(found.chosen.residuals * bench.noise[output], ends[:-1])
+    parts = np.split(found.judged.residuals * bench.noise[output], ends[:-1])
     return tuple(
         Run(record.name, record.role, record.t, record[output], record[output] - error)
         for record, error in zip(found.held_out, parts, strict=True)

@@ -23,6 +23,8 @@ _VAGUE = 0.05
 _FLOOR = 1.5
 _NOISY = 0.1
 """Noise floor, relative to the motion, from which terms may well hide in it."""
+_NEAR = 1.5
+"""Factor of the held-out error within which another equation is nearly as good."""
 _FORCE_TERMS_OF = {"beta": "|x'| |F|^(n-1) F", "gamma": "x' |F|^n"}
 
 
@@ -62,6 +64,7 @@ def warnings_of(
     how: str,
     selection: Selection,
     chosen: Trial,
+    excess: float,
     terms: Sequence[Term],
     held: str,
     force: ForceEquation | None,
@@ -73,10 +76,7 @@ def warnings_of(
     source = task.rig.inputs[0].name
     sizes = [float(np.std(record[source])) for record in estimation]
     if max(sizes) < 1.2 * min(sizes):
-        found.append(
-            "The records have one amplitude: a softening or hardening spring, friction and hysteresis look like other numbers "
-            "of a linear rig there. Add a record at half or twice the amplitude."
-        )
+        found.append(_one_amplitude(selection, chosen))
     best = criterion(chosen, selection.independent)
     rivals = [
         trial
@@ -106,9 +106,9 @@ def warnings_of(
             f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change it by less; "
             f"in doubt is {likeliest} first."
         )
-    if chosen.excess > _FLOOR:
+    if excess > _FLOOR:
         found.append(
-            f"The equations leave {chosen.excess:.1f} times the noise floor in free run on the held-out records: "
+            f"The equations leave {excess:.1f} times the noise floor in free run on the held-out records: "
             "something is still missing, or disturbances are larger than the floor says."
         )
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
@@ -122,3 +122,24 @@ def warnings_of(
                 f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
             )
     return tuple(found)
+
+
+def _one_amplitude(selection: Selection, chosen: Trial) -> str:
+    """Return what records of a single amplitude tell apart, and what they do not."""
+    others = sorted(
+        (t for t in selection.trials if not t.support >= chosen.support and math.isfinite(t.excess)),
+        key=lambda t: t.excess,
+    )
+    near = [t for t in others if t.excess < _NEAR * chosen.excess]
+    if not others:
+        told = "Softening, hardening, friction or hysteresis may look like other numbers of the same equation there"
+    elif near:
+        listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in near[:3])
+        told = f"Nearly as good there is {listed}"
+    else:
+        ratio = others[0].excess / chosen.excess
+        told = f"There the terms are told apart (the next equation leaves {ratio:.3g} times as much), elsewhere they are untested"
+    return (
+        f"The records have one amplitude: how a force grows with it has not been seen. {told}. "
+        "Add a record at half or twice the amplitude."
+    )

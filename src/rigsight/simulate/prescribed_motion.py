@@ -86,7 +86,7 @@ def _penalty(samples: NDArray[np.float64]) -> float:
 
 
 def _end_slopes(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the parabola with the samples' slopes at both ends: a cosine transform takes every other slope there for a corner."""
+    """Return the parabola with the samples' slopes at both ends: a cosine transform takes any other slope for a corner."""
     count = min(_END, samples.size)
     index = np.arange(count, dtype=np.float64)
     degree = min(3, count - 1)
