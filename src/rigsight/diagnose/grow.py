@@ -70,7 +70,9 @@ def grown(
     usable = sorted((m for m in singles if m.residuals and np.isfinite(m.excess)), key=lambda m: m.excess)
     if not usable or usable[0].excess <= at_floor:
         return []
-    beam = [m for m in usable[:2] if m.excess <= _BEAM * usable[0].excess]
+    beam = usable[:1]
+    if len(usable) > 1 and usable[1].excess <= _BEAM * usable[0].excess and not _alike(usable[0], usable[1]):
+        beam.append(usable[1])
     pairs: list[Scored] = []
     for parent in beam:
         partners = [
@@ -86,6 +88,12 @@ def grown(
         for pair in refine(bench, pairs, n_jobs)
         if pair.excess <= allowed
     ]
+
+
+def _alike(one: Scored, other: Scored) -> bool:
+    """Return True if one is a special or limiting case of the other: what is missing beside them is the same."""
+    parents = {name for model in (one, other) for effect in model.effects for name in effect.parents}
+    return bool(parents & {*one.names, *other.names})
 
 
 def _known_pair(pairs: Sequence[Scored], parent: Scored, effect: Effect) -> bool:

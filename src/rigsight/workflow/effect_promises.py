@@ -256,6 +256,11 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
         records.append(simulated.with_signals(**noisy))
     free = [*bench.free, *(p.name for p in own)]
     start = {name: value * (_WRONG if name in free else 1.0) for name, value in truth.items()}
+    if effect.place is Place.DISTURBANCE:
+        # A line that is off by more than a cycle over the record is another line to a fit over time.
+        for p in own:
+            if p.dimension == "time^-1":
+                start[p.name] = truth[p.name] + 1.0 / float(t[-1])
     result = GreyBoxFit(structure, records, scales, noise).fit(start, free)
     if abs(result.weighted_rms - 1.0) > 0.05:
         return (

@@ -71,6 +71,8 @@ def own_effects(
             )
         taken[own.effect.name] = own.declared
         found.append(own)
+    if not found:
+        return ()
     stage = Stage(CHECKING, len(found), listener)
     for own in found:
         _check_parents(own, taken)
