@@ -357,6 +357,9 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         if at_floor(pool[-1]):
             break
         pool.append(tried(support))
+    if not any(at_floor(trial) for trial in pool):
+        # A rich term may stand for a simple one in the regression, and its fit stop where that of the simple one does not.
+        pool += [tried(support) for support in _special_cases(bench, [trial.support for trial in pool])]
     independent = independent_samples(min(pool, key=lambda t: t.excess).residuals)
 
     def cost(trial: Trial) -> float:
@@ -423,12 +426,19 @@ def proposals(bench: Bench) -> list[Support]:
 def _simpler(bench: Bench, support: Support) -> list[Support]:
     """Return the supports with a term less, or with a special case of a term in its place."""
     found = [support - {name} for name in sorted(support)]
-    for name in sorted(support):
-        parents = [
-            p for p in bench.candidates[name].effect.parents if p in bench.candidates and p not in support
-        ]
-        found += [support - {name} | {parent} for parent in parents]
-    return found
+    return found + _special_cases(bench, [support])
+
+
+def _special_cases(bench: Bench, supports: Sequence[Support]) -> list[Support]:
+    """Return the supports that have a special case of a term in its place, each once, without those that are given."""
+    found = {
+        support - {name} | {parent}: None
+        for support in supports
+        for name in sorted(support)
+        for parent in bench.candidates[name].effect.parents
+        if parent in bench.candidates and parent not in support
+    }
+    return [support for support in found if support not in supports]
 
 
 def _next_terms(bench: Bench, support: Support) -> list[str]:
