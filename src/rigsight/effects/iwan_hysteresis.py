@@ -34,7 +34,7 @@ N_ELEMENTS = 6
 DECADES = 2.7
 """Range of deflections over which the elements let go."""
 
-a, x_s, q = sp.symbols("a x_s q", real=True)
+a, x_s, q, beta, gamma = sp.symbols("a x_s q beta gamma", real=True)
 elements = sp.symbols(f"z0:{N_ELEMENTS}", real=True)
 
 _reaches = [sp.Float(10.0 ** (-DECADES * (1.0 - (i + 0.5) / N_ELEMENTS))) for i in range(N_ELEMENTS)]
@@ -53,6 +53,12 @@ def _from_secant(share: float, reach: float, power: float) -> Start:
     softening = share + (1.0 - share) * stuck
     values = {"k": k / softening, "a": share, "x_s": reach * x_size, "q": power}
     return Start({name: sp.sympify(value) for name, value in values.items()})
+
+
+_FROM_BOUC_WEN = Start(
+    {"a": a, "x_s": 2 / sp.sqrt(beta**2 + gamma**2), "q": sp.Integer(0)}, parent="bouc_wen_hysteresis"
+)
+"""The same loop with its rounding spread over many sliders: where both fit, the one state is preferred to the six."""
 
 
 IWAN_HYSTERESIS = Effect(
@@ -102,5 +108,6 @@ IWAN_HYSTERESIS = Effect(
         _from_secant(0.1, 2.0, -0.3),
         _from_secant(0.3, 0.5, 0.0),
         _from_secant(0.5, 2.0, 0.5),
+        _FROM_BOUC_WEN,
     ),
 )
