@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rigsight.discover.doubts import doubts, warnings_of
 from rigsight.discover.equations import equations
-from rigsight.discover.hysteresis import LOOP, ForceEquation, force_equation
+from rigsight.discover.hysteresis import LOOP, LOOPS, ForceEquation, force_equation
 from rigsight.discover.library import Candidate, candidates, offered_effects, torque_along
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
@@ -239,7 +239,8 @@ def _distinct(
     dropped: set[int] = set()
     for i, j, _ in alike(projected, columns, _SAME_COLUMN):
         # A loop may turn into friction or damping, not the other way round: the simpler term stands for it.
-        first, second = (j, i) if library[i].name == LOOP else (i, j)
+        loops = [library[k].name in LOOPS for k in (i, j)]
+        first, second = (j, i) if loops == [True, False] else (i, j)
         if first not in dropped and second not in dropped:
             dropped.add(second)
             stands_for.setdefault(library[first].name, []).append(library[second].name)
@@ -356,7 +357,7 @@ def _inclusion(
     offered_terms = [
         name
         for name in dict.fromkeys((*polished, *proposed, *ranked))
-        if name in kept or not kept.intersection(bench.candidates[name].effect.parents)
+        if name in kept or not kept & _ancestors(bench, name)
     ]
     names = offered_terms[:_ENSEMBLE_TERMS]
     shift = _rest_shift(bench, final)
@@ -368,8 +369,8 @@ def _inclusion(
     library = [bench.candidates[name] for name in names]
     if shift:
         # The loop does not know where rest is.
-        loops = [candidate for candidate in library if candidate.name == LOOP]
-        effects = [candidate.effect for candidate in library if candidate.name != LOOP]
+        loops = [candidate for candidate in library if candidate.name in LOOPS]
+        effects = [candidate.effect for candidate in library if candidate.name not in LOOPS]
         library = loops + candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
     again = replace(
         bench,
@@ -383,6 +384,12 @@ def _inclusion(
     columns = np.column_stack([again.column(name) for name in offered])
     found = inclusion_probabilities(again.sparse, columns, rng)
     return dict(zip(offered, map(float, found), strict=True))
+
+
+def _ancestors(bench: Bench, name: str) -> set[str]:
+    """Return the effects that a term has as special or limiting cases, and theirs."""
+    parents = [parent for parent in bench.candidates[name].effect.parents if parent in bench.candidates]
+    return set(parents).union(*(_ancestors(bench, parent) for parent in parents))
 
 
 def _rest_shift(bench: Bench, final: FitResult) -> float:

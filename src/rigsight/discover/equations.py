@@ -11,6 +11,9 @@ from sympy.printing.str import StrPrinter
 from rigsight.simulate import Structure
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
+_DIGITS = 4
+"""Of the numbers that an effect's equation holds; parameters stand as symbols and lose none."""
+
 
 class _Text(StrPrinter):  # type: ignore[misc]
     def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
@@ -24,6 +27,14 @@ class _Text(StrPrinter):  # type: ignore[misc]
 
     def _print_positive_part(self, expr: sp.Expr) -> str:
         return str(f"max(0, {self._print(expr.args[0])})")
+
+    def _print_Float(self, expr: sp.Float) -> str:  # noqa: N802
+        return f"{float(expr):.{_DIGITS}g}"
+
+
+class _Tex(LatexPrinter):  # type: ignore[misc]
+    def _print_Float(self, expr: sp.Float) -> str:  # noqa: N802
+        return str(super()._print_Float(sp.Float(expr, _DIGITS)))
 
 
 def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -39,12 +50,16 @@ def equations(structure: Structure, numbers: Mapping[str, float]) -> tuple[tuple
     plain, pretty = _names(structure)
     written = {sp.Symbol(f"p_{name}", real=True): sp.nsimplify(value) for name, value in numbers.items()}
     rows = [(left, right.xreplace(written)) for left, right in _rows(structure)]
-    text = tuple(f"{left[0]} = {_Text().doprint(right.xreplace(plain))}" for left, right in rows)
-    printer = LatexPrinter({"symbol_names": pretty})
-    latex = tuple(
-        f"{left[1]} = {printer.doprint(right.xreplace({s: s for s in pretty}))}" for left, right in rows
-    )
-    return text, latex
+    printer = _Tex({"symbol_names": pretty})
+    text = [f"{left[0]} = {_Text().doprint(right.xreplace(plain))}" for left, right in rows]
+    latex = [f"{left[1]} = {printer.doprint(right)}" for left, right in rows]
+    first = len(rows) - len(structure.equations)
+    for index, equation in enumerate(structure.equations):
+        if equation.limit is not None:
+            state, limit = equation.symbol, equation.limit.xreplace(written)
+            text[first + index] += f" within |{plain[state]}| <= {_Text().doprint(limit.xreplace(plain))}"
+            latex[first + index] += rf",\quad |{pretty[state]}| \le {printer.doprint(limit)}"
+    return tuple(text), tuple(latex)
 
 
 def _rows(structure: Structure) -> list[tuple[tuple[str, str], sp.Expr]]:

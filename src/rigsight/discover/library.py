@@ -19,7 +19,7 @@ import sympy as sp
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from rigsight.discover.hysteresis import LOOP, best_loop
+from rigsight.discover.hysteresis import LOOPS, best_loop
 from rigsight.discover.monomials import MONOMIALS
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected
@@ -67,7 +67,7 @@ class Candidate:
 def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
     """Return the effects that a regression can hold as terms on this rig.
 
-    A state has no signal of its own along a measured motion; loop and lag are the exceptions, because theirs follow from
+    A state has no signal of its own along a measured motion; loops and lag are the exceptions, because theirs follow from
     motion and input.
     """
     changes_spring = [e for e in (*CATALOGUE, *MONOMIALS) if e.spring is not None or e.deflection is not None]
@@ -76,7 +76,7 @@ def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
         for effect in (*CATALOGUE, *MONOMIALS)
         if rig.offers(effect)
         and (has_spring or effect not in changes_spring)
-        and (effect.name in (LOOP, _LAG) or _is_static(effect))
+        and (effect.name in (*LOOPS, _LAG) or _is_static(effect))
     ]
 
 
@@ -133,7 +133,7 @@ def candidates(
             continue
         best = (
             _loop(effect, motions, rows, projected, scales, driven)
-            if effect.name == LOOP
+            if effect.name in LOOPS
             else _best_inner(effect, motions, rows, projected, scales, sign)
         )
         if best is not None:
@@ -149,7 +149,7 @@ def _loop(
     scales: Mapping[str, float],
     driven: bool,
 ) -> Candidate | None:
-    loop = best_loop(motions, rows, projected, scales["x"], driven)
+    loop = best_loop(effect.name, motions, rows, projected, scales["x"], driven)
     return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
 

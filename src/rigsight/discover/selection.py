@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.hysteresis import LOOP
+from rigsight.discover.hysteresis import LOOPS
 from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected, information_criterion, sparse_path
 from rigsight.identify import FitResult, GreyBoxFit
@@ -30,6 +30,9 @@ _WORTH = 0.02
 """Share of the regression's residual power that a term must explain to be worth a polish, unless it is the first in line."""
 _ROUNDS = 4
 _EVALUATIONS = 40
+_FIRST_EVALUATIONS = 12
+_HOPELESS = 10.0
+"""Factor over the best RMS so far at which a support is given up after the first evaluations."""
 _TOLERANCE = 1e-5
 _SMALL = 1e-3
 _RELEASED = 0.98
@@ -177,7 +180,7 @@ class Bench:
         own |= candidate.inner
         own |= {name: share * coefficient for name, share in candidate.linear.items()}
         found: dict[str, float] = {}
-        if effect.name == LOOP:
+        if effect.name in LOOPS:
             stiffness = self.rig.motion.stiffness.name
             without = max(values[stiffness], _SMALL * coefficient)
             total = without + max(coefficient, _SMALL * without)
@@ -235,13 +238,22 @@ class Bench:
     ) -> Trial:
         structure = self.structure(support, release)
         values = dict(start) if start is not None else self.start(structure, support)
-        fit = GreyBoxFit(structure, self.estimation, self.scales, self.noise).fit(
-            values,
-            self.free_parameters(structure, left_out),
-            max_evaluations=_EVALUATIONS,
-            tolerance=_TOLERANCE,
-            finish=False,
+        free = self.free_parameters(structure, left_out)
+        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise)
+        fit = problem.fit(
+            values, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
         )
+        best = min((trial.fit.cost for trial in self.trials.values()), default=float("inf"))
+        if not fit.success and fit.cost < _HOPELESS**2 * best:
+            fit = problem.fit(
+                fit.values,
+                free,
+                fit.initial_states,
+                max_evaluations=_EVALUATIONS - _FIRST_EVALUATIONS,
+                tolerance=_TOLERANCE,
+                finish=False,
+                substeps=fit.substeps,
+            )
         return self.scored(support, fit)
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
@@ -391,7 +403,8 @@ def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:
     """Return the trial with the fewest parameters of those that the held-out records cannot tell from the best."""
     lowest = min(cost(trial) for trial in trials)
     close = [trial for trial in trials if cost(trial) <= lowest + STRONG or cost(trial) == lowest]
-    return min(close, key=lambda t: (t.n_free, cost(t)))
+    # As many parameters: one state is less than the six of a spread of sliders.
+    return min(close, key=lambda t: (t.n_free, len(t.fit.structure.states), cost(t)))
 
 
 def proposals(bench: Bench) -> list[Support]:
