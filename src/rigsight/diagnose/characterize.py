@@ -1,7 +1,13 @@
 """Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
 
-Each candidate gets a first look at the liveliest stretches of the records, from all its starts. Those whose look comes near
-the best are fitted to all records; the best of those to full precision.
+Each candidate gets a first look at the liveliest stretches of the records, from all its starts: first in short pieces with
+initial states of their own, which keeps a model that is far off in step with the motion, then in one piece. Those whose look
+comes near the best are fitted to all records; the best of those to full precision.
+
+References
+----------
+H. G. Bock, in *Modelling of Chemical Reaction Systems* (Springer 1981) 102, for fits in pieces (multiple shooting, here without
+the condition that pieces join).
 """
 
 from __future__ import annotations
@@ -13,14 +19,20 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from rigsight.diagnose.starts import start_values, with_own_values
+from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.identify import EffectRegression, FitResult, GreyBoxFit
 from rigsight.simulate import Structure
 
 _LOOK_EVALUATIONS = 25
+_PIECE = 4.0
+"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long."""
 _LOOK_TOLERANCE = 1e-3
 _LOOK_ACCURACY = 1e-3
+_LONG_PIECE = 20.0
+_STUCK = 2.0
+"""Mean squared error of whole records, in units of that of the first look, above which a fit is taken to have stopped short."""
 _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-4
 _HOPELESS_EVALUATIONS = 8
@@ -201,17 +213,17 @@ def look_at(
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
-    fits = [
-        fit.fit(
-            start,
-            free,
-            max_evaluations=_LOOK_EVALUATIONS,
-            tolerance=_LOOK_TOLERANCE,
-            finish=False,
-            substeps=substeps,
-        )
-        for start in starts
-    ]
+    pieces = [cut([record], _PIECE * bench.period) for record in bench.look]
+    in_pieces = GreyBoxFit(
+        structure, [piece for parts in pieces for piece in parts], bench.scales, bench.noise, _LOOK_ACCURACY
+    )
+    of_pieces = None
+    if substeps is not None:
+        of_pieces = [n for n, parts in zip(substeps, pieces, strict=True) for _ in parts]
+    fits = []
+    for start in starts:
+        near = in_pieces.fit(start, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, of_pieces)
+        fits.append(fit.fit(near.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps))
     return Look(effects, structure, free, _distinct(fits))
 
 
@@ -246,19 +258,29 @@ def _fitted(
     promising: bool,
 ) -> Scored:
     fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise)
-    results = [
-        fit.fit(
-            start.values,
-            free,
-            max_evaluations=_ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS,
-            tolerance=_ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE,
+    evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
+    tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
+
+    def whole(values: Mapping[str, float]) -> FitResult:
+        return fit.fit(values, free, max_evaluations=evaluations, tolerance=tolerance)
+
+    results = [whole(start.values) for start in (starts if promising else starts[:1])]
+    if promising and min(map(_mean_square, results)) > _STUCK * min(map(_mean_square, starts)):
+        in_pieces = GreyBoxFit(
+            structure, cut(bench.estimation, _LONG_PIECE * bench.period), bench.scales, bench.noise
         )
-        for start in (starts if promising else starts[:1])
-    ]
+        near = in_pieces.fit(
+            starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
+        )
+        results.append(whole(near.values))
     usable = [result for result in results if result.residuals]
     if not usable:
         return Scored(effects, results[0], (), (), float("inf"))
     return bench.score(effects, min(usable, key=lambda result: result.cost))
+
+
+def _mean_square(fit: FitResult) -> float:
+    return fit.cost / fit.n_samples
 
 
 def _distinct(fits: Sequence[FitResult]) -> tuple[FitResult, ...]:

@@ -82,6 +82,11 @@ class Workbench:
     held: frozenset[str]
     modelled: tuple[Effect, ...] = ()
 
+    @property
+    def period(self) -> float:
+        """Natural period of the rig, or the typical one of its motion [s]."""
+        return float(2.0 * np.pi * self.scales["time"])
+
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
         """Return the equations of the simulation in question with effects added."""
         return compose(self.rig, (*self.modelled, *effects), fixed)

@@ -44,6 +44,12 @@ _STATE_RANGE = 20.0
 _LEAST_RANGE = 1e-9
 """Least unit of a limited state, in units of its size: a play of zero has no range."""
 _WORSE = 1e3
+_FIRST_SAMPLES = 7
+_FIRST_SUBSTEPS = 4
+_RESTING = 1e-3
+"""Share of its range within which an input rests."""
+_FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
+"""Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +141,7 @@ class GreyBoxFit:
         """
         coordinates = Coordinates.of(self.structure, free, start, self.scales)
         n_states = len(self.structure.states)
-        states = list(initial_states) if initial_states is not None else [d.first_state for d in self._data]
+        states = list(initial_states) if initial_states is not None else self._first_states(start)
         own = coordinates.from_values(start)
         sizes = self.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
         places = [np.where(self._limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
@@ -168,6 +174,27 @@ class GreyBoxFit:
             max_nfev=max_evaluations,
         )
         return self._result(problem, solution.x, bool(solution.status > 0), solution.message, finish)
+
+    def _first_states(self, start: Mapping[str, float]) -> list[NDArray[np.float64]]:
+        """Return each record's guess; of several for states with a range, and of moving and resting, the best."""
+        guesses = [d.first_state for d in self._data]
+        if not np.any(self._limited):
+            return guesses
+        p = np.array([start[name] for name in self.structure.names])
+        ranges = np.where(self._limited, self.state_sizes(p[:, None])[:, 0], 0.0)
+        found = []
+        for data, guess in zip(self._data, guesses, strict=True):
+            at_rest = _state_at_rest(self.structure, data.record, guess)
+            lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
+            n_samples = data.record.n_samples
+            with np.errstate(all="ignore"):
+                sets = np.repeat(p[:, None], lanes.shape[1], axis=1)
+                out = simulate_sets(self.structure, data.held, sets, lanes, n_samples, _FIRST_SUBSTEPS)
+                errors = (data.measured[:, :, None] - out) * data.weights[:, None]
+                costs = np.nansum(errors**2, axis=(0, 1))
+            costs[~np.all(np.isfinite(out), axis=(0, 1))] = np.inf
+            found.append(lanes[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else guess)
+        return found
 
     def _failed(self, coordinates: Coordinates, theta: NDArray[np.float64], message: str) -> FitResult:
         p = coordinates.to_parameters(theta[: len(coordinates.free)])
@@ -397,7 +424,7 @@ def _first_state(structure: Structure, record: Record) -> NDArray[np.float64]:
     state = np.zeros(len(structure.states))
     if not structure.rig.is_driven:
         return state
-    count = min(7, record.n_samples)
+    count = min(_FIRST_SAMPLES, record.n_samples)
     time = np.arange(count) * record.dt
     displacement = record[structure.rig.outputs[0].name][:count]
     slope, level = np.polyfit(time, displacement, 1)
@@ -409,4 +436,19 @@ def _first_state(structure: Structure, record: Record) -> NDArray[np.float64]:
             state[i] = float(np.mean(record[name][:count]))
         elif dimension == "input":
             state[i] = record[structure.rig.inputs[0].name][0]
+    return state
+
+
+def _state_at_rest(structure: Structure, record: Record, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the guess without motion: the mean of the outputs for as long as the input rests."""
+    state = guess.copy()
+    if not structure.rig.is_driven:
+        return state
+    drive = record[structure.rig.inputs[0].name]
+    moving = np.flatnonzero(np.abs(drive - drive[0]) > _RESTING * float(np.ptp(drive)))
+    count = max(_FIRST_SAMPLES, int(moving[0]) if moving.size else record.n_samples)
+    state[0], state[1] = float(np.mean(record[structure.rig.outputs[0].name][:count])), 0.0
+    for i, name in enumerate(structure.state_names):
+        if name in record and i > 1:
+            state[i] = float(np.mean(record[name][:count]))
     return state
