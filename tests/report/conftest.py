@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rigsight.diagnose.finding import AmplitudeDependence, DataQuality, Finding
 from rigsight.diagnose.gap_parts import (
     AmplitudePart,
     BandPart,
@@ -18,7 +20,8 @@ from rigsight.diagnose.gap_parts import (
     StatePart,
     TimePart,
 )
-from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, NoiseFloor, OutputGap, Trace
+from rigsight.diagnose.result import Advice, Candidate, Diagnosis, Estimate, NoiseFloor, OutputGap, Trace
+from rigsight.report import render_report
 
 NOISE = {"psi": 4e-4, "y": 3e-5, "force": 12.0}
 SIZE = {"psi": 0.06, "y": 0.004, "force": 900.0}
@@ -172,11 +175,14 @@ def diagnosis() -> Diagnosis:
 @pytest.fixture(scope="session")
 def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
     """Diagnoses of other kinds, by name."""
-    nothing = {"effects": (), "where": (), "ambiguous_with": ()}
+    # One record is enough where records are not the matter: figures take the time of these tests.
+    one = {"traces": diagnosis.traces[:1]}
+    nothing = {**one, "effects": (), "where": (), "ambiguous_with": ()}
     hostile = "<script>alert(\"1\")</script> & $x_1$ 'q'"
     changes: dict[str, dict[str, Any]] = {
         "effect": {},
         "two effects": {
+            **one,
             "effects": ("coulomb_friction", "cubic_stiffness"),
             "ambiguous_with": (),
             "effect_shares": {
@@ -185,6 +191,7 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
             },
         },
         "own effect": {
+            **one,
             "effects": ("my_gear",),
             "ambiguous_with": (),
             "candidates": (candidate(("my_gear",), 0.9, 1.0),),
@@ -206,7 +213,7 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
             "localization": Localization(),
         },
         "unknown": {**nothing, "verdict": "unknown", "where": ("yaw_dynamics",)},
-        "not finite": {"gap": {"psi": OutputGap(float("nan"), float("inf"), 0.01, 0.009)}},
+        "not finite": {**one, "gap": {"psi": OutputGap(float("nan"), float("inf"), 0.01, 0.009)}},
         "no validation": {
             "scored_on": "estimation",
             "windows": 12.5,
@@ -235,6 +242,39 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
                 sentence=hostile,
             ),
         },
+        "nothing given": {
+            "traces": tuple(replace(own, before=own.reidentified) for own in diagnosis.traces),
+        },
+        "advised": {
+            **one,
+            "advice": (
+                Advice(("coulomb_friction",), "sweep", 1.25, (0.5, 40.0), "psi", 23.4),
+                Advice(("stribeck_friction",), "sine", 0.5, (3.0, 3.0), "psi", 0.04),
+            ),
+            "data_quality": DataQuality(
+                (
+                    Finding(
+                        "clipping",
+                        "Channel psi stands still at its ends.",
+                        "Widen its range.",
+                        True,
+                        "all.csv",
+                        "psi",
+                        0.4,
+                    ),
+                    Finding(
+                        "quantization",
+                        "Steps of psi are coarse.",
+                        "Use a finer sensor.",
+                        False,
+                        None,
+                        None,
+                        None,
+                    ),
+                ),
+                AmplitudeDependence("yes", "The frequency response u -> psi changes with the amplitude."),
+            ),
+        },
         "long": {
             "traces": tuple(
                 trace(f"sweep {i}", "validation" if i < 2 else "estimation", ("psi", "y"), 20_000)
@@ -243,3 +283,16 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
         },
     }
     return lambda name: replace(diagnosis, **changes[name])
+
+
+@pytest.fixture(scope="session")
+def page_of(variant: Callable[[str], Diagnosis]) -> Callable[[str], str]:
+    """The report of each kind of diagnosis, rendered once."""
+
+    @cache
+    def rendered(name: str) -> str:
+        return render_report(
+            variant(name), "rigsight diagnose data <&>", {"rigsight": "0.1.0", "numpy": "2.4"}, 7
+        )
+
+    return rendered

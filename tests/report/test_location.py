@@ -21,8 +21,8 @@ def words(html: str) -> str:
     return " ".join(re.sub(r"<[^>]+>", " ", html).split())
 
 
-def test_the_page_says_on_which_leg_the_gap_lies(diagnosis: Diagnosis) -> None:
-    page = words(render(diagnosis))
+def test_the_page_says_on_which_leg_the_gap_lies(page_of: Callable[[str], str]) -> None:
+    page = words(page_of("effect"))
     assert "The gap lies before psi is measured." in page
     assert "u → psi 40 % 13 % 0.9 %" in page
     assert "−4 ± 0.1 ms, then 1.1 %" in page
@@ -50,24 +50,24 @@ def test_without_a_force_the_map_of_states_shows_the_residual_alone(diagnosis: D
     assert "what the equations lack" not in str(maps.figures[1].image)
 
 
-def test_the_budget_shows_its_intervals(diagnosis: Diagnosis) -> None:
-    page = words(render(diagnosis))
+def test_the_budget_shows_its_intervals(page_of: Callable[[str], str]) -> None:
+    page = words(page_of("effect"))
     assert "39 % to 45 %" in page
     assert "95 % to 98 %" in page
 
 
-def test_two_effects_share_the_gap(variant: Callable[[str], Diagnosis]) -> None:
-    assert "Coulomb friction 80 % 70 %" in words(render(variant("two effects")))
+def test_two_effects_share_the_gap(page_of: Callable[[str], str]) -> None:
+    assert "Coulomb friction 80 % 70 %" in words(page_of("two effects"))
 
 
 def test_without_a_shift_nothing_is_said_of_it(diagnosis: Diagnosis) -> None:
     alone = replace(diagnosis.localization, by_path=diagnosis.localization.by_path[:1])
-    only = replace(diagnosis, localization=alone)
+    only = replace(diagnosis, localization=alone, traces=())
     assert [row["shift"] for row in path_rows(only)] == [""]
     assert "input earlier by" not in render(only)
 
 
 def test_a_result_without_places_has_no_such_section(diagnosis: Diagnosis) -> None:
-    html = render(replace(diagnosis, localization=Localization()))
+    html = render(replace(diagnosis, localization=Localization(), traces=()))
     assert 'id="where"' not in html
     assert 'href="#where"' not in html

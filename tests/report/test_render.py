@@ -1,23 +1,19 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 from collections import Counter
 from collections.abc import Callable
 from html.parser import HTMLParser
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report import render_report
 
 VOID = {"meta", "br", "img", "input", "link", "hr", "col"}
 VARIANTS = (
     "effect", "two effects", "own effect", "parameters", "none", "unknown", "no candidates", "not finite", "no validation",
-    "element", "hostile",
+    "element", "hostile", "advised",
 )  # fmt: skip
 
 
@@ -45,7 +41,7 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        if not self.open or self.open[-1] != "style":
+        if not self.open or self.open[-1] not in ("style", "script"):
             self.text.append(data)
 
     def all(self, tag: str) -> list[dict[str, str | None]]:
@@ -55,13 +51,9 @@ class Page(HTMLParser):
         return " ".join(" ".join(self.text).split())
 
 
-def render(diagnosis: Diagnosis) -> str:
-    return render_report(diagnosis, "rigsight diagnose data <&>", {"rigsight": "0.1.0", "numpy": "2.4"}, 7)
-
-
-@pytest.fixture(scope="module", params=VARIANTS)
-def html(request: pytest.FixtureRequest, variant: Callable[[str], Diagnosis]) -> str:
-    return render(variant(request.param))
+@pytest.fixture(params=VARIANTS)
+def html(request: pytest.FixtureRequest, page_of: Callable[[str], str]) -> str:
+    return page_of(request.param)
 
 
 def test_every_kind_of_result_is_one_sound_page(html: str) -> None:
@@ -69,7 +61,8 @@ def test_every_kind_of_result_is_one_sound_page(html: str) -> None:
     ids = Counter(attrs["id"] for _, attrs in page.tags if "id" in attrs)
     assert [name for name, count in ids.items() if count > 1] == []
     targets = [attrs["href"] for _, attrs in page.tags if attrs.get("href")]
-    targets += [f"#{name}" for name in re.findall(r"url\(#([^)]+)\)", html)]
+    drawn = re.sub(r"<script>.*?</script>", "", html, flags=re.DOTALL)
+    targets += [f"#{name}" for name in re.findall(r"url\(#([^)]+)\)", drawn)]
     assert [target for target in targets if target[:1] != "#" or target[1:] not in ids] == []
     labels = [attrs["aria-labelledby"] for _, attrs in page.tags if attrs.get("aria-labelledby")]
     assert set(labels) <= set(ids)
@@ -77,10 +70,15 @@ def test_every_kind_of_result_is_one_sound_page(html: str) -> None:
 
 def test_the_page_asks_nothing_of_the_network(html: str) -> None:
     page = Page(html)
-    assert page.all("script") == page.all("link") == page.all("iframe") == []
+    assert page.all("link") == page.all("iframe") == []
+    assert all("src" not in attrs for attrs in page.all("script"))
     sources = [attrs[key] or "" for _, attrs in page.tags for key in ("src", "href") if key in attrs]
     assert all(source.startswith(("#", "data:image/png")) for source in sources)
-    assert re.findall(r"(?:https?:)?//\w", re.sub(r"base64,[^\"]*", "", html)) == []
+    packed = r"base64,[^\"]*|\"data\":\"[^\"]*\""
+    # The one address is the name of the SVG namespace, which nothing fetches.
+    assert set(re.findall(r"(?:https?:)?//\w[^\"]*", re.sub(packed, "", html))) == {
+        "http://www.w3.org/2000/svg"
+    }
     assert "@import" not in html
 
 
@@ -92,23 +90,25 @@ def test_the_page_can_be_read_without_seeing_it(html: str) -> None:
     assert all(attrs.get("scope") for attrs in page.all("th"))
     assert len(page.all("caption")) == len(page.all("table"))
     figures, pictures = page.all("figure"), [*page.all("svg"), *page.all("img")]
-    assert len(page.all("figcaption")) == len(figures) == len(pictures)
+    assert len(page.all("figcaption")) == len(figures) <= len(pictures)
     assert all(attrs.get("aria-label") or attrs.get("alt") for attrs in pictures)
     levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
     assert all(after <= before + 1 for before, after in pairwise(levels))
 
 
-def test_names_from_files_are_text_and_never_markup(variant: Callable[[str], Diagnosis]) -> None:
-    html = render(variant("hostile"))
+def test_names_from_files_are_text_and_never_markup(page_of: Callable[[str], str]) -> None:
+    html = page_of("hostile")
     page = Page(html)
-    assert page.all("script") == []
+    kinds = [attrs.get("type") for attrs in page.all("script")]
+    assert kinds.count(None) == 1, "only the page's own script may run"
+    assert set(kinds) <= {None, "application/json"}
     assert '<script>alert("1")</script> & $x_1$' in page.words()
     assert "<x<y>" not in html
     assert page.all("y") == page.all("b<") == []
 
 
-def test_the_page_says_verdict_and_evidence(diagnosis: Diagnosis) -> None:
-    words = Page(render(diagnosis)).words()
+def test_the_page_says_verdict_and_evidence(page_of: Callable[[str], str], diagnosis: Diagnosis) -> None:
+    words = Page(page_of("effect")).words()
     assert "most likely caused by Bouc-Wen hysteresis in the yaw dynamics" in words
     assert "cannot tell Bouc-Wen hysteresis from Coulomb friction and cubic stiffness" in words
     assert "yaw angle psi" in words
@@ -125,34 +125,40 @@ def test_the_page_says_verdict_and_evidence(diagnosis: Diagnosis) -> None:
         assert note in words
 
 
-def test_records_that_were_scored_come_first_and_open(diagnosis: Diagnosis) -> None:
-    records = Page(render(diagnosis)).all("details")
+def test_records_that_were_scored_come_first_and_open(page_of: Callable[[str], str]) -> None:
+    records = Page(page_of("effect")).all("details")
     assert ["open" in attrs for attrs in records] == [True, True, False]
 
 
-def test_parameters_without_a_fit_come_from_the_model(variant: Callable[[str], Diagnosis]) -> None:
-    words = Page(render(variant("none"))).words()
+def test_parameters_without_a_fit_come_from_the_model(page_of: Callable[[str], str]) -> None:
+    words = Page(page_of("none")).words()
     assert "J_z 0.5612 kg m 2 yaw inertia of the axle bridge" in words
 
 
-def test_long_records_make_no_heavy_page(variant: Callable[[str], Diagnosis]) -> None:
-    assert len(render(variant("long")).encode()) < 3_000_000
+def test_long_records_make_no_heavy_page(page_of: Callable[[str], str]) -> None:
+    assert len(page_of("long").encode()) < 3_000_000
 
 
-def test_a_browser_opens_the_page(diagnosis: Diagnosis, tmp_path: Path) -> None:
-    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("no Chromium here; the page was checked as text only")
-    (tmp_path / "report.html").write_text(render(diagnosis), encoding="utf-8")
-    picture = tmp_path / "page.png"
-    run = subprocess.run(
-        [
-            browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--enable-logging=stderr",
-            "--disable-background-networking", "--disable-component-update", "--disable-sync",
-            f"--user-data-dir={tmp_path / 'profile'}", f"--screenshot={picture}", "--window-size=1200,2000",
-            f"file://{tmp_path / 'report.html'}",
-        ],
-        capture_output=True, text=True, timeout=90, check=False,
-    )  # fmt: skip
-    assert picture.stat().st_size > 50_000
-    assert "CONSOLE" not in run.stderr
+def test_the_page_says_what_to_measure_next_and_what_the_records_show(
+    page_of: Callable[[str], str],
+) -> None:
+    words = Page(page_of("advised")).words()
+    assert "To tell Coulomb friction apart, drive a sweep of amplitude 1.25 A from 0.5 to 40 rad/s" in words
+    assert (
+        "No experiment of the menu tells Stribeck friction apart: the best, a sine of amplitude 0.5 A at 3 rad/s"
+        in words
+    )
+    assert (
+        "all.csv, psi clipping, a fault Channel psi stands still at its ends. Widen its range. 40 %" in words
+    )
+    assert "all records quantization Steps of psi are coarse. Use a finer sensor. not measured" in words
+    assert "u \u2192 psi changes with the amplitude" in words
+
+
+def test_parameters_have_intervals_inside_their_own_range(page_of: Callable[[str], str]) -> None:
+    words = Page(page_of("effect")).words()
+    assert "J_z 0.5612 \u00b1 0.0021 0.5571 to 0.5653 kg m 2" in words
+    assert (
+        "k_3 (\u22123.100 \u00b1 0.020) \u00b7 10 5 \u22123.139 \u00b7 10 5 to \u22123.061 \u00b7 10 5"
+        in words
+    )

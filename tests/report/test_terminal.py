@@ -24,8 +24,11 @@ def test_ten_lines_say_verdict_gap_ranking_and_parameters(diagnosis: Diagnosis) 
     text = "\n".join(lines)
     assert "Missing effect: rear axle, March" in text
     assert "down to 1.04 x the noise floor" in text
-    assert "42 % given, 13 % re-identified, 0.94 % with effect (noise floor 0.9 %)" in text
-    assert "Bouc-Wen hysteresis: probability 91 %, 1.04 x floor" in text
+    assert "42 % given, 13 % re-identified, 0.94 % after, floor 0.9 %" in text
+    assert (
+        "Bouc-Wen hysteresis 91 % (1.04 x floor); Coulomb friction and cubic stiffness 6 % (1.06 x floor)"
+        in text
+    )
     assert "beta = 1203 +/- 31 1/rad" in text
     assert "k_c" not in text, "the rig's own numbers are for the report"
     assert "gamma = not determined by these records" in text
@@ -49,3 +52,10 @@ def test_a_title_that_the_terminal_cannot_write_does_no_harm(diagnosis: Diagnosi
 
 def test_a_narrow_terminal_wraps(diagnosis: Diagnosis) -> None:
     assert max(map(len, printed(diagnosis, width=60))) <= 60
+
+
+def test_one_experiment_is_named_and_the_rest_left_to_the_report(variant: Callable[[str], Diagnosis]) -> None:
+    text = "\n".join(printed(variant("advised")))
+    assert "To tell Coulomb friction apart, drive a sweep of amplitude 1.25 A from 0.5 to 40 rad/s" in text
+    assert "differ by 23 standard deviations of the noise" in text
+    assert "Stribeck friction apart" not in text

@@ -87,6 +87,9 @@ def test_the_example_wins_against_its_nearest_relatives(campaign: Path, tmp_path
     found = diagnosis.candidates[0].parameters["k_5"]
     assert found.unit == "N/m^5"
     assert found.value == pytest.approx(VALUES["k_5"], abs=4 * found.std)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert quintic.summary in page
+    assert "<mn>5</mn></msup>" in page, "the report shows the declared torque"
     model = json.loads((out / "model.json").read_text())
     assert model["effects"] == ["quintic_stiffness"]
     with pytest.raises(InputError, match=r"'quintic_stiffness' is unknown.*--effects FILE"):

@@ -16,6 +16,7 @@ from rigsight.plot.drawing import (
     OTHER,
     REIDENTIFIED,
     WITH_EFFECT,
+    envelope,
     in_style,
     line,
     new_figure,
@@ -27,9 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_WIDTH = 5.4
+"""Inch; on a phone, where it is scaled to the screen, letters stay readable."""
 _DETAIL_PERIODS = 5.0
 _DETAIL_SHARE = 1.0 / 12.0
 _DETAIL_MIN_SAMPLES = 60
+_BINS = 250
+"""Bins of a line in print, where the axis of a whole record is some 110 mm wide."""
 
 
 def detail_window(trace: Trace, output: str) -> slice:
@@ -67,7 +72,7 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | 
         Panel title by output; default is its name.
     """
     outputs = list(diagnosis.gap)
-    figure = new_figure(6.8, 0.45 + 1.75 * max(1, len(outputs)))
+    figure = new_figure(_WIDTH, 0.45 + 1.75 * max(1, len(outputs)))
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
     for ax, output in zip(axes, outputs, strict=False):
         gap = diagnosis.gap[output]
@@ -97,7 +102,7 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | 
         ax.set_title((labels or {}).get(output, output), pad=14)
         ax.grid(axis="x")
         ax.set_axisbelow(True)
-    axes[-1].set_xlabel("gap as NRMSE [% of the measured RMS about its mean]")
+    axes[-1].set_xlabel("gap as NRMSE [% of the measured RMS]")
     return figure
 
 
@@ -128,7 +133,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         Candidates drawn, best first.
     """
     candidates = diagnosis.candidates[:limit]
-    figure = new_figure(6.8, 0.95 + 0.27 * max(1, len(candidates)))
+    figure = new_figure(_WIDTH, 0.95 + 0.27 * max(1, len(candidates)))
     ax = figure.subplots()
     finite = [c.excess for c in candidates if np.isfinite(c.excess) and c.excess > 0.0]
     left, right = min([1.0, *finite]) / 1.04, max([1.5, *finite])
@@ -155,13 +160,19 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")
     ax.set_axisbelow(True)
-    ax.set_xlabel("RMS left over, in units of the noise floor (dashed: 1, a perfect model)")
+    ax.set_xlabel("RMS left over / noise floor (dashed: 1, perfect)")
     return figure
 
 
 @in_style
 def comparison(
-    diagnosis: Diagnosis, trace: Trace, output: str, window: slice | None = None, after_label: str = "after"
+    diagnosis: Diagnosis,
+    trace: Trace,
+    output: str,
+    window: slice | None = None,
+    after_label: str = "after",
+    before_label: str = "given simulation",
+    marked: slice | None = None,
 ) -> Figure:
     """Draw measured against simulated, given and after, with the residuals below.
 
@@ -175,8 +186,10 @@ def comparison(
         Name of the output.
     window
         Samples to draw; all where None.
-    after_label
-        What the simulation after the diagnosis is called in the legend.
+    after_label, before_label
+        What the simulations after and before the diagnosis are called in the legend.
+    marked
+        Samples to mark with a bar in a drawing of the whole record.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -198,11 +211,11 @@ def comparison(
     figure.subplots_adjust(
         left=0.66 / width, right=1.0 - 0.14 / width, bottom=0.46 / height, top=1.0 - 0.34 / height, hspace=0.1
     )
-    line(top, t, measured * factor, MEASURED, "measured", linewidth=2.6, alpha=0.55)
-    line(top, t, before * factor, GIVEN, "given simulation", linewidth=1.0, linestyle=(0, (5, 1.6)))
-    line(top, t, after * factor, WITH_EFFECT, after_label, linewidth=1.0)
-    line(bottom, t, residuals[0] * residual_factor, GIVEN, linewidth=0.8)
-    line(bottom, t, residuals[1] * residual_factor, WITH_EFFECT, linewidth=0.8)
+    line(top, *_printed(t, measured * factor), MEASURED, "measured", linewidth=2.6, alpha=0.55)
+    line(top, *_printed(t, before * factor), GIVEN, before_label, linewidth=1.0, linestyle=(0, (5, 1.6)))
+    line(top, *_printed(t, after * factor), WITH_EFFECT, after_label, linewidth=1.0)
+    line(bottom, *_printed(t, residuals[0] * residual_factor), GIVEN, linewidth=0.8)
+    line(bottom, *_printed(t, residuals[1] * residual_factor), WITH_EFFECT, linewidth=0.8)
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), None)
     if floor is not None and np.isfinite(floor):
         bottom.axhspan(
@@ -218,8 +231,15 @@ def comparison(
         ax.yaxis.set_label_coords(-0.5 / (width - 0.8), 0.5)
     if not window:
         figure.legend(loc="upper left", ncols=3, fontsize=8.5, handlelength=2.2, columnspacing=1.4)
-        _mark_detail(top, trace, detail_window(trace, output))
+    if marked is not None:
+        _mark_detail(top, trace, marked)
     return figure
+
+
+def _printed(
+    t: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return envelope(t, np.where(np.isfinite(values), values, np.nan), _BINS)
 
 
 def _mark_detail(ax: Axes, trace: Trace, window: slice) -> None:

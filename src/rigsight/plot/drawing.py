@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
@@ -112,7 +111,7 @@ def display_scale(unit: str, size: float) -> DisplayScale:
 def envelope(
     t: NDArray[np.float64], values: NDArray[np.float64], n_bins: int = _ENVELOPE_BINS
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a shorter line with the same picture: lowest and highest sample of each bin, in their order in time.
+    """Return a shorter line with the same picture: lowest and highest finite sample of each bin, in their order in time.
 
     Parameters
     ----------
@@ -128,15 +127,15 @@ def envelope(
     """
     if values.size <= 2 * n_bins:
         return t, values
-    edges = np.linspace(0, values.size, n_bins + 1).astype(int)
-    keep: list[int] = []
-    for start, stop in pairwise(edges):
-        part = values[start:stop]
-        if not np.any(np.isfinite(part)):
-            keep.append(int(start))
-            continue
-        low, high = int(np.nanargmin(part)), int(np.nanargmax(part))
-        keep += [int(start) + i for i in sorted({low, high})]
+    size = -(-values.size // n_bins)
+    padded = np.full(-(-values.size // size) * size, np.nan)
+    padded[: values.size] = values
+    bins = padded.reshape(-1, size)
+    finite = np.isfinite(bins)
+    # Of a bin without a number the first sample stays: the gap is seen.
+    low = np.where(finite, bins, np.inf).argmin(axis=1)
+    high = np.where(finite, bins, -np.inf).argmax(axis=1)
+    keep = np.unique(size * np.arange(low.size)[:, None] + np.column_stack([low, high]))
     return t[keep], values[keep]
 
 

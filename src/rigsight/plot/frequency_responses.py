@@ -98,13 +98,15 @@ def bode(panels: Sequence[Panel]) -> Figure:
 
 
 @in_style
-def overlaid_responses(columns: Sequence[Sequence[Panel]]) -> Figure:
+def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "fitted") -> Figure:
     """Draw the magnitudes of several records over each other: measured as lines, fitted dashed in the same color.
 
     Parameters
     ----------
     columns
         One sequence of panels per path, in the order of the amplitudes; their titles name the path, their labels the record.
+    fitted_label
+        What the dashed lines are called.
     """
     figure = new_figure(4.6 * len(columns) + (1.4 if len(columns) == 1 else 0.0), 4.0)
     axes = figure.subplots(1, len(columns), squeeze=False)[0]
@@ -137,17 +139,17 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]]) -> Figure:
         ax.set_ylabel(f"magnitude [dB re 1 {panels[0].measured.unit}]")
         ax.set_xlabel("angular frequency [rad/s]")
         ax.grid()
-    axes[0].plot([], [], color=FLOOR, linewidth=1.4, linestyle=(0, (4, 2)), label="fitted")
+    axes[0].plot([], [], color=FLOOR, linewidth=1.4, linestyle=(0, (4, 2)), label=fitted_label)
     handles, names = axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper left", ncols=min(len(names), 6), fontsize=8.5)
     return figure
 
 
-def thinned(measured: FrequencyResponse) -> FrequencyResponse:
-    """Return about as many lines as the eye can tell apart on a logarithmic axis."""
-    if measured.omega.size <= _MOST_LINES:
+def thinned(measured: FrequencyResponse, most_lines: int = _MOST_LINES) -> FrequencyResponse:
+    """Return at most this many lines, by default about as many as the eye can tell apart on a logarithmic axis."""
+    if measured.omega.size <= most_lines:
         return measured
-    wished = np.geomspace(measured.omega[0], measured.omega[-1], _MOST_LINES)
+    wished = np.geomspace(measured.omega[0], measured.omega[-1], most_lines)
     kept = np.zeros(measured.omega.size, dtype=np.bool_)
     kept[np.minimum(np.searchsorted(measured.omega, wished), measured.omega.size - 1)] = True
     return measured.at(kept)

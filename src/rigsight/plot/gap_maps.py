@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH = 5.8
+_WIDTH = 5.4
 _DASHES = (0, (4, 2))
 _PERCENT = 100.0
 _SHADES = 15

@@ -22,6 +22,8 @@ _REFERENCE = re.compile(r'(url\(#|xlink:href="#)([^")]+)')
 _NOISE = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->", re.DOTALL)
 _NAMESPACES = re.compile(r' xmlns(:xlink)?="[^"]*"')
 _SIZE = re.compile(r'(<svg\b[^>]*?) width="[^"]*"([^>]*?)')
+_PATH = re.compile(r'(?<=\bd=")[^"]+')
+_DIGITS = re.compile(r"(\.\d\d)\d+")
 _HEIGHT = re.compile(r'(<svg\b[^>]*?) height="[^"]*"')
 
 
@@ -71,6 +73,8 @@ def _svg(figure: Figure, key: str, alt: str) -> Markup:
     text = _ID.sub(rf'id="{key}-\1"', text)
     text = _REFERENCE.sub(rf"\g<1>{key}-\2", text).replace("xlink:href", "href")
     text = _HEIGHT.sub(r"\1", _SIZE.sub(r"\1\2", text, count=1), count=1)
+    # A hundredth of a point is finer than any screen or printer; matplotlib writes a millionth.
+    text = _PATH.sub(lambda path: _DIGITS.sub(r"\1", path[0]), text)
     # The page's own sans serif face, where DejaVu is missing.
     text = text.replace("'DejaVu Sans'", "'DejaVu Sans', Verdana, sans-serif")
     label = escape(alt)

@@ -52,6 +52,17 @@ def written(value: float, std: float | None = None) -> Written:
     return Written(f"{value * scale:.{decimals}f}", f"{std * scale:.{decimals}f}", exponent)
 
 
+def written_limits(low: float, high: float, std: float) -> tuple[Written, Written]:
+    """Return the limits of an interval with two significant digits of the standard error, both with the same power of ten."""
+    size = max(abs(low), abs(high))
+    power = math.floor(math.log10(size)) if size > 0.0 else 0
+    exponent = power if power >= 5 or power <= -4 else 0
+    scale = 10.0**-exponent
+    decimals = min(max(0, 1 - math.floor(math.log10(std * scale))), 9)
+    first, last = (Written(f"{limit * scale:.{decimals}f}", "", exponent) for limit in (low, high))
+    return first, last
+
+
 def estimate_text(estimate: Estimate) -> str:
     """Return an estimate in ASCII, e.g. ``"81.2 +/- 1.3 N m/rad"``."""
     number = written(estimate.value, estimate.std)

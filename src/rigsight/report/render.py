@@ -1,17 +1,26 @@
-"""A diagnosis as one self-contained HTML page: no script, no network, nothing beside the file."""
+"""A diagnosis as one self-contained HTML page: no network, nothing beside the file, and readable without its script."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import base64
+import hashlib
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
+from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from rigsight.diagnose.result import Diagnosis
+from rigsight.effects import Effect
 from rigsight.report import location, sections
+from rigsight.report.equations import equation_groups, known_effects
 from rigsight.report.quantities import Written
+from rigsight.report.record_views import record_views
+from rigsight.report.response_charts import amplitude_figures
+from rigsight.report.responses import record_responses
 from rigsight.report.wording import (
+    advice_sentences,
     after_label,
     ambiguity_sentence,
     basis_sentence,
@@ -24,9 +33,15 @@ from rigsight.report.wording import (
     verdict_sentence,
 )
 
+_SCRIPT = files("rigsight.report") / "templates" / "chart.js"
+
 
 def render_report(
-    diagnosis: Diagnosis, command: str, versions: Mapping[str, str], seed: int | None = None
+    diagnosis: Diagnosis,
+    command: str,
+    versions: Mapping[str, str],
+    seed: int | None = None,
+    own_effects: Iterable[Effect] = (),
 ) -> str:
     """Return the report as one HTML page.
 
@@ -40,7 +55,12 @@ def render_report(
         Package -> version, as in ``{"rigsight": "0.1.0", "numpy": "2.0.0"}``.
     seed
         Seed of everything random; None where nothing was.
+    own_effects
+        Effects beside those of the catalogue that the simulation may have.
     """
+    known = known_effects(own_effects)
+    responses = {trace.record: record_responses(diagnosis, trace) for trace in diagnosis.traces}
+    script = _SCRIPT.read_text(encoding="utf-8")
     return (
         environment()
         .get_template("report.html.jinja")
@@ -52,7 +72,7 @@ def render_report(
             basis_sentence=basis_sentence(diagnosis),
             after_label=sentence_case(after_label(diagnosis)),
             rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
-            effects=sections.effect_summaries(diagnosis),
+            effects=sections.effect_summaries(diagnosis, known),
             left=[times_floor(excess(diagnosis, stage)) for stage in ("before", "reidentified", "after")],
             probability=next(
                 (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
@@ -68,8 +88,15 @@ def render_report(
             ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
             ranking_rows=sections.ranking_rows(diagnosis),
             outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
-            parameters=sections.parameter_rows(diagnosis),
-            records=list(sections.record_views(diagnosis)),
+            parameters=sections.parameter_rows(diagnosis, known),
+            equations=equation_groups(diagnosis, known),
+            amplitude_figures=amplitude_figures(diagnosis, responses),
+            records=list(record_views(diagnosis, responses)),
+            advice=advice_sentences(diagnosis),
+            findings=sections.finding_rows(diagnosis),
+            notes=sections.other_notes(diagnosis),
+            script=Markup(f"\n{script}"),
+            script_hash=_content_hash(f"\n{script}"),
             floors=sections.floor_rows(diagnosis),
             command=command,
             versions=versions,
@@ -77,6 +104,11 @@ def render_report(
             made=datetime.now(UTC),
         )
     )
+
+
+def _content_hash(script: str) -> str:
+    """Return the name by which the page's policy allows this one script and no other."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode('utf-8')).digest()).decode('ascii')}"
 
 
 def environment() -> Environment:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from rigsight import plot
-from rigsight.diagnose.result import Diagnosis, Estimate, Trace
-from rigsight.effects import CATALOGUE, Effect
-from rigsight.metrics import nrmse
+from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.report.figures import PageFigure, page_figure
-from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written
+from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written, written_limits
 from rigsight.report.wording import (
     TIMES,
     after_label,
@@ -25,51 +24,38 @@ from rigsight.report.wording import (
 )
 from rigsight.rigs import RIGS
 
+_TWO_SIDED = 1.96
+"""Standard deviations of a 95 % interval."""
+
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One number of the diagnosed simulation."""
+    """One number of the diagnosed simulation; `interval` is its 95 % interval, empty where it was not fitted."""
 
     name: str
     description: str
     number: Written
     unit: str
     remark: str
+    interval: tuple[Written, ...] = ()
 
 
 @dataclass(frozen=True)
-class RecordView:
-    """One record: what it is, what the simulations leave of it, figures.
+class FindingRow:
+    """One thing that the records themselves say: where, what, what to do, and whether the gap may come from it."""
 
-    Attributes
-    ----------
-    key
-        Anchor in the page.
-    title, facts
-        Name, and role, kind, amplitude, length in words.
-    rows
-        Output, gap given, gap after.
-    pairs
-        Whole record and detail of each output.
-    missing
-        Outputs that the record lacks.
-    is_open
-        False for records that are folded away at first.
-    """
-
-    key: str
-    title: str
-    facts: str
-    rows: list[tuple[str, str, str]]
-    pairs: list[tuple[PageFigure, PageFigure]]
-    missing: list[str] = field(default_factory=list)
-    is_open: bool = True
+    where: str
+    kind: str
+    sentence: str
+    mend: str
+    serious: bool
+    explained: str
 
 
-def effect_summaries(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return label, catalogue name and summary of every effect named; the summary of a user's effect is empty."""
+def effect_summaries(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[tuple[str, str, str]]:
+    """Return label, name and summary of every effect named; the summary of one that is not among the known is empty."""
     return [
-        (sentence_case(effect_label(name)), name, effect.summary if (effect := _effect(name)) else "")
+        (sentence_case(effect_label(name)), name, known[name].summary if name in known else "")
         for name in diagnosis.effects
     ]
 
@@ -158,9 +144,9 @@ def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]
 
 
-def parameter_rows(diagnosis: Diagnosis) -> list[ParameterRow]:
+def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[ParameterRow]:
     """Return the numbers of the diagnosed simulation: fitted ones with their errors, else those of the model file."""
-    known = {p.name: p for p in _parameters(diagnosis)}
+    known = {p.name: p for p in _parameters(diagnosis, effects)}
     candidate = named_candidate(diagnosis)
     if candidate is not None and diagnosis.verdict in ("effect", "parameters"):
         return [
@@ -180,66 +166,18 @@ def parameter_rows(diagnosis: Diagnosis) -> list[ParameterRow]:
 def _parameter_row(name: str, estimate: Estimate, parameter: Parameter | None) -> ParameterRow:
     remark = "" if math.isfinite(estimate.std) else UNDETERMINED
     description = parameter.description if parameter else ""
-    return ParameterRow(name, description, written(estimate.value, estimate.std), estimate.unit, remark)
+    number = written(estimate.value, estimate.std)
+    return ParameterRow(name, description, number, estimate.unit, remark, _interval(estimate, parameter))
 
 
-def record_views(diagnosis: Diagnosis) -> Iterator[RecordView]:
-    """Yield the records, those that were scored first and open."""
-    ordered = sorted(diagnosis.traces, key=lambda trace: trace.role != diagnosis.scored_on)
-    for index, trace in enumerate(ordered, start=1):
-        yield RecordView(
-            key=f"record-{index}",
-            title=trace.record,
-            facts=_facts(diagnosis, trace),
-            rows=[
-                (
-                    output_label(diagnosis, output),
-                    gap_percent(nrmse(trace.before[output] - trace.measured[output], trace.measured[output])),
-                    gap_percent(nrmse(trace.after[output] - trace.measured[output], trace.measured[output])),
-                )
-                for output in trace.measured
-            ],
-            pairs=[
-                _pair(diagnosis, trace, output, f"record-{index}-output-{i}")
-                for i, output in enumerate(trace.measured, start=1)
-            ],
-            missing=[
-                output_label(diagnosis, output) for output in diagnosis.gap if output not in trace.measured
-            ],
-            is_open=trace.role == diagnosis.scored_on,
-        )
-
-
-def _pair(diagnosis: Diagnosis, trace: Trace, output: str, key: str) -> tuple[PageFigure, PageFigure]:
-    label = after_label(diagnosis)
-    window = plot.detail_window(trace, output)
-    begin, end = trace.t[window.start], trace.t[window.stop - 1]
-    what = f"{output_label(diagnosis, output)}, record {trace.record}"
-    whole = page_figure(
-        plot.comparison(diagnosis, trace, output, after_label=label),
-        f"{key}-whole",
-        f"Measured and simulated {what}, given and {label}, with the errors below.",
-        "Measured against simulated; below, what is left, with a band of twice the noise floor. "
-        "The black bar marks the detail.",
-    )
-    detail = page_figure(
-        plot.comparison(diagnosis, trace, output, window),
-        f"{key}-detail",
-        f"Detail of {what} from {begin:.4g} s to {end:.4g} s.",
-        f"Where the given simulation errs most: {begin:.4g} s to {end:.4g} s.",
-    )
-    return whole, detail
-
-
-def _facts(diagnosis: Diagnosis, trace: Trace) -> str:
-    inputs = list(trace.inputs)
-    unit = diagnosis.units.get(inputs[0], "") if inputs else ""
-    scale = plot.display_scale(unit, abs(trace.amplitude or 0.0))
-    facts = [f"{trace.role} record", trace.kind]
-    if trace.amplitude is not None:
-        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {scale.unit}".strip())
-    length = float(trace.t[-1] - trace.t[0]) if trace.t.size else 0.0
-    return ", ".join([*facts, f"{length:.4g} s", f"{trace.t.size} samples"])
+def _interval(estimate: Estimate, parameter: Parameter | None) -> tuple[Written, ...]:
+    """Return the 95 % limits, cut where the parameter's own range ends."""
+    if not (math.isfinite(estimate.value) and math.isfinite(estimate.std) and estimate.std > 0.0):
+        return ()
+    low, high = estimate.value - _TWO_SIDED * estimate.std, estimate.value + _TWO_SIDED * estimate.std
+    if parameter is not None:
+        low, high = max(low, parameter.lower), min(high, parameter.upper)
+    return tuple(written_limits(low, high, estimate.std))
 
 
 def floor_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
@@ -265,15 +203,33 @@ def output_label(diagnosis: Diagnosis, output: str) -> str:
     return meaning if meaning.startswith(output) else f"{meaning} {output}".strip()
 
 
-def _effect(name: str) -> Effect | None:
-    return next((effect for effect in CATALOGUE if effect.name == name), None)
+def finding_rows(diagnosis: Diagnosis) -> list[FindingRow]:
+    """Return what the records themselves say, in the order in which it is worth reading."""
+    if diagnosis.data_quality is None:
+        return []
+    return [
+        FindingRow(
+            where=", ".join(part for part in (finding.record or "all records", finding.signal) if part),
+            kind=finding.kind.replace("_", " "),
+            sentence=finding.sentence,
+            mend=finding.mend,
+            serious=finding.serious,
+            explained="not measured" if finding.explained is None else percent(finding.explained),
+        )
+        for finding in diagnosis.data_quality.findings
+    ]
 
 
-def _parameters(diagnosis: Diagnosis) -> Iterator[Parameter]:
+def other_notes(diagnosis: Diagnosis) -> list[str]:
+    """Return the notes that do not stand under data quality already."""
+    told = () if diagnosis.data_quality is None else diagnosis.data_quality.notes
+    return [note for note in diagnosis.notes if note not in told]
+
+
+def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[Parameter]:
     rig = RIGS.get(diagnosis.rig)
     if rig:
         yield from rig.parameters
-    for name in diagnosis.effects:
-        effect = _effect(name)
-        if effect:
-            yield from effect.parameters
+    for name in (*diagnosis.model.get("effects", ()), *diagnosis.effects):
+        if name in known:
+            yield from known[name].parameters

@@ -16,7 +16,6 @@ from rigsight.report.quantities import estimate_text, gap_percent
 from rigsight.report.wording import (
     TIMES,
     advice_sentences,
-    after_label,
     ambiguity_sentence,
     basis_sentence,
     effects_label,
@@ -27,6 +26,8 @@ from rigsight.report.wording import (
 )
 
 _RANKED = 3
+_ADVICES = 1
+"""Experiments told; the report holds all."""
 _COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
 
 
@@ -47,7 +48,7 @@ class Summary:
         yield text(verdict_sentence(diagnosis))
         if diagnosis.ambiguous_with:
             yield text(ambiguity_sentence(diagnosis))
-        for sentence in advice_sentences(diagnosis):
+        for sentence in advice_sentences(diagnosis)[:_ADVICES]:
             yield text(sentence)
         table = Table.grid(padding=(0, 2))
         for subject, words in _rows(diagnosis):
@@ -77,11 +78,10 @@ def summary(diagnosis: Diagnosis) -> Summary:
 def _rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     for output, gap in diagnosis.gap.items():
         stages = f"{gap_percent(gap.before)} given, {gap_percent(gap.reidentified)} re-identified"
-        after = f", {gap_percent(gap.after)} {after_label(diagnosis)}" if diagnosis.effects else ""
-        floor = f" (noise floor {gap_percent(gap.noise_floor)})"
-        yield f"gap in {output}", f"{stages}{after}{floor}"
-    for rank, candidate in enumerate(diagnosis.candidates[:_RANKED], start=1):
-        yield f"candidate {rank}", _candidate(candidate)
+        after = f", {gap_percent(gap.after)} after" if diagnosis.effects else ""
+        yield f"gap in {output}", f"{stages}{after}, floor {gap_percent(gap.noise_floor)}"
+    if diagnosis.candidates:
+        yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
     named = named_candidate(diagnosis)
     if named is not None and named.parameters:
         # The effect's own numbers are the news; the report and the results hold all of them.
@@ -97,6 +97,6 @@ def _rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
 
 
 def _candidate(candidate: Candidate) -> str:
-    left = f"{candidate.excess:.3g} x floor" if math.isfinite(candidate.excess) else "could not be scored"
-    unfinished = "" if candidate.success else ", fit not converged"
-    return f"{effects_label(candidate.effects)}: probability {percent(candidate.probability)}, {left}{unfinished}"
+    left = f"{candidate.excess:.3g} x floor" if math.isfinite(candidate.excess) else "not scored"
+    unfinished = "" if candidate.success else ", not converged"
+    return f"{effects_label(candidate.effects)} {percent(candidate.probability)} ({left}{unfinished})"

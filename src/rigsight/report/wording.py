@@ -177,7 +177,8 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
     unit = next(iter(diagnosis.units.values()), "")
     sentences = []
     for advice in diagnosis.advice:
-        size = f"{advice.amplitude:.3g} {unit}".strip()
+        # An axis calls the unit of its input just that.
+        size = f"amplitude {advice.amplitude:.3g} {'' if unit == 'input' else unit}".strip()
         band = ""
         if advice.band is not None:
             low, high = advice.band
@@ -185,15 +186,25 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
         rival = effects_label(advice.rival)
         if advice.separation < _SEPARATES:
             sentences.append(
-                f"No experiment of the menu separates {rival}: at most {advice.separation:.1f} standard deviations of noise "
-                f"in {advice.output}, by a {advice.waveform} of {size}{band}."
+                f"No experiment of the menu tells {rival} apart: the best, a {advice.waveform} of {size}{band}, parts the two "
+                f"predictions of {advice.output} by {_deviations(advice.separation)} of the noise."
             )
         else:
             sentences.append(
-                f"To tell {rival} apart, drive a {advice.waveform} of {size}{band}: the two predictions then differ in "
-                f"{advice.output} by {advice.separation:.3g} standard deviations of the noise."
+                f"To tell {rival} apart, drive a {advice.waveform} of {size}{band}: the two predictions of {advice.output} then "
+                f"differ by {_deviations(advice.separation)} of the noise."
             )
     return sentences
+
+
+def _deviations(separation: float) -> str:
+    if separation < 0.1:
+        return "less than 0.1 standard deviations"
+    return (
+        f"{separation:.0f} standard deviations"
+        if separation >= 10.0
+        else f"{separation:.2g} standard deviations"
+    )
 
 
 def basis_sentence(diagnosis: Diagnosis) -> str:

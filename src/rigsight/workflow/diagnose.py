@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -86,7 +86,11 @@ def run_diagnose(
         )
     if out is not None:
         write_diagnosis(
-            diagnosis, Path(out), command or f"rigsight diagnose {shlex.quote(str(campaign))}", seed
+            diagnosis,
+            Path(out),
+            command or f"rigsight diagnose {shlex.quote(str(campaign))}",
+            seed,
+            (*effects, *own_effects),
         )
     return diagnosis
 
@@ -99,8 +103,10 @@ def task_of(campaign: Campaign) -> Task:
     return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records, campaign.modelled)
 
 
-def write_diagnosis(diagnosis: Diagnosis, out: Path, command: str, seed: int) -> tuple[Path, ...]:
-    """Write the three results of a diagnosis into a folder, all or none.
+def write_diagnosis(
+    diagnosis: Diagnosis, out: Path, command: str, seed: int, effects: Iterable[Effect] = CATALOGUE
+) -> tuple[Path, ...]:
+    """Write the three results of a diagnosis into a folder, all or none; the report shows the equations of these effects.
 
     Raises
     ------
@@ -112,7 +118,9 @@ def write_diagnosis(diagnosis: Diagnosis, out: Path, command: str, seed: int) ->
         {
             DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
             MODEL_FILE: json_text(diagnosis.model),
-            REPORT_FILE: render_report(diagnosis, command=command, versions=versions(), seed=seed),
+            REPORT_FILE: render_report(
+                diagnosis, command=command, versions=versions(), seed=seed, own_effects=effects
+            ),
         },
     )
 

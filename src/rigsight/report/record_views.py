@@ -1,0 +1,218 @@
+"""What does the page show of each record? What it is, what the simulations leave of it, its curves over time and frequency."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight import plot
+from rigsight.diagnose.result import STAGES, Diagnosis, Trace
+from rigsight.metrics import nrmse
+from rigsight.report.charts import (
+    Chart,
+    ChartPanel,
+    Curve,
+    chart_data,
+    curve_names,
+    points_per_curve,
+)
+from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.quantities import gap_percent
+from rigsight.report.response_charts import response_chart
+from rigsight.report.responses import PathResponse
+from rigsight.report.sections import output_label
+from rigsight.report.wording import after_label
+
+
+@dataclass(frozen=True)
+class RecordView:
+    """One record.
+
+    Attributes
+    ----------
+    key
+        Anchor in the page.
+    title, facts
+        Name, and role, kind, amplitude, length in words.
+    rows
+        Output, gap given, gap after.
+    charts
+        Each output over time, then each signal path over frequency.
+    missing
+        Outputs that the record lacks.
+    is_open
+        False for records that are folded away at first.
+    """
+
+    key: str
+    title: str
+    facts: str
+    rows: list[tuple[str, str, str]]
+    charts: list[Chart]
+    missing: list[str] = field(default_factory=list)
+    is_open: bool = True
+
+
+def record_views(
+    diagnosis: Diagnosis, responses: Mapping[str, tuple[PathResponse, ...]]
+) -> Iterator[RecordView]:
+    """Yield the records, those that were scored first and open.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    responses
+        Frequency responses by record.
+    """
+    names = curve_names(diagnosis)
+    n_pictures = sum(len(trace.measured) for trace in diagnosis.traces)
+    most_points = points_per_curve((2 * len(names) - 1) * n_pictures)
+    ordered = sorted(diagnosis.traces, key=lambda trace: trace.role != diagnosis.scored_on)
+    for index, trace in enumerate(ordered, start=1):
+        key = f"record-{index}"
+        yield RecordView(
+            key=key,
+            title=trace.record,
+            facts=_facts(diagnosis, trace),
+            rows=[
+                (
+                    output_label(diagnosis, output),
+                    gap_percent(nrmse(-trace.residual("before", output), trace.measured[output])),
+                    gap_percent(nrmse(-trace.residual("after", output), trace.measured[output])),
+                )
+                for output in trace.measured
+            ],
+            charts=[
+                *(
+                    _time_chart(diagnosis, trace, output, names, most_points, f"{key}-output-{i}")
+                    for i, output in enumerate(trace.measured, start=1)
+                ),
+                *(
+                    response_chart(trace.record, response, names, f"{key}-path-{i}")
+                    for i, response in enumerate(responses.get(trace.record, ()), start=1)
+                ),
+            ],
+            missing=[
+                output_label(diagnosis, output) for output in diagnosis.gap if output not in trace.measured
+            ],
+            is_open=trace.role == diagnosis.scored_on,
+        )
+
+
+def _time_chart(
+    diagnosis: Diagnosis, trace: Trace, output: str, names: Mapping[str, str], most_points: int, key: str
+) -> Chart:
+    measured = np.asarray(trace.measured[output], dtype=np.float64)
+    stages = [stage for stage in STAGES if stage in names]
+    errors = {stage: -trace.residual(stage, output) for stage in stages}
+    unit = diagnosis.units.get(output, "")
+    scale = plot.display_scale(unit, float(np.max(np.abs(measured[np.isfinite(measured)]), initial=0.0)))
+    low, high = float(np.nanmin(measured)), float(np.nanmax(measured))
+    span = high - low
+    # A simulation that left the record by more than this is off the picture.
+    worst = max((_largest(error, 2.0 * span) for error in errors.values()), default=0.0)
+    error_scale = plot.display_scale(unit, worst)
+    floor = next((f.std for f in diagnosis.noise_floors if f.output == output), math.nan)
+    panels = [
+        ChartPanel(
+            _with_unit(output, scale.unit),
+            3,
+            [
+                _curve("measured", trace, measured * scale.factor, most_points),
+                *(_curve(s, trace, (measured + errors[s]) * scale.factor, most_points) for s in stages),
+            ],
+            cap=(scale.factor * (low - span), scale.factor * (high + span)),
+        ),
+        ChartPanel(
+            _with_unit("error", error_scale.unit),
+            2,
+            [_curve(s, trace, errors[s] * error_scale.factor, most_points) for s in stages],
+            cap=(-2.0 * span * error_scale.factor, 2.0 * span * error_scale.factor),
+            band=2.0 * floor * error_scale.factor if math.isfinite(floor) else None,
+        ),
+    ]
+    window = plot.detail_window(trace, output)
+    title = f"Measured and simulated {output_label(diagnosis, output)}, record {trace.record}"
+    data = chart_data(
+        title,
+        ("t", "s"),
+        panels,
+        names,
+        detail=(float(trace.t[window.start]), float(trace.t[window.stop - 1])),
+    )
+    thinned = ""
+    if measured.size > most_points:
+        thinned = (
+            f" Drawn are the lowest and highest of every {-(-measured.size // (most_points // 2))} samples."
+        )
+    caption = (
+        f"{output_label(diagnosis, output)} over time; below, simulated minus measured, with a band of twice the noise "
+        "floor."
+    )
+    return Chart(
+        key,
+        _drawings(diagnosis, trace, output, window, names, key),
+        data,
+        f"{caption[:1].upper()}{caption[1:]}{thinned}",
+    )
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit in ("", "1") else f"{name} [{unit}]"
+
+
+def _curve(of: str, trace: Trace, values: NDArray[np.float64], most_points: int) -> Curve:
+    x, y = plot.envelope(trace.t, np.where(np.isfinite(values), values, np.nan), most_points // 2)
+    return Curve(of, x, y)
+
+
+def _largest(values: NDArray[np.float64], limit: float) -> float:
+    return min(limit, float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)))
+
+
+def _drawings(
+    diagnosis: Diagnosis, trace: Trace, output: str, window: slice, names: Mapping[str, str], key: str
+) -> tuple[PageFigure, ...]:
+    """Return the static drawings: the whole record and, of records that were scored, a detail."""
+    label, before = after_label(diagnosis), names["before"]
+    is_scored = trace.role == diagnosis.scored_on
+    begin, end = trace.t[window.start], trace.t[window.stop - 1]
+    what = f"{output_label(diagnosis, output)}, record {trace.record}"
+    whole = page_figure(
+        plot.comparison(
+            diagnosis,
+            trace,
+            output,
+            after_label=label,
+            before_label=before,
+            marked=window if is_scored else None,
+        ),
+        f"{key}-whole",
+        f"Measured and simulated {what}, {before} and {label}, with the errors below.",
+        "The black bar marks the detail.",
+    )
+    if not is_scored:
+        return (whole,)
+    detail = page_figure(
+        plot.comparison(diagnosis, trace, output, window),
+        f"{key}-detail",
+        f"Detail of {what} from {begin:.4g} s to {end:.4g} s.",
+        f"Where it errs most, {before}: {begin:.4g} s to {end:.4g} s.",
+    )
+    return whole, detail
+
+
+def _facts(diagnosis: Diagnosis, trace: Trace) -> str:
+    inputs = list(trace.inputs)
+    unit = diagnosis.units.get(inputs[0], "") if inputs else ""
+    scale = plot.display_scale(unit, abs(trace.amplitude or 0.0))
+    facts = [f"{trace.role} record", trace.kind]
+    if trace.amplitude is not None:
+        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {scale.unit}".strip())
+    length = float(trace.t[-1] - trace.t[0]) if trace.t.size else 0.0
+    return ", ".join([*facts, f"{length:.4g} s", f"{trace.t.size} samples"])

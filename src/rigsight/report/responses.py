@@ -1,0 +1,103 @@
+"""What are the frequency responses of each record, measured and simulated, by one estimator?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.compare.response_error import (
+    measured_responses,
+    response_error,
+    signal_paths,
+    simulated_response,
+    without_shares,
+)
+from rigsight.diagnose.result import STAGES, Diagnosis, Trace
+from rigsight.errors import InputError
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify.record_response import Method
+from rigsight.records import Record
+from rigsight.records.record import Hold, Kind
+from rigsight.rigs import RIGS
+
+_METHOD: Method = "local_rational"
+_FEWEST_LINES = 8
+"""Lines below which there is no curve to look at."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathResponse:
+    """One signal path of one record.
+
+    Attributes
+    ----------
+    path
+        As in ``"u -> psi"``.
+    measured
+        At the lines that stand out of their noise.
+    simulated
+        Stage of the diagnosis -> its response at lines of the measured one.
+    decibel
+        Stage -> RMS of the ratio of the magnitudes, measured over simulated [dB].
+    """
+
+    path: str
+    measured: FrequencyResponse
+    simulated: Mapping[str, FrequencyResponse]
+    decibel: Mapping[str, float]
+
+
+def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, ...]:
+    """Return the responses of one record, path by path; none of a step, of an element, or where nothing stands out.
+
+    None either of records that are scored in windows: their simulations begin anew in each, and their spectra say nothing.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    trace
+        One of its records.
+    """
+    rig = RIGS.get(diagnosis.rig)
+    signals = {*trace.inputs, *trace.measured}
+    if rig is None or not rig.is_driven or diagnosis.windows is not None:
+        return ()
+    if not {rig.inputs[0].name, rig.outputs[0].name} <= signals:
+        return ()
+    paths = signal_paths(rig)
+    found = []
+    measured, _ = measured_responses(_record(diagnosis, trace, trace.measured), paths, _METHOD)
+    for path in paths:
+        own = measured.get(path.name)
+        if own is None or own.omega.size < _FEWEST_LINES:
+            continue
+        simulated: dict[str, FrequencyResponse] = {}
+        decibel: dict[str, float] = {}
+        for stage in STAGES:
+            outputs: Mapping[str, NDArray[np.float64]] = getattr(trace, stage)
+            try:
+                response = simulated_response(_record(diagnosis, trace, outputs), path, _METHOD, own)
+                decibel[stage] = response_error(own, response).decibel
+            except InputError:
+                # A simulation that left the numbers, or does not move: the other stages are still worth seeing.
+                continue
+            simulated[stage] = without_shares(response)
+        found.append(PathResponse(path.name, without_shares(own), simulated, decibel))
+    return tuple(found)
+
+
+def _record(diagnosis: Diagnosis, trace: Trace, outputs: Mapping[str, NDArray[np.float64]]) -> Record:
+    hold = diagnosis.model.get("hold")
+    return Record(
+        name=trace.record,
+        dt=trace.dt,
+        signals={**trace.inputs, **outputs},
+        units=diagnosis.units,
+        kind=cast("Kind", trace.kind),
+        hold=cast("Hold", hold) if hold in get_args(Hold) else "foh",
+    )
