@@ -21,9 +21,11 @@ import typer
 from rigsight.errors import InputError, RigsightError
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from rigsight.diagnose import Diagnosis
     from rigsight.records import ColumnMapping
-    from rigsight.workflow.progress import Listener, Step
+    from rigsight.workflow.progress import Listener
 
 BAD_INPUT, DEFECT, INTERRUPTED = 2, 1, 130
 
@@ -47,7 +49,7 @@ Jobs = Annotated[
         "-j",
         min=1,
         show_default="one per processor",
-        help="Candidates fitted, or records identified, at the same time.",
+        help="Candidates fitted, records identified or trials run at the same time.",
     ),
 ]
 OwnEffects = Annotated[
@@ -90,7 +92,7 @@ def rigsight(
 
 
 @contextlib.contextmanager
-def _told(debug: bool) -> Iterator[None]:
+def _told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code."""
     if debug:
         yield
@@ -103,7 +105,7 @@ def _told(debug: bool) -> Iterator[None]:
     except RigsightError as error:
         _leave(str(error), BAD_INPUT)
     except KeyboardInterrupt:
-        _leave("interrupted; nothing was written.", INTERRUPTED)
+        _leave(f"interrupted; {left}.", INTERRUPTED)
     except BrokenPipeError:
         raise
     except MemoryError:
@@ -232,11 +234,9 @@ def identify(
             campaign, out, method=method, resolution=resolution, n_jobs=jobs, listener=listener
         )
     if not quiet:
-        from rich.console import Console
-
         from rigsight.report import identification_summary
 
-        Console(highlight=False).print(identification_summary(identification))
+        _print(identification_summary(identification))
         for line in ("", f"Results: {out / 'identification.json'}", f"Model:   {out / 'model.json'}"):
             typer.echo(line)
 
@@ -286,11 +286,9 @@ def discover(
             listener=listener,
         )
     if not quiet:
-        from rich.console import Console
-
         from rigsight.report.discovery import discovery_summary
 
-        Console(highlight=False).print(discovery_summary(found))
+        _print(discovery_summary(found))
         for line in ("", f"Results: {out / 'discovery.json'}", f"Model:   {out / 'model.json'}"):
             typer.echo(line)
 
@@ -343,11 +341,9 @@ def compare(
             command=_command_line(),
         )
     if not quiet:
-        from rich.console import Console
-
         from rigsight.report import comparison_summary
 
-        Console(highlight=False).print(comparison_summary(comparison))
+        _print(comparison_summary(comparison))
         for line in ("", f"Page:  {out / 'comparison.html'}", f"Table: {out / 'comparison.csv'}"):
             typer.echo(line)
 
@@ -478,6 +474,49 @@ def vary(
         typer.echo(f"Pictures and numbers: {out}")
 
 
+@app.command()
+def blind(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Its folder.")] = Path("blind"),
+    trials: Annotated[
+        int | None, typer.Option(min=1, show_default="one of every cell", help="Number of trials.")
+    ] = None,
+    trial: Annotated[
+        list[int] | None,
+        typer.Option(metavar="NUMBER", show_default="all", help="Run only this trial. May be repeated."),
+    ] = None,
+    design: Annotated[
+        Literal["small", "standard"], typer.Option(help="Which list of cells is drawn from.")
+    ] = "standard",
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Diagnose drawn rigs whose effect is withheld, and score the verdicts by sealed keys.
+
+    Writes campaigns, keys and results into DIR as they are finished, and the score into DIR/blind.json. Started again, it goes
+    on where it was interrupted.
+    """
+    with _told(debug, "the same command goes on from here"), _listening(quiet) as listener:
+        from rigsight.workflow.blind import run_blind
+
+        content = run_blind(
+            out,
+            design=design,
+            trials=trials,
+            seed=seed,
+            only=trial or (),
+            n_jobs=jobs,
+            listener=listener,
+            command=_command_line(),
+        )
+    if not quiet:
+        from rigsight.report.blind import BlindSummary
+
+        _print(BlindSummary(content))
+        typer.echo(f"\nScore: {out / 'blind.json'}")
+
+
 @app.command(name="effects")
 def list_effects(
     effects: OwnEffects = None,
@@ -537,11 +576,15 @@ def _command_line() -> str:
 
 
 def _show(diagnosis: Diagnosis) -> None:
-    from rich.console import Console
-
     from rigsight.report.terminal import summary
 
-    Console(highlight=False).print(summary(diagnosis))
+    _print(summary(diagnosis))
+
+
+def _print(renderable: RenderableType) -> None:
+    from rich.console import Console
+
+    Console(highlight=False).print(renderable)
 
 
 def _show_files(out: Path, *more: str) -> None:
@@ -549,44 +592,7 @@ def _show_files(out: Path, *more: str) -> None:
         typer.echo(line)
 
 
-@contextlib.contextmanager
-def _listening(quiet: bool) -> Iterator[Listener]:
-    """Show progress on stderr: a bar on a terminal, a line per stage where the output is kept, nothing if quiet."""
-    if quiet:
-        yield lambda _: None
-    elif not sys.stderr.isatty():
-        yield _say_stage
-    else:
-        with _bar() as listener:
-            yield listener
+def _listening(quiet: bool) -> contextlib.AbstractContextManager[Listener]:
+    from rigsight.workflow.progress_display import listening
 
-
-def _say_stage(step: Step) -> None:
-    if step.done == 0:
-        typer.echo(f"{step.stage} ...", err=True)
-
-
-@contextlib.contextmanager
-def _bar() -> Iterator[Listener]:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[detail]}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        tasks = {}
-        # The first seconds go into importing numba and sympy: say that something happens.
-        starting = progress.add_task("Starting", total=None, detail="")
-
-        def listener(step: Step) -> None:
-            progress.update(starting, visible=False)
-            if step.stage not in tasks:
-                tasks[step.stage] = progress.add_task(step.stage, total=step.total, detail="")
-            progress.update(tasks[step.stage], completed=step.done, total=step.total, detail=step.detail)
-
-        yield listener
+    return listening(quiet)

@@ -1,0 +1,12 @@
+"""Rigs whose effect is withheld: drawn, simulated by an integrator of their own, and scored by a key."""
+
+from rigsight.blind.draw import Trial as Trial
+from rigsight.blind.draw import draw_trial as draw_trial
+from rigsight.blind.outside import OUTSIDE as OUTSIDE
+from rigsight.blind.plant import Plant as Plant
+from rigsight.blind.score import Outcome as Outcome
+from rigsight.blind.score import outcome as outcome
+from rigsight.blind.score import summary as summary
+from rigsight.blind.subjects import Design as Design
+from rigsight.blind.subjects import n_trials as n_trials
+from rigsight.blind.subjects import subject_of as subject_of

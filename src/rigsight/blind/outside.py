@@ -1,0 +1,149 @@
+"""Which effects does the catalogue not hold? A diagnosis that meets one of them should say `unknown`.
+
+Four resemble nothing in the catalogue: a stiffness that pulsates, a drive that weakens as it warms up, one whose gain depends on
+the displacement, a sensor that drifts. Six resemble something: each has the sign, symmetry and loss of a catalogue effect, but
+another law. None of them becomes a catalogue equation, alone or with other linear parameters, for any value drawn here (a van
+der Pol term, for instance, is position-dependent damping beside less viscous damping, and friction of one direction is Coulomb
+friction beside an offset: they are not in).
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from rigsight.effects import Effect
+from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
+from rigsight.effects.symbols import k, reading, t, u, v, x
+from rigsight.parameters import Parameter
+
+_strength, _rate, _time, _reach, _phase, _memory = sp.symbols(
+    "strength rate settling reach phase memory", real=True
+)
+_RISES = Signature(GainTrend.RISES)
+_STEADY = Signature(GainTrend.STEADY)
+
+
+def _strength_of(description: str, dimension: str, *starts: float) -> Parameter:
+    return Parameter("strength", description, dimension, null=0.0, starts=starts)
+
+
+PULSATING_STIFFNESS = Effect(
+    name="pulsating_stiffness",
+    place=Place.DYNAMICS,
+    summary="The stiffness rises and falls with its own period (parametric excitation).",
+    parameters=(
+        _strength_of("relative change of the stiffness", "", 0.15, 0.3),
+        Parameter("rate", "its angular frequency", "time^-1", starts=(0.4, 1.3)),
+    ),
+    energy=Energy.ACTIVE,
+    signature=_STEADY,
+    torque=_strength * k * x * sp.sin(_phase),
+    states=(State(_phase, _rate, ""),),
+)
+FADING_DRIVE = Effect(
+    name="fading_drive",
+    place=Place.ACTUATOR,
+    summary="The drive weakens as it warms up during a record.",
+    parameters=(
+        _strength_of("share of the drive that is lost", "", 0.2, 0.4),
+        Parameter("settling", "time constant of warming up", "time", starts=(60.0, 200.0)),
+    ),
+    energy=Energy.ACTIVE,
+    signature=_STEADY,
+    drive=u * (1 - _strength * (1 - sp.exp(-t / _time))),
+)
+DRIVE_OVER_POSITION = Effect(
+    name="drive_over_position",
+    place=Place.ACTUATOR,
+    summary="The drive is weaker away from the middle.",
+    parameters=(_strength_of("loss per squared displacement", "x^-2", 0.2, 0.5),),
+    energy=Energy.ACTIVE,
+    signature=_RISES,
+    drive=u * (1 - _strength * x**2),
+)
+DRIFTING_SENSOR = Effect(
+    name="drifting_sensor",
+    place=Place.SENSOR,
+    summary="The displacement's sensor drifts as long as a record lasts.",
+    parameters=(_strength_of("drift per time", "x time^-1", 0.0005, 0.001),),
+    energy=Energy.ACTIVE,
+    signature=_STEADY,
+    measured=reading + _strength * t,
+)
+BROKEN_POWER_STIFFNESS = Effect(
+    name="broken_power_stiffness",
+    place=Place.DYNAMICS,
+    summary="A second spring, as of a contact, whose force grows with the power 1.5 of the deflection.",
+    parameters=(
+        _strength_of("stiffness of the contact", "force x^-1", 0.5, 1.0),
+        Parameter("reach", "deflection at which it has that stiffness", "x", starts=(1.0,)),
+    ),
+    energy=Energy.CONSERVATIVE,
+    signature=Signature(GainTrend.FALLS),
+    torque=_strength * x * sp.sqrt(sp.Abs(x)) / sp.sqrt(_reach),
+)
+MAXWELL_BRANCH = Effect(
+    name="maxwell_branch",
+    place=Place.DYNAMICS,
+    summary="Beside the spring, another one in series with a damper: rubber that relaxes.",
+    parameters=(
+        _strength_of("stiffness of the branch", "force x^-1", 0.3, 0.8),
+        Parameter("settling", "relaxation time", "time", starts=(0.5, 2.0)),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=_STEADY,
+    torque=_strength * _memory,
+    states=(State(_memory, v - _memory / _time, "x"),),
+)
+CUBIC_DAMPING = Effect(
+    name="cubic_damping",
+    place=Place.DYNAMICS,
+    summary="Damping that grows with the cube of the speed.",
+    parameters=(_strength_of("drag coefficient", "force time^3 x^-3", 0.2, 0.6),),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(GainTrend.FALLS),
+    torque=_strength * v**3,
+)
+STRUCTURAL_DAMPING = Effect(
+    name="structural_damping",
+    place=Place.DYNAMICS,
+    summary="A resistance that grows with the deflection and opposes the motion, whatever its speed.",
+    parameters=(_strength_of("share of the stiffness", "force x^-1", 0.1, 0.25),),
+    energy=Energy.DISSIPATIVE,
+    signature=_STEADY,
+    torque=_strength * sp.Abs(x) * sp.sign(v),
+)
+DRIVE_OVER_SPEED = Effect(
+    name="drive_over_speed",
+    place=Place.ACTUATOR,
+    summary="The drive is weaker the faster the rig moves, either way.",
+    parameters=(_strength_of("loss per speed", "x^-1 time", 0.2, 0.5),),
+    energy=Energy.ACTIVE,
+    signature=_RISES,
+    drive=u * (1 - _strength * sp.Abs(v)),
+)
+FRICTION_ON_ONE_SIDE = Effect(
+    name="friction_on_one_side",
+    place=Place.DYNAMICS,
+    summary="Dry friction that acts on one side of the middle only.",
+    parameters=(_strength_of("friction", "drive", 0.1, 0.2),),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(GainTrend.RISES, even_harmonics=True),
+    torque=_strength * sp.sign(v) * (1 + sp.sign(x)) / 2,
+)
+
+UNLIKE_THE_CATALOGUE: tuple[Effect, ...] = (
+    PULSATING_STIFFNESS,
+    FADING_DRIVE,
+    DRIVE_OVER_POSITION,
+    DRIFTING_SENSOR,
+)
+LIKE_THE_CATALOGUE: tuple[Effect, ...] = (
+    BROKEN_POWER_STIFFNESS,
+    MAXWELL_BRANCH,
+    CUBIC_DAMPING,
+    STRUCTURAL_DAMPING,
+    DRIVE_OVER_SPEED,
+    FRICTION_ON_ONE_SIDE,
+)
+OUTSIDE: tuple[Effect, ...] = UNLIKE_THE_CATALOGUE + LIKE_THE_CATALOGUE

@@ -1,0 +1,108 @@
+"""Which numbers does a hidden effect get, so that it leaves a gap of the wished size?
+
+The shape (which effect, which proportions) comes from the effect's own declaration; the strength is then scaled until the linear
+equations, identified anew on two sweeps, leave the wished multiple of the noise floor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from rigsight.effects import Effect
+from rigsight.errors import SimulationError
+from rigsight.units import characteristic_value
+
+_STRONGEST = 1.5
+"""Most that a strength may exceed the strongest start value of the effect's declaration."""
+_LIMITS = {"drive": 0.2, "input": 0.2}
+"""Friction and dead zones beyond this share of the largest drive would stop the rig on its smallest sweep."""
+_NEVER = 1e300
+"""A null value that stands for an unreachable threshold."""
+_TRIALS = 7
+_CLOSE = 0.15
+_SMALLEST = 1e-5
+
+
+def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
+    """Return a value for each of the effect's parameters by its own name, at full strength."""
+    shape: dict[str, float] = {}
+    for p in effect.parameters:
+        spread = math.exp(rng.uniform(-0.4, 0.4))
+        if p.starts and p.fitted:
+            start = p.starts[int(rng.integers(len(p.starts)))]
+            shape[p.name] = start * characteristic_value(p.dimension, scales) * spread
+        else:
+            assert p.default is not None
+            shape[p.name] = p.default
+        shape[p.name] = min(max(shape[p.name], p.lower), p.upper)
+        if p.null == 1.0:
+            shape[p.name] = rng.uniform(0.1, 0.5)
+        if p.name in effect.special_cases:
+            shape[p.name] = effect.special_cases[p.name] * (
+                1.0 if rng.random() < 0.5 else rng.uniform(1.2, 2.5)
+            )
+    for pair in effect.searched_as:
+        dimension = next(p.dimension for p in effect.parameters if p.name == pair.first)
+        unit = characteristic_value(dimension, scales)
+        total = unit * math.exp(rng.uniform(math.log(1.5), math.log(12.0)))
+        difference = unit * math.exp(rng.uniform(math.log(1.5), math.log(20.0)))
+        shape[pair.first], shape[pair.second] = 0.5 * (total + difference), 0.5 * (total - difference)
+    if {"T_c", "T_s"} <= shape.keys():
+        # Friction that grows with speed would be no Stribeck friction.
+        shape["T_s"] = shape["T_c"] * rng.uniform(1.25, 2.0)
+    return shape
+
+
+def scaled(
+    effect: Effect, shape: Mapping[str, float], strength: float, scales: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the parameters of an effect between its null (strength 0) and its full shape (1), or beyond."""
+    values = dict(shape)
+    for p in effect.parameters:
+        if p.null is None:
+            continue
+        if p.null >= _NEVER:
+            values[p.name] = shape[p.name] / strength
+        elif p.null == 1.0:
+            values[p.name] = max(1.0 - strength * (1.0 - shape[p.name]), 0.02)
+        else:
+            limit = _LIMITS.get(p.dimension, math.inf) * characteristic_value(p.dimension, scales)
+            values[p.name] = min(strength * shape[p.name], limit)
+    return values
+
+
+def strength_for(gap: Callable[[float], float], wished: float) -> float:
+    """Return the strength at which a gap is near the wished size, or the strongest that is allowed.
+
+    Parameters
+    ----------
+    gap
+        Gap over strength, rising; raises `SimulationError` where the plant cannot be simulated.
+    wished
+        The gap to reach.
+    """
+    low, high = _SMALLEST, _STRONGEST
+    strength, best = 0.3, (math.inf, _SMALLEST)
+    for _ in range(_TRIALS):
+        try:
+            reached = gap(strength)
+        except SimulationError:
+            reached = math.inf
+        distance = abs(math.log(max(reached, 1e-12) / wished)) if math.isfinite(reached) else math.inf
+        best = min(best, (distance, strength))
+        if distance < _CLOSE or (strength >= _STRONGEST and reached < wished):
+            break
+        if reached > wished:
+            high = min(high, strength)
+        else:
+            low = max(low, strength)
+        # A gap in proportion to the strength is the rule; a threshold needs bisection.
+        step = strength * wished / reached if 0.0 < reached < math.inf else 0.5 * strength
+        inside = low < step < high
+        strength = (
+            step if inside else (high if high == _STRONGEST and reached < wished else math.sqrt(low * high))
+        )
+    return best[1]

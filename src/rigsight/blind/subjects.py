@@ -1,0 +1,127 @@
+"""What is hidden in which trial? A fixed list of cells, shuffled by the seed: nothing follows from a trial's number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from rigsight.blind.outside import OUTSIDE
+from rigsight.effects import CATALOGUE, Effect, Place, effect_named
+from rigsight.errors import check_option
+
+Kind = Literal["single", "pair", "none", "parameters", "outside"]
+Tier = Literal["faint", "clear", "strong"]
+Noise = Literal["low", "high"]
+Design = Literal["small", "standard"]
+
+TIERS: dict[Tier, tuple[float, float]] = {"faint": (1.5, 5.0), "clear": (5.0, 20.0), "strong": (20.0, 80.0)}
+"""Gap that the re-identified equations leave, in units of the noise floor."""
+NOISES: tuple[Noise, ...] = ("low", "high")
+_COUNTS: dict[Design, dict[str, int]] = {
+    "small": {"pair": 24, "none": 8, "parameters": 8, "outside": 3},
+    "standard": {"pair": 60, "none": 24, "parameters": 24, "outside": 6},
+}
+"""Trials of each kind besides three strengths at two noise levels of each single effect; outside: of each effect."""
+_HYSTERESES = frozenset({"bouc_wen_hysteresis", "iwan_hysteresis"})
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What one trial hides.
+
+    Attributes
+    ----------
+    kind
+        A single effect of the catalogue, two of them, none, wrong parameters, or an effect from outside.
+    effects
+        Names; empty where there is none.
+    tier
+        Strength that is aimed for; None where there is no effect.
+    noise
+        Noise level.
+    """
+
+    kind: Kind
+    effects: tuple[str, ...]
+    tier: Tier | None
+    noise: Noise
+
+
+def subject_of(design: Design, seed: int, trial: int) -> Subject:
+    """Return what a trial hides; every pass over the list of cells is shuffled anew.
+
+    Raises
+    ------
+    InputError
+        If there is no such design.
+    """
+    cells = _cells(design)
+    cycle, place = divmod(trial, len(cells))
+    rng = np.random.default_rng([seed, cycle])
+    cell = cells[int(rng.permutation(len(cells))[place])]
+    if cell.kind == "pair":
+        own = np.random.default_rng([seed, cycle, place])
+        return Subject("pair", _pair(own), cell.tier, cell.noise)
+    return cell
+
+
+def n_trials(design: Design) -> int:
+    """Return the number of trials of one pass."""
+    return len(_cells(design))
+
+
+def hidden_effects(subject: Subject) -> tuple[Effect, ...]:
+    """Return the effects that a trial hides."""
+    outside = {effect.name: effect for effect in OUTSIDE}
+    return tuple(outside[name] if name in outside else effect_named(name) for name in subject.effects)
+
+
+def _cells(design: Design) -> list[Subject]:
+    counts = _COUNTS[check_option("The design", design, get_args(Design))]  # type: ignore[index]
+    tiers: tuple[Tier, ...] = tuple(TIERS)
+    cells = [
+        Subject("single", (effect.name,), tier, noise)
+        for effect in CATALOGUE
+        for tier in tiers
+        for noise in NOISES
+    ]
+    # A pair is two clear effects: of a faint one beside another nobody can say more than of a faint one alone.
+    cells += [Subject("pair", (), tiers[1 + i % 2], NOISES[i // 2 % 2]) for i in range(counts["pair"])]
+    cells += [Subject("none", (), None, NOISES[i % 2]) for i in range(counts["none"])]
+    cells += [Subject("parameters", (), None, NOISES[i % 2]) for i in range(counts["parameters"])]
+    cells += [
+        Subject("outside", (effect.name,), tiers[i % 3], NOISES[(i + number) % 2])
+        for number, effect in enumerate(OUTSIDE)
+        for i in range(counts["outside"])
+    ]
+    return cells
+
+
+def _pair(rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw two effects of which neither contains the other."""
+    while True:
+        first, second = rng.choice(len(CATALOGUE), 2, replace=False)
+        pair = CATALOGUE[int(first)], CATALOGUE[int(second)]
+        if _tells_apart(*pair):
+            return tuple(sorted(effect.name for effect in pair))
+
+
+def _tells_apart(first: Effect, second: Effect) -> bool:
+    related = first.name in second.parents or second.name in first.parents
+    both_hysteresis = {first.name, second.name} <= _HYSTERESES
+    # The weight's sine needs an axis that swings wide, the wheel and the second sensor a running gear.
+    names = {first.name, second.name}
+    other_rig = "gravity_pendulum" in names and any(needs_running_gear(e) for e in (first, second))
+    return not (related or both_hysteresis or other_rig)
+
+
+def needs_running_gear(effect: Effect) -> bool:
+    """Return True if only a running gear shows the effect for what it is.
+
+    On a rig with one output a sensor that is late is a drive that is late.
+    """
+    return effect.place in (Place.LATERAL_DYNAMICS, Place.SENSOR) and effect.name in {
+        e.name for e in CATALOGUE
+    }

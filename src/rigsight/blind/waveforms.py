@@ -1,0 +1,146 @@
+"""How does an input run at any time, not only at samples?
+
+A drawn rig is driven by these functions themselves; a record holds their samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+Signal = Callable[[float], float]
+
+
+class Waveform(Protocol):
+    """An input that is zero before t = 0."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Times [s] at which the input or its slope jumps, increasing."""
+        ...
+
+    def piece(self, index: int) -> Signal:
+        """Return the input between breaks ``index - 1`` and ``index``, smooth beyond its ends."""
+        ...
+
+
+def samples(waveform: Waveform, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a waveform at the times `t` [s], shape (n_samples,); at a jump, the value after it."""
+    index = np.searchsorted(waveform.breaks, t, side="right")
+    pieces = [waveform.piece(i) for i in range(len(waveform.breaks) + 1)]
+    return np.array([pieces[i](float(time)) for i, time in zip(index, t, strict=True)])
+
+
+def _silence(_: float) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A logarithmic sweep from `omega_start` to `omega_stop` [rad/s] in `duration` [s]."""
+
+    amplitude: float
+    omega_start: float
+    omega_stop: float
+    duration: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Its begin."""
+        return (0.0,)
+
+    def piece(self, index: int) -> Signal:
+        """Return silence before the begin, the sweep after it."""
+        if index == 0:
+            return _silence
+        growth = math.log(self.omega_stop / self.omega_start) / self.duration
+        amplitude, phase = self.amplitude, self.omega_start / growth
+
+        def sweep(t: float) -> float:
+            return amplitude * math.sin(phase * math.expm1(growth * t))
+
+        return sweep
+
+
+@dataclass(frozen=True)
+class Step:
+    """Zero before `start` [s], `amplitude` from it on."""
+
+    amplitude: float
+    start: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The jump."""
+        return (self.start,)
+
+    def piece(self, index: int) -> Signal:
+        """Return the level before or after the jump."""
+        level = self.amplitude * index
+        return lambda _: level
+
+
+@dataclass(frozen=True, eq=False)
+class Multisine:
+    """A sum of sines that fades in over `rise` [s], as a generator that protects a rig does it.
+
+    Attributes
+    ----------
+    amplitudes, omega, phases
+        Of each sine, shape (n_lines,).
+    """
+
+    amplitudes: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    phases: NDArray[np.float64]
+    rise: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Begin and end of the rise."""
+        return (0.0, self.rise)
+
+    def piece(self, index: int) -> Signal:
+        """Return silence, the rise, or the sum."""
+        if index == 0:
+            return _silence
+        amplitudes, omega, phases, rise = self.amplitudes, self.omega, self.phases, self.rise
+
+        def steady(t: float) -> float:
+            return float(np.dot(amplitudes, np.cos(omega * t + phases)))
+
+        def rising(t: float) -> float:
+            return steady(t) * math.sin(0.5 * math.pi * t / rise) ** 2
+
+        return rising if index == 1 else steady
+
+
+class Disturbance:
+    """Colored noise as a smooth function of time, from `start` [s] on.
+
+    Parameters
+    ----------
+    values
+        Equally spaced values, shape (n_values,).
+    start, spacing
+        Time of the first, and their distance [s].
+    """
+
+    def __init__(self, values: NDArray[np.float64], start: float, spacing: float) -> None:
+        self.spline = CubicSpline(start + spacing * np.arange(values.size), values)
+        self._rows = self.spline.c.T.tolist()
+        self._start = start
+        self._spacing = spacing
+
+    def __call__(self, t: float) -> float:
+        """Return the noise at a time [s]."""
+        index = min(max(int((t - self._start) / self._spacing), 0), len(self._rows) - 1)
+        c3, c2, c1, c0 = self._rows[index]
+        tau = t - self._start - index * self._spacing
+        return float(c0 + tau * (c1 + tau * (c2 + tau * c3)))

@@ -1,0 +1,54 @@
+"""How does a person at a terminal see the progress of a command?"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+
+import typer
+
+from rigsight.workflow.progress import Listener, Step, silent
+
+
+@contextlib.contextmanager
+def listening(quiet: bool) -> Iterator[Listener]:
+    """Show progress on stderr: a bar on a terminal, a line per stage where the output is kept, nothing if quiet."""
+    if quiet:
+        yield silent
+    elif not sys.stderr.isatty():
+        yield _say_stage
+    else:
+        with _bar() as listener:
+            yield listener
+
+
+def _say_stage(step: Step) -> None:
+    if step.done == 0:
+        typer.echo(f"{step.stage} ...", err=True)
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Listener]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[detail]}"),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        tasks = {}
+        # The first seconds go into importing numba and sympy: say that something happens.
+        starting = progress.add_task("Starting", total=None, detail="")
+
+        def listener(step: Step) -> None:
+            progress.update(starting, visible=False)
+            if step.stage not in tasks:
+                tasks[step.stage] = progress.add_task(step.stage, total=step.total, detail="")
+            progress.update(tasks[step.stage], completed=step.done, total=step.total, detail=step.detail)
+
+        yield listener

@@ -1,0 +1,80 @@
+"""A trial follows from its number alone, and hides what its key says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from rigsight.blind import Trial, draw_trial, n_trials, subject_of
+from rigsight.blind.subjects import TIERS, Subject
+from rigsight.simulate import compose, simulate
+
+SEED = 11
+
+
+def first_trial(fits: Callable[[Subject], bool]) -> int:
+    return next(t for t in range(n_trials("small")) if fits(subject_of("small", SEED, t)))
+
+
+@pytest.fixture(scope="module")
+def cubic() -> Trial:
+    return draw_trial(
+        "small", SEED, first_trial(lambda s: s.effects == ("cubic_stiffness",) and s.tier == "clear")
+    )
+
+
+def test_a_trial_drawn_twice_is_the_same(cubic: Trial) -> None:
+    again = draw_trial("small", SEED, cubic.key["trial"])
+    assert again.key == cubic.key
+    assert again.given == cubic.given
+    for one, other in zip((*cubic.records, *cubic.withheld), (*again.records, *again.withheld), strict=True):
+        assert all(np.array_equal(one[name], other[name]) for name in one.signals)
+
+
+def test_a_hidden_effect_leaves_a_gap_of_about_the_wished_size(cubic: Trial) -> None:
+    low, high = TIERS["clear"]
+    assert low / 2.0 < cubic.key["gap"] < high * 1.5
+    assert cubic.key["where"] in (["yaw_dynamics"], ["dynamics"])
+    assert cubic.key["values"]["k_3"] != 0.0
+
+
+def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_other_as_well(
+    cubic: Trial,
+) -> None:
+    output = cubic.linear.rig.outputs[0].name
+    errors = []
+    for record in (r for r in cubic.records if r.kind == "sweep"):
+        simulated = simulate(compose(cubic.linear.rig), {**cubic.linear.values, **cubic.given}, record)
+        left = np.sqrt(np.mean((record[output] - simulated[output]) ** 2))
+        errors.append(left / cubic.key["noise_floor"][output])
+    assert max(errors) > 3.0
+    assert min(errors) < 0.3 * max(errors)
+
+
+def test_without_an_effect_nothing_but_noise_is_left() -> None:
+    trial = draw_trial("small", SEED, first_trial(lambda s: s.kind == "none"))
+    assert trial.key["gap"] == pytest.approx(1.0, abs=0.05)
+    for name in ("J_z", "k_c", "k_d", "m", "d", "k"):
+        if name in trial.given:
+            assert trial.given[name] == pytest.approx(trial.key["values"][name], rel=0.01)
+
+
+def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
+    trial = draw_trial("small", SEED, first_trial(lambda s: s.kind == "parameters"))
+    assert trial.key["gap"] == pytest.approx(1.0, abs=0.05)
+    off = [
+        abs(value / trial.key["values"][name] - 1.0)
+        for name, value in trial.given.items()
+        if trial.key["values"][name] != 0.0 and not name.endswith("_off")
+    ]
+    assert all(0.049 < error < 0.201 for error in off)
+
+
+def test_records_look_alike_whatever_is_hidden(cubic: Trial) -> None:
+    other = draw_trial("small", SEED, first_trial(lambda s: s.kind == "none"))
+    for one, two in zip(cubic.records, other.records, strict=True):
+        assert (one.name, one.role, one.kind, one.hold, one.n_samples, one.dt) == (
+            two.name, two.role, two.kind, two.hold, two.n_samples, two.dt,
+        )  # fmt: skip

@@ -1,0 +1,59 @@
+"""Every cell is drawn once in each pass, in an order that tells nothing."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from rigsight.blind.outside import LIKE_THE_CATALOGUE, OUTSIDE, UNLIKE_THE_CATALOGUE
+from rigsight.blind.subjects import NOISES, TIERS, hidden_effects, n_trials, subject_of
+from rigsight.effects import CATALOGUE
+from rigsight.errors import InputError
+
+
+@pytest.mark.parametrize("design", ["small", "standard"])
+def test_none_is_missed(design: str) -> None:
+    subjects = [subject_of(design, 3, trial) for trial in range(n_trials(design))]
+    cells = Counter((s.effects, s.tier, s.noise) for s in subjects if s.kind == "single")
+    assert cells == Counter(((e.name,), tier, noise) for e in CATALOGUE for tier in TIERS for noise in NOISES)
+    assert {s.effects[0] for s in subjects if s.kind == "outside"} == {e.name for e in OUTSIDE}
+    assert {"none", "parameters", "pair"} <= {s.kind for s in subjects}
+
+
+def test_another_pass_and_another_seed_are_other_orders_of_the_same_cells() -> None:
+    count = n_trials("small")
+    first, again, second, other = (
+        [subject_of("small", seed, start + trial) for trial in range(count)]
+        for seed, start in ((1, 0), (1, 0), (1, count), (2, 0))
+    )
+    assert first == again
+    assert first != second != other
+    singles = [Counter(s for s in subjects if s.kind == "single") for subjects in (first, second, other)]
+    assert singles[0] == singles[1] == singles[2]
+
+
+def test_pairs_hold_two_effects_of_which_neither_contains_the_other() -> None:
+    pairs = [
+        s for s in (subject_of("standard", 5, t) for t in range(n_trials("standard"))) if s.kind == "pair"
+    ]
+    for subject in pairs:
+        first, second = hidden_effects(subject)
+        assert first.name != second.name
+        assert first.name not in second.parents
+        assert second.name not in first.parents
+
+
+def test_effects_from_outside_are_none_of_the_catalogue() -> None:
+    known = {effect.name for effect in CATALOGUE}
+    laws = {(e.torque, e.drive, e.spring, e.measured) for e in CATALOGUE}
+    assert len(UNLIKE_THE_CATALOGUE) >= 3
+    assert len(LIKE_THE_CATALOGUE) >= 3
+    for effect in OUTSIDE:
+        assert effect.name not in known
+        assert (effect.torque, effect.drive, effect.spring, effect.measured) not in laws
+
+
+def test_an_unknown_design_is_told() -> None:
+    with pytest.raises(InputError, match="small"):
+        subject_of("large", 0, 0)  # type: ignore[arg-type]
