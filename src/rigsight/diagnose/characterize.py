@@ -1,8 +1,9 @@
 """Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
 
-Each candidate gets a first look at the liveliest stretches of the records, from all its starts: first in short pieces with
-initial states of their own, which keeps a model that is far off in step with the motion, then in one piece. Those whose look
-comes near the best are fitted to all records; the best of those to full precision.
+Each candidate gets a first look. From all its starts it is fitted to the liveliest stretches of the records: in short pieces with
+initial states of their own, which keeps a model that is far off in step with the motion, then in one piece. From where the best
+of these ended it is fitted roughly to the whole records. Those that come near the best are fitted with care, the best of them
+to full precision.
 
 References
 ----------
@@ -23,23 +24,29 @@ from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.identify import EffectRegression, FitResult, GreyBoxFit
+from rigsight.records.record import Record
 from rigsight.simulate import Structure
 
 _LOOK_EVALUATIONS = 25
 _PIECE = 4.0
 """Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long."""
+_WIDE_EVALUATIONS = 12
 _LOOK_TOLERANCE = 1e-3
 _LOOK_ACCURACY = 1e-3
 _LONG_PIECE = 20.0
+_MOST_PIECES = 40
+"""In all: every piece has initial states of its own, and the fit's equations grow with them."""
 _STUCK = 2.0
-"""Mean squared error of whole records, in units of that of the first look, above which a fit is taken to have stopped short."""
+"""Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit counts as stopped short."""
 _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-4
 _HOPELESS_EVALUATIONS = 8
 _REFINE_EVALUATIONS = 150
 _HOPELESS_TOLERANCE = 1e-2
+_NEAR = 25.0
+"""A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
 _PROMISING = 9.0
-"""A candidate whose first look costs less than this factor of the best (three times its RMS) is followed to the end."""
+"""A candidate that costs less than this factor of the best on whole records (three times its RMS) is followed to the end."""
 _CONTENDER = 1.5
 """A model whose held-out error is within this factor of the best is fitted to full precision."""
 _ALIKE = 1.05
@@ -52,12 +59,28 @@ _RELEASE_GAIN = 1.02
 
 @dataclass(frozen=True)
 class Look:
-    """First fits of a candidate to a part of the records, best first, those that ended at the same place once."""
+    """First fits of a candidate to part of the records or roughly to all, best first, those that ended at the same place once.
+
+    Attributes
+    ----------
+    effects, structure, free
+        What was fitted.
+    fits
+        What was reached.
+    nearest
+        Mean squared error that was reached in their liveliest stretches.
+    """
 
     effects: tuple[Effect, ...]
     structure: Structure
     free: tuple[str, ...]
     fits: tuple[FitResult, ...]
+    nearest: float
+
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last."""
+        return self.effects[-1].name
 
     @property
     def cost(self) -> float:
@@ -98,12 +121,15 @@ def fit_candidates(
     if bench.rig.is_driven:
         regression = EffectRegression(bench.rig, bench.estimation, linear.fit.values, bench.scales)
     looks = _looks(bench, linear, bench.offered(effects), regression, n_jobs)
-    lowest = min((look.cost for look in looks), default=float("inf"))
+    wide = {look.newest: look for look in widened(bench, looks, n_jobs)}
+    lowest = min((look.cost for look in wide.values()), default=float("inf"))
 
     def one(found: Look) -> Scored:
-        scored = followed(bench, found, promising=found.cost <= _PROMISING * lowest)
+        found = wide.get(found.newest, found)
+        promising = found.newest in wide and found.cost <= _PROMISING * lowest
+        scored = followed(bench, found, promising)
         if progress is not None:
-            progress(found.effects[-1].name)
+            progress(found.newest)
         return scored
 
     models = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in looks))
@@ -152,7 +178,7 @@ def fit_candidate(
     hold
         Rig parameters to keep at their base value.
     """
-    found = look_at(bench, effects, base, {}, hold=hold)
+    (found,) = widened(bench, [look_at(bench, effects, base, {}, hold=hold)])
     return refine(bench, [followed(bench, found, promising=True)])[0]
 
 
@@ -203,7 +229,7 @@ def look_at(
     hold
         Rig parameters to keep at their base value.
     substeps
-        Integration steps per sample in each stretch; None chooses them, which needs the accurate integrator.
+        Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
     """
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
     structure = bench.composed(effects, special)
@@ -213,23 +239,58 @@ def look_at(
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
-    pieces = [cut([record], _PIECE * bench.period) for record in bench.look]
+    pieces = [_pieces(bench, [record], _PIECE) for record in bench.look]
     in_pieces = GreyBoxFit(
         structure, [piece for parts in pieces for piece in parts], bench.scales, bench.noise, _LOOK_ACCURACY
     )
     of_pieces = None
     if substeps is not None:
         of_pieces = [n for n, parts in zip(substeps, pieces, strict=True) for _ in parts]
-    fits = []
-    for start in starts:
-        near = in_pieces.fit(start, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, of_pieces)
-        fits.append(fit.fit(near.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps))
-    return Look(effects, structure, free, _distinct(fits))
+    first = [
+        in_pieces.fit(start, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, of_pieces)
+        for start in starts
+    ]
+    near = [
+        fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+        for found in _distinct(first, alike=float("inf"))
+    ]
+    nearest = _distinct(near)
+    return Look(effects, structure, free, nearest, _mean_square(nearest[0]))
+
+
+def widened(
+    bench: Workbench, looks: Sequence[Look], n_jobs: int = 1, substeps: Sequence[int] | None = None
+) -> list[Look]:
+    """Fit those looks roughly to the whole records that came near the best one in the liveliest stretches; drop the others.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    looks
+        First looks.
+    n_jobs
+        Looks fitted at the same time.
+    substeps
+        Integration steps per sample of each record; None chooses them.
+    """
+    lowest = min((look.nearest for look in looks), default=float("inf"))
+
+    def one(look: Look) -> Look:
+        whole = GreyBoxFit(look.structure, bench.estimation, bench.scales, bench.noise, _LOOK_ACCURACY)
+        fits = [
+            whole.fit(near.values, look.free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+            for near in look.fits
+        ]
+        return replace(look, fits=_distinct(fits))
+
+    near = [look for look in looks if look.nearest <= _NEAR * lowest]
+    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in near))
 
 
 def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking."""
-    scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising)
+    scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising, look.nearest)
     special = look.effects[-1].special_cases
     if promising and special:
         structure = bench.composed(look.effects, {n: v for n, v in look.structure.fixed if n not in special})
@@ -256,6 +317,7 @@ def _fitted(
     free: Sequence[str],
     starts: Sequence[FitResult],
     promising: bool,
+    nearest: float = float("inf"),
 ) -> Scored:
     fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise)
     evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
@@ -265,9 +327,9 @@ def _fitted(
         return fit.fit(values, free, max_evaluations=evaluations, tolerance=tolerance)
 
     results = [whole(start.values) for start in (starts if promising else starts[:1])]
-    if promising and min(map(_mean_square, results)) > _STUCK * min(map(_mean_square, starts)):
+    if promising and min(map(_mean_square, results)) > _STUCK * nearest:
         in_pieces = GreyBoxFit(
-            structure, cut(bench.estimation, _LONG_PIECE * bench.period), bench.scales, bench.noise
+            structure, _pieces(bench, bench.estimation, _LONG_PIECE), bench.scales, bench.noise
         )
         near = in_pieces.fit(
             starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
@@ -279,17 +341,23 @@ def _fitted(
     return bench.score(effects, min(usable, key=lambda result: result.cost))
 
 
+def _pieces(bench: Workbench, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
+    """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
+    duration = sum(record.n_samples * record.dt for record in records)
+    return cut(records, max(periods * bench.period, duration * len(bench.look) / len(records) / _MOST_PIECES))
+
+
 def _mean_square(fit: FitResult) -> float:
     return fit.cost / fit.n_samples
 
 
-def _distinct(fits: Sequence[FitResult]) -> tuple[FitResult, ...]:
-    """Return the best fit, and a second one if it is as good but ended elsewhere."""
+def _distinct(fits: Sequence[FitResult], alike: float = _ALIKE) -> tuple[FitResult, ...]:
+    """Return the best fit, and the next one that ended elsewhere if its cost is within a factor of the best."""
     ordered = sorted(fits, key=lambda result: result.cost)
     best = ordered[0]
     values = np.array([best.values[name] for name in best.free])
     for other in ordered[1:]:
         theirs = np.array([other.values[name] for name in other.free])
-        if other.cost <= _ALIKE * best.cost and not np.allclose(values, theirs, rtol=0.05, atol=1e-12):
+        if other.cost <= alike * best.cost and not np.allclose(values, theirs, rtol=0.05, atol=1e-12):
             return best, other
     return (best,)

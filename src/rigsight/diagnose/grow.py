@@ -1,6 +1,6 @@
 """Does a second effect explain what the best one leaves? Greedy growth from the best models, each pair on held-out records.
 
-Every effect gets a first look beside the best model; only those that lower the cost clearly are fitted to all records. What
+Every effect gets a first look beside the best model; only those that lower the cost clearly are fitted with care. What
 the growth cannot do without is found by the ranking: the pair competes with its own parts.
 
 References
@@ -16,19 +16,21 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from rigsight.diagnose.characterize import Look, followed, look_at, refine
+from rigsight.diagnose.characterize import Look, followed, look_at, refine, widened
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.identify import FitResult, GreyBoxFit
 from rigsight.simulate import Structure
 
 MOST_EFFECTS = 2
 """Effects that a verdict can name together."""
 _BEAM = 1.15
-"""A second single is grown too if its held-out error is within this factor of the best."""
+"""Singles are grown if their held-out error is within this factor of the best: the simplest, and the best that is unlike it."""
+_TIE = 1.01
 _WORTH_FOLLOWING = 0.85
-"""Factor by which a second effect must lower the cost of a first look to be fitted to all records."""
+"""Factor by which a second effect must lower the cost at a first look to be fitted with care."""
 _MOST_FOLLOWED = 4
+_BOTH_WAYS = 5
+"""Most promising pairs that are looked at from the fit of the second effect as well: a strong memory hides behind a first one."""
 _HALF = 0.5
 """Share of what the best single leaves above the floor that a second effect must close, as the first must of the whole gap.
 
@@ -70,9 +72,14 @@ def grown(
     usable = sorted((m for m in singles if m.residuals and np.isfinite(m.excess)), key=lambda m: m.excess)
     if not usable or usable[0].excess <= at_floor:
         return []
-    beam = usable[:1]
-    if len(usable) > 1 and usable[1].excess <= _BEAM * usable[0].excess and not _alike(usable[0], usable[1]):
-        beam.append(usable[1])
+    close = [model for model in usable if model.excess <= _BEAM * usable[0].excess]
+    # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
+    # many, the one that the catalogue has first is the plainer.
+    order = {effect.name: place for place, effect in enumerate(effects)}
+    best = min(close, key=lambda model: (model.n_free, model.excess))
+    tied = [model for model in close if model.n_free == best.n_free and model.excess <= _TIE * best.excess]
+    first = min(tied, key=lambda model: order[model.names[0]])
+    beam = [first, *[model for model in close if model is not first and not _alike(first, model)][:1]]
     pairs: list[Scored] = []
     for parent in beam:
         partners = [
@@ -80,7 +87,7 @@ def grown(
             for effect in bench.offered(effects)
             if effect not in parent.effects and not _known_pair(pairs, parent, effect)
         ]
-        pairs += _pairs(bench, parent, partners, n_jobs, prepare)
+        pairs += _pairs(bench, parent, partners, usable, n_jobs, prepare)
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
     alone = {model.names[0]: model.excess for model in singles}
     return [
@@ -101,9 +108,14 @@ def _known_pair(pairs: Sequence[Scored], parent: Scored, effect: Effect) -> bool
 
 
 def _pairs(
-    bench: Workbench, parent: Scored, partners: Sequence[Effect], n_jobs: int, prepare: Prepare | None
+    bench: Workbench,
+    parent: Scored,
+    partners: Sequence[Effect],
+    singles: Sequence[Scored],
+    n_jobs: int,
+    prepare: Prepare | None,
 ) -> list[Scored]:
-    base = _settled(bench, parent)
+    base = parent.fit
     if prepare is not None:
         prepare([_structure(bench, (*parent.effects, effect)) for effect in partners])
 
@@ -111,6 +123,18 @@ def _pairs(
         return look_at(bench, (*parent.effects, effect), base, {}, substeps=base.substeps)
 
     looks = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(effect) for effect in partners))
+    looks = sorted(widened(bench, looks, n_jobs, base.substeps), key=_cost)[:_BOTH_WAYS]
+    alone = {model.names[0]: model.fit for model in singles}
+
+    def other_way(found: Look) -> Look:
+        second = found.effects[-1]
+        if second.name not in alone:
+            return found
+        turned = look_at(bench, (second, *parent.effects), alone[second.name], {}, substeps=base.substeps)
+        (wide,) = widened(bench, [turned], substeps=base.substeps)
+        return min(found, replace(wide, effects=found.effects), key=_cost)
+
+    looks = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(other_way)(found) for found in looks))
     promising = sorted((found for found in looks if found.cost <= _WORTH_FOLLOWING * base.cost), key=_cost)
 
     def follow(found: Look) -> Scored:
@@ -130,9 +154,3 @@ def _cost(found: Look) -> float:
 def _structure(bench: Workbench, effects: tuple[Effect, ...]) -> Structure:
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
     return bench.composed(effects, special)
-
-
-def _settled(bench: Workbench, parent: Scored) -> FitResult:
-    """Fit the parent to the stretches that are looked at, so that both costs are of the same records."""
-    fit = GreyBoxFit(parent.fit.structure, bench.look, bench.scales, bench.noise)
-    return fit.fit(parent.fit.values, parent.fit.free, max_evaluations=30, tolerance=1e-3, finish=False)
