@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge
+from rigsight.diagnose.verdict import AT_FLOOR, MOST_LEFT, Judgement, judge
 
 ABOVE, BELOW = 1.001, 0.999
 
 
 @pytest.fixture
 def verdict(scored):
-    def of(before: float, linear: float, best: float) -> Judgement:
-        return judge(before, scored((), excess=linear), scored(("cubic_stiffness",), excess=best))
+    def of(before: float, linear: float, best: float, lower_bound: bool = False) -> Judgement:
+        return judge(
+            before, scored((), excess=linear), scored(("cubic_stiffness",), excess=best), lower_bound
+        )
 
     return of
 
@@ -45,10 +47,18 @@ def test_an_effect_must_lower_the_error_by_a_tenth(verdict) -> None:
     assert verdict(5.0, 1.15, 1.15 / 1.1 * ABOVE).verdict == "unknown"
 
 
-def test_an_effect_must_close_half_of_the_gap_above_the_floor(verdict) -> None:
+def test_above_a_measured_floor_the_nearest_relative_is_not_the_cause(verdict) -> None:
+    assert verdict(100.0, 100.0, MOST_LEFT * BELOW).verdict == "effect"
+    found = verdict(100.0, 100.0, MOST_LEFT * ABOVE)
+    assert found.verdict == "unknown"
+    assert "cubic_stiffness" in found.reason
+    assert "1.3 times the noise floor" in found.reason
+
+
+def test_above_a_lower_bound_an_effect_must_close_half_of_the_gap(verdict) -> None:
     """From 11 to the floor at 1 are ten: closing five leaves six."""
-    assert verdict(11.0, 11.0, 6.0 * BELOW).verdict == "effect"
-    found = verdict(11.0, 11.0, 6.0 * ABOVE)
+    assert verdict(11.0, 11.0, 6.0 * BELOW, lower_bound=True).verdict == "effect"
+    found = verdict(11.0, 11.0, 6.0 * ABOVE, lower_bound=True)
     assert found.verdict == "unknown"
     assert "cubic_stiffness" in found.reason
 
@@ -60,9 +70,9 @@ def test_an_effect_that_reaches_the_floor_is_named_whatever_the_gap_was(verdict)
 
 
 def test_an_effect_that_leaves_something_says_so(verdict) -> None:
-    found = verdict(20.0, 20.0, 3.0)
+    found = verdict(20.0, 20.0, 1.2)
     assert found.verdict == "effect"
-    assert "3 times the noise floor" in found.reason
+    assert "1.2 times the noise floor" in found.reason
 
 
 def test_a_failed_candidate_explains_nothing(verdict) -> None:

@@ -23,7 +23,7 @@ from rigsight.diagnose.starts import start_values, with_own_values
 from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.identify import EffectRegression, FitResult, GreyBoxFit
+from rigsight.identify import EffectRegression, FitResult
 from rigsight.records.record import Record
 from rigsight.simulate import Structure
 
@@ -91,7 +91,7 @@ class Look:
 def fit_linear(bench: Workbench, start: Mapping[str, float]) -> Scored:
     """Re-identify the equations without an effect."""
     structure = bench.composed()
-    fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise)
+    fit = bench.problem(structure, bench.estimation)
     return bench.score((), fit.fit(start, bench.free_parameters(structure)))
 
 
@@ -189,7 +189,7 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
     def one(model: Scored) -> Scored:
         if not (np.isfinite(model.excess) and model.excess <= _CONTENDER * best):
             return model
-        fit = GreyBoxFit(model.fit.structure, bench.estimation, bench.scales, bench.noise)
+        fit = bench.problem(model.fit.structure, bench.estimation)
         result = fit.fit(
             model.fit.values,
             model.fit.free,
@@ -234,15 +234,13 @@ def look_at(
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
     structure = bench.composed(effects, special)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
-    fit = GreyBoxFit(structure, bench.look, bench.scales, bench.noise, _LOOK_ACCURACY)
+    fit = bench.problem(structure, bench.look, _LOOK_ACCURACY)
     starts = list(start_values(bench, structure, effects[-1], base, parents))
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
     pieces = [_pieces(bench, [record], _PIECE) for record in bench.look]
-    in_pieces = GreyBoxFit(
-        structure, [piece for parts in pieces for piece in parts], bench.scales, bench.noise, _LOOK_ACCURACY
-    )
+    in_pieces = bench.problem(structure, [piece for parts in pieces for piece in parts], _LOOK_ACCURACY)
     of_pieces = None
     if substeps is not None:
         of_pieces = [n for n, parts in zip(substeps, pieces, strict=True) for _ in parts]
@@ -277,7 +275,7 @@ def widened(
     lowest = min((look.nearest for look in looks), default=float("inf"))
 
     def one(look: Look) -> Look:
-        whole = GreyBoxFit(look.structure, bench.estimation, bench.scales, bench.noise, _LOOK_ACCURACY)
+        whole = bench.problem(look.structure, bench.estimation, _LOOK_ACCURACY)
         fits = [
             whole.fit(near.values, look.free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
             for near in look.fits
@@ -319,7 +317,7 @@ def _fitted(
     promising: bool,
     nearest: float = float("inf"),
 ) -> Scored:
-    fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise)
+    fit = bench.problem(structure, bench.estimation)
     evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
     tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
 
@@ -328,9 +326,7 @@ def _fitted(
 
     results = [whole(start.values) for start in (starts if promising else starts[:1])]
     if promising and min(map(_mean_square, results)) > _STUCK * nearest:
-        in_pieces = GreyBoxFit(
-            structure, _pieces(bench, bench.estimation, _LONG_PIECE), bench.scales, bench.noise
-        )
+        in_pieces = bench.problem(structure, _pieces(bench, bench.estimation, _LONG_PIECE))
         near = in_pieces.fit(
             starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
         )

@@ -3,6 +3,9 @@
 Three ways, the first that the records allow wins: repeated periods of one input (noise and disturbance alike), stretches in
 which the input rests (sensor noise and the disturbance that passes through the rig), and the top of the spectrum, where no rig
 responds (white sensor noise only: a lower bound).
+
+An element's input is itself measured, and its noise reaches the force only while the element moves: what a force shows at rest is
+a lower bound as well.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ _TOP_OF_SPECTRUM = 0.85
 _FREE_MODES = 6
 _MAX_HANKEL_ROWS = 200
 _SMALLEST = 1e-9
+_AT_REST = "stretches in which the input rests"
 _WHITE_ONLY = "top of the spectrum (white noise only)"
 
 
@@ -50,7 +54,7 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
                     signal.unit,
                     max(std, _SMALLEST * size),
                     method,
-                    lower_bound=method == _WHITE_ONLY,
+                    lower_bound=method == _WHITE_ONLY or (not rig.is_driven and method == _AT_REST),
                 )
             )
     return tuple(floors)
@@ -67,7 +71,7 @@ def _noise_floor(rig: Rig, output: str, records: Sequence[Record]) -> tuple[floa
         top = min(top, float(np.median([_roughness(record[output]) for record in records])))
     quiet = [q for record in records for q in _quiet_stretches(record, source, output)]
     if quiet:
-        return max(float(np.median(quiet)), top), "stretches in which the input rests"
+        return max(float(np.median(quiet)), top), _AT_REST
     return top, _WHITE_ONLY
 
 

@@ -29,7 +29,7 @@ from rigsight.diagnose.windows import WINDOW, cut, window_length
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import GreyBoxFit, characteristic_scales, linear_start
+from rigsight.identify import FitMemory, characteristic_scales, linear_start
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -76,6 +76,7 @@ def diagnose(
     n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
     prepare: Prepare | None = None,
+    memory: FitMemory | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a simulation and records of its rig.
 
@@ -93,6 +94,8 @@ def diagnose(
         Called with a short text when a stage or candidate is done.
     prepare
         Called with structures that are about to be simulated, to compile them side by side.
+    memory
+        Where the outcomes of fits are kept; those that it has are not done again.
 
     Raises
     ------
@@ -129,6 +132,7 @@ def diagnose(
         noise=noise,
         held=_held(task, estimation, no_spring),
         modelled=task.modelled,
+        memory=memory,
     )
     linear = fit_linear(bench, start)
     if not linear.residuals:
@@ -190,7 +194,7 @@ def _before(task: Task, bench: Workbench, estimation: Sequence[Record], linear: 
     structure = bench.composed()
     start = {**_start(task, estimation), **linear.fit.values, **task.given}
     missing = [name for name in bench.free_parameters(structure) if name not in task.given]
-    fit = GreyBoxFit(structure, bench.estimation, bench.scales, bench.noise).fit(start, missing)
+    fit = bench.problem(structure, bench.estimation).fit(start, missing)
     if not fit.residuals:
         raise InputError(f"The given simulation cannot be run: {fit.message}")
     return bench.score((), fit)

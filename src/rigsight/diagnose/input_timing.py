@@ -16,7 +16,7 @@ import numpy as np
 from rigsight.diagnose.finding import Finding
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect, effect_named
-from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.identify import FitResult
 from rigsight.records.record import Hold, Record
 
 _EVALUATIONS = 10
@@ -169,7 +169,7 @@ def _refitted(
     free: Sequence[str],
     records: Sequence[Record],
 ) -> FitResult:
-    fit = GreyBoxFit(base.structure, records, bench.scales, bench.noise)
+    fit = bench.problem(base.structure, records)
     return fit.fit(start, free, max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
 
 

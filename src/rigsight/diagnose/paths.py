@@ -16,7 +16,6 @@ from rigsight.diagnose.gap_parts import PathPart
 from rigsight.diagnose.lateral_leg import LateralLeg, fit_lateral_leg
 from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.identify import GreyBoxFit
 from rigsight.metrics import rms
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -113,9 +112,7 @@ def _motion_alone(bench: Workbench, linear: Scored) -> Scored:
         held=bench.held | downstream,
     )
     structure = linear.fit.structure
-    fit = GreyBoxFit(structure, alone.estimation, alone.scales, alone.noise).fit(
-        linear.fit.values, alone.free_parameters(structure)
-    )
+    fit = alone.problem(structure, alone.estimation).fit(linear.fit.values, alone.free_parameters(structure))
     return alone.score((), fit) if fit.residuals else linear
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
-from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
@@ -71,6 +71,8 @@ class Workbench:
         Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
     modelled
         Effects that the simulation in question has already; every candidate is added to them.
+    memory
+        Where the outcomes of fits are kept.
     """
 
     rig: Rig
@@ -81,11 +83,18 @@ class Workbench:
     noise: Mapping[str, float]
     held: frozenset[str]
     modelled: tuple[Effect, ...] = ()
+    memory: FitMemory | None = None
 
     @property
     def period(self) -> float:
         """Natural period of the rig, or the typical one of its motion [s]."""
         return float(2.0 * np.pi * self.scales["time"])
+
+    def problem(
+        self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
+    ) -> GreyBoxFit:
+        """Return the fit of a structure to records, with the bench's scales and noise."""
+        return GreyBoxFit(structure, records, self.scales, self.noise, accuracy, self.memory)
 
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
         """Return the equations of the simulation in question with effects added."""
@@ -141,7 +150,7 @@ class Workbench:
 
     def score(self, effects: tuple[Effect, ...], fit: FitResult) -> Scored:
         """Simulate the scoring records with a fitted model; only their initial states are estimated."""
-        result = GreyBoxFit(fit.structure, self.scoring, self.scales, self.noise).fit(fit.values, [])
+        result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
         excess = result.weighted_rms if result.residuals else float("inf")
         return Scored(effects, fit, result.residuals, result.initial_states, excess)
 

@@ -6,7 +6,9 @@ from rigsight.identify.conicity import creep_error_of_sine as creep_error_of_sin
 from rigsight.identify.conicity import estimate_conicity as estimate_conicity
 from rigsight.identify.driven_offsets import driven_offsets as driven_offsets
 from rigsight.identify.effect_start import EffectRegression as EffectRegression
+from rigsight.identify.fit_memory import FitMemory as FitMemory
 from rigsight.identify.fit_result import FitResult as FitResult
+from rigsight.identify.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
 from rigsight.identify.grey_box import GreyBoxFit as GreyBoxFit
 from rigsight.identify.hysteresis import Calibration as Calibration
 from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
@@ -34,10 +36,12 @@ from rigsight.identify.transfer_function import fit_frequency_response as fit_fr
 from rigsight.identify.transfer_step import fit_step as fit_step
 
 __all__ = [
+    "DEFAULT_ACCURACY",
     "Calibration",
     "ConicityEstimate",
     "DerivedQuantities",
     "EffectRegression",
+    "FitMemory",
     "FitResult",
     "GreyBoxFit",
     "JointFit",

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from scipy.optimize import least_squares
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP, Coordinates
 from rigsight.identify.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit_result import FitResult
 from rigsight.records.record import Record
 from rigsight.simulate import (
@@ -78,6 +80,8 @@ class GreyBoxFit:
         Standard deviation by which the residuals of each output are divided.
     accuracy
         Relative accuracy of the simulations; the number of substeps follows from it.
+    memory
+        Where outcomes are kept; a fit that was done before is not done again, and comes out the same.
     """
 
     def __init__(
@@ -87,8 +91,10 @@ class GreyBoxFit:
         scales: Mapping[str, float],
         output_noise: Mapping[str, float],
         accuracy: float = DEFAULT_ACCURACY,
+        memory: FitMemory | None = None,
     ) -> None:
         self.structure = structure
+        self.memory = memory
         self.scales = dict(scales)
         self.accuracy = accuracy
         sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
@@ -96,6 +102,16 @@ class GreyBoxFit:
         self._limited = np.array([equation.limit is not None for equation in structure.equations], dtype=bool)
         names = [signal.name for signal in structure.rig.outputs]
         self._data = [self._prepared(record, names, output_noise) for record in records]
+        self._problem: list[Any] = []
+        if memory is not None:
+            self._problem = [
+                [str(equation) for equation in (*structure.equations, *structure.outputs)],
+                list(structure.names),
+                sorted(self.scales.items()),
+                [record_digest(record) for record in records],
+                [d.weights.tolist() for d in self._data],
+                accuracy,
+            ]
         self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self._data))
 
     def _prepared(self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]) -> _Data:
@@ -161,6 +177,11 @@ class GreyBoxFit:
             return self._failed(coordinates, theta, "The start values cannot be simulated.")
         if theta.size == 0:
             return self._result(problem, theta, True, "Nothing to fit.", finish)
+        key = self._key(coordinates, start, theta, (max_evaluations, tolerance, problem.substeps))
+        known = None if self.memory is None else self.memory.recall(key)
+        if known is not None:
+            problem.n_evaluations = known["evaluations"] - 1
+            return self._result(problem, np.array(known["theta"]), known["success"], known["message"], finish)
         solution = least_squares(
             problem.residual,
             theta,
@@ -173,7 +194,24 @@ class GreyBoxFit:
             gtol=1e-3 * tolerance,
             max_nfev=max_evaluations,
         )
-        return self._result(problem, solution.x, bool(solution.status > 0), solution.message, finish)
+        success = bool(solution.status > 0)
+        result = self._result(problem, solution.x, success, solution.message, finish)
+        if self.memory is not None:
+            outcome = {"theta": solution.x.tolist(), "success": success, "message": solution.message}
+            self.memory.remember(key, {**outcome, "evaluations": result.n_evaluations})
+        return result
+
+    def _key(
+        self,
+        coordinates: Coordinates,
+        start: Mapping[str, float],
+        theta: NDArray[np.float64],
+        settings: tuple[int, float, list[int]],
+    ) -> str:
+        if self.memory is None:
+            return ""
+        values = [float(start[name]) for name in self.structure.names]
+        return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
 
     def _first_states(self, start: Mapping[str, float]) -> list[NDArray[np.float64]]:
         """Return each record's guess; of several for states with a range, and of moving and resting, the best."""

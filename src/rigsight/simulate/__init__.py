@@ -1,5 +1,6 @@
 """Rig and effects -> compiled kernel -> outputs for a record's input."""
 
+from rigsight.simulate.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.simulation import choose_substeps as choose_substeps
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
@@ -15,6 +16,7 @@ from rigsight.simulate.structure import structure_named as structure_named
 
 __all__ = [
     "Structure",
+    "cache_folder",
     "carried_over",
     "choose_substeps",
     "compose",

@@ -15,6 +15,7 @@ from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs.running_gear import creep_factor
 from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.fit_journal import FitJournal
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.model_file import MODEL_FILE
 from rigsight.workflow.progress import Listener, Stage, silent
@@ -40,6 +41,8 @@ def run_diagnose(
     command: str | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records.
+
+    What an interrupted diagnosis of the same campaign has fitted is not fitted again.
 
     Parameters
     ----------
@@ -75,7 +78,7 @@ def run_diagnose(
     prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with threadpool_limits(limits=1, user_api="blas"), FitJournal(Path(campaign)) as journal:
         diagnosis = diagnose(
             task_of(read),
             candidates,
@@ -83,6 +86,7 @@ def run_diagnose(
             n_jobs=jobs,
             progress=stage.finished,
             prepare=lambda structures: prepare_kernels(structures, jobs, listener, for_looks=True),
+            memory=journal,
         )
     if out is not None:
         write_diagnosis(

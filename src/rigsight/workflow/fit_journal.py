@@ -1,0 +1,90 @@
+"""Where do the fits of a running diagnosis go, so that one that was interrupted goes on where it stopped?
+
+A line of JSON per fit, appended as it ends, in a file beside the compiled kernels. A kill leaves at most a torn last line, which
+is not read. The file goes with the end of the diagnosis.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import threading
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from rigsight.simulate import cache_folder
+
+
+class FitJournal:
+    """The fits of one diagnosis, kept on disk until it is done.
+
+    Used as a context: left without an error the file is removed, otherwise it stays.
+
+    Parameters
+    ----------
+    campaign
+        The campaign's file or folder; its path names the journal. What was fitted there is told apart by the keys of the fits.
+    """
+
+    def __init__(self, campaign: Path) -> None:
+        name = hashlib.sha256(f"{version('rigsight')} {campaign.resolve()}".encode()).hexdigest()[:24]
+        self._path = cache_folder() / "unfinished" / f"{name}.jsonl"
+        self._known: dict[str, Mapping[str, Any]] = {}
+        self._lock = threading.Lock()
+        self.recalled = 0
+        """Fits that did not have to be done again."""
+
+    def __enter__(self) -> Self:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            lines = self._path.read_text(encoding="utf-8").splitlines() if self._path.exists() else []
+        except (OSError, UnicodeDecodeError):
+            lines = []
+        for line in lines:
+            try:
+                entry = json.loads(line)
+                self._known[entry["key"]] = _checked(entry)
+            except (ValueError, KeyError, TypeError):
+                continue
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            with contextlib.suppress(OSError):
+                self._path.unlink()
+
+    def recall(self, key: str) -> Mapping[str, Any] | None:
+        """Return the outcome that was remembered under a key, None if there is none."""
+        found = self._known.get(key)
+        if found is not None:
+            with self._lock:
+                self.recalled += 1
+        return found
+
+    def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
+        """Append an outcome; where the disk does not take it, the diagnosis goes on without."""
+        line = json.dumps({"key": key, **outcome}) + "\n"
+        with self._lock, contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
+            file.write(line)
+
+
+def _checked(entry: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return an entry whose parts have the types that a fit relies on.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If they do not.
+    """
+    return {
+        "theta": [float(value) for value in entry["theta"]],
+        "success": bool(entry["success"]),
+        "message": str(entry["message"]),
+        "evaluations": int(entry["evaluations"]),
+    }

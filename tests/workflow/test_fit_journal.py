@@ -1,0 +1,77 @@
+"""A diagnosis that was interrupted goes on where it stopped, and comes out the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rigsight.diagnose import Diagnosis
+from rigsight.effects import effect_named
+from rigsight.workflow.diagnose import run_diagnose
+from rigsight.workflow.fit_journal import FitJournal
+from rigsight.workflow.progress import Step
+
+CANDIDATES = [effect_named(name) for name in ("cubic_stiffness", "coulomb_friction")]
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Fits that were recalled, one entry per diagnosis that ended."""
+    seen: list[int] = []
+    leave = FitJournal.__exit__
+
+    def noted(self: FitJournal, kind, error, trace) -> None:
+        seen.append(self.recalled)
+        leave(self, kind, error, trace)
+
+    monkeypatch.setattr(FitJournal, "__exit__", noted)
+    return seen
+
+
+@pytest.fixture
+def journals(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    monkeypatch.setattr("rigsight.workflow.fit_journal.cache_folder", lambda: tmp_path / "cache")
+    return tmp_path / "cache/unfinished"
+
+
+def diagnosed(campaign: Path, stop_at: str | None = None) -> Diagnosis:
+    def listener(step: Step) -> None:
+        if step.detail == stop_at:
+            raise KeyboardInterrupt
+
+    return run_diagnose(campaign, None, effects=CANDIDATES, n_jobs=1, listener=listener)
+
+
+def test_finished_fits_are_recalled_and_the_result_is_the_same(
+    axis_campaign: Path, journals: Path, counted: list[int]
+) -> None:
+    whole = diagnosed(axis_campaign)
+    with pytest.raises(KeyboardInterrupt):
+        diagnosed(axis_campaign, stop_at="cubic_stiffness")
+    (journal,) = journals.iterdir()
+    n_finished = len(journal.read_text().splitlines())
+    again = diagnosed(axis_campaign)
+    assert counted[0] == counted[1] == 0
+    assert counted[2] == n_finished > 3
+    assert not journal.exists()
+    assert again.to_json() == whole.to_json()
+
+
+def test_a_torn_or_foreign_line_is_not_read(axis_campaign: Path, journals: Path, counted: list[int]) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        diagnosed(axis_campaign, stop_at="cubic_stiffness")
+    (journal,) = journals.iterdir()
+    first, *_ = journal.read_text().splitlines()
+    journal.write_text(first + "\n" + '{"key": "x", "theta": "no numbers"}\n' + first[: len(first) // 2])
+    assert diagnosed(axis_campaign).verdict
+    assert counted[-1] == 1
+
+
+def test_a_cache_that_cannot_be_written_stops_nothing(
+    axis_campaign: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("")
+    monkeypatch.setattr("rigsight.workflow.fit_journal.cache_folder", lambda: in_the_way)
+    assert diagnosed(axis_campaign).verdict
