@@ -27,6 +27,7 @@ from rigsight.diagnose.result import (
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge
 from rigsight.diagnose.windows import WINDOW, cut, window_length
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
+from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, characteristic_scales, linear_start
@@ -162,7 +163,20 @@ def diagnose(
     diagnosis = _assembled(
         task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on, rng
     )
-    return replace(diagnosis, data_quality=quality)
+    lacking = _missing_force(bench, linear, no_spring, rng) if judgement.verdict == "unknown" else None
+    if lacking is not None:
+        diagnosis = replace(diagnosis, notes=(*diagnosis.notes, lacking.sentence))
+    return replace(diagnosis, data_quality=quality, missing_force=lacking)
+
+
+def _missing_force(
+    bench: Workbench, linear: Scored, no_spring: bool, rng: np.random.Generator
+) -> MissingForce | None:
+    """Return the shape of what is lacking; beside effects that are modelled already the rig's own terms do not stand alone."""
+    if bench.modelled:
+        return None
+    noise = bench.noise[bench.rig.outputs[0].name]
+    return missing_force(bench.rig, bench.estimation, linear.fit.values, bench.scales, noise, rng, no_spring)
 
 
 def _no_spring(task: Task) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.gap_parts import Localization
+from rigsight.discover import MissingForce
 
 Verdict = Literal["effect", "parameters", "none", "unknown"]
 Stage = Literal["before", "reidentified", "after"]
@@ -204,6 +205,8 @@ class Diagnosis:
         The gap split by record, amplitude, band, state, time and signal path.
     effect_shares
         Effect -> output -> share of the closed gap that it explains, where the verdict names several.
+    missing_force
+        What sparse regression makes of the force that is lacking, where no effect explains the gap.
     """
 
     title: str
@@ -225,6 +228,7 @@ class Diagnosis:
     data_quality: DataQuality | None = None
     localization: Localization = field(default_factory=Localization)
     effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    missing_force: MissingForce | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -262,6 +266,7 @@ class Diagnosis:
                 effect: {output: _number(share) for output, share in shares.items()}
                 for effect, shares in self.effect_shares.items()
             },
+            "missing_force": None if self.missing_force is None else self.missing_force.to_json(),
             "window": self.windows,
             "scored_on": self.scored_on,
             "data_quality": [] if self.data_quality is None else self.data_quality.to_json(),

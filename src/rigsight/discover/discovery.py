@@ -16,9 +16,19 @@ from rigsight.discover.equations import equations
 from rigsight.discover.hysteresis import LOOP, LOOPS, ForceEquation, force_equation
 from rigsight.discover.library import Candidate, candidates, offered_effects, torque_along
 from rigsight.discover.motion import Motion, motion_of
+from rigsight.discover.own_regression import own_regression, rows_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
-from rigsight.discover.selection import STRONG, Bench, Selection, Trial, criterion, proposals, select
+from rigsight.discover.selection import (
+    STRONG,
+    Bench,
+    Selection,
+    Trial,
+    criterion,
+    next_terms,
+    proposals,
+    select,
+)
 from rigsight.discover.weak_form import Rows
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
@@ -29,8 +39,6 @@ from rigsight.simulate.model import Model
 
 Method = Literal["full", "discrepancy"]
 METHODS: tuple[Method, ...] = ("discrepancy", "full")
-_WINDOW = 0.75
-"""Width of a test function in natural periods: long enough to average the noise, short enough to see the motion bend."""
 _LEAST_SAMPLES = 200
 _HELD_BACK = 0.3
 _SAME_COLUMN = 0.999
@@ -40,7 +48,6 @@ _CLEARLY_OFF = 3.0
 _ENSEMBLE_TERMS = 6
 _SAME_REST = 1e-5
 """Shift of the rest position, in units of the motion, that changes no column."""
-_MOST_POINTS = 20_000
 
 
 @dataclass(frozen=True)
@@ -109,8 +116,8 @@ def discover(
     output = task.rig.outputs[0].name
     motions = [motion_of(task.rig, record, values, task.noise[output]) for record in estimation]
     say("motion smoothed")
-    rows = _rows(pointwise, scales["time"], motions)
-    projected = _projected(task, motions, rows)
+    rows = rows_of(motions, scales["time"], pointwise)
+    projected = own_regression(task.rig, task.no_spring, motions, rows)
     library = _library(task, motions, rows, projected, scales)
     library, same = _distinct(library, projected)
     say("library")
@@ -200,26 +207,6 @@ def _without_downstream(rig: Rig, record: Record) -> Record:
     return replace(record, signals={name: s for name, s in record.signals.items() if name in keep})
 
 
-def _projected(task: Task, motions: Sequence[Motion], rows: Rows) -> Projected:
-    """Return the regression of acceleration (or force) on the rig's own terms."""
-    order = 2 if task.rig.is_driven else 0
-    blocks, targets = [], []
-    for motion in motions:
-        velocity, displacement = rows.velocity(motion), rows.of(motion.x)
-        one = np.ones_like(displacement)
-        if not task.rig.is_driven:
-            blocks.append(np.column_stack([velocity, displacement, one]))
-            targets.append(rows.of(motion.measured))
-            continue
-        drive = rows.of(motion.u)
-        own = (drive, -velocity, one) if task.no_spring else (drive, -velocity, -displacement, one)
-        blocks.append(np.column_stack(own))
-        targets.append(rows.acceleration(motion))
-    target = np.concatenate(targets)
-    independent = max(target.size * rows.independent_share(order), 10.0)
-    return Projected(np.concatenate(blocks), target, independent)
-
-
 def _library(
     task: Task, motions: Sequence[Motion], rows: Rows, projected: Projected, scales: Mapping[str, float]
 ) -> list[Candidate]:
@@ -245,12 +232,6 @@ def _distinct(
             dropped.add(second)
             stands_for.setdefault(library[first].name, []).append(library[second].name)
     return [candidate for i, candidate in enumerate(library) if i not in dropped], stands_for
-
-
-def _rows(pointwise: bool, time: float, motions: Sequence[Motion]) -> Rows:
-    if pointwise:
-        return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
-    return Rows.weak(_WINDOW * 2.0 * np.pi * time, motions[0].dt)
 
 
 def _own_terms(task: Task, projected: Projected) -> dict[str, NDArray[np.float64]]:
@@ -364,7 +345,7 @@ def _inclusion(
     if abs(shift) < _SAME_REST * bench.scales["x"]:
         shift = 0.0
     moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
-    projected = _projected(task, moved, rows) if shift else bench.projected
+    projected = own_regression(task.rig, task.no_spring, moved, rows) if shift else bench.projected
     own_terms = _own_terms(task, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
@@ -451,6 +432,7 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
     warnings = warnings_of(
         task,
         found.estimation,
+        found.held_out,
         found.how,
         selection,
         found.chosen,
@@ -459,7 +441,7 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
         found.held,
         found.force,
         task.noise[output] / size,
-        _likeliest(bench, terms),
+        next(iter(next_terms(bench, found.chosen.support)), ""),
     )
     return Discovery(
         title=task.title,
@@ -483,17 +465,6 @@ def _assembled(task: Task, method: Method, pointwise: bool, bench: Bench, found:
         model=Model.of(structure, final.values, found.estimation[0].hold).to_json(),
         warnings=warnings,
     )
-
-
-def _likeliest(bench: Bench, terms: Sequence[Term]) -> str:
-    """Return the term outside the equation that alone explains most of the regression."""
-    kept = {term.name for term in terms if term.kept}
-    shares = {
-        name: bench.projected.explained(candidate.column[:, None])[1]
-        for name, candidate in bench.candidates.items()
-        if name not in kept
-    }
-    return max(shares, key=lambda name: shares[name], default="")
 
 
 def _terms(bench: Bench, found: _Found, coefficients: Mapping[str, Coefficient]) -> tuple[Term, ...]:

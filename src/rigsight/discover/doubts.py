@@ -12,6 +12,7 @@ from rigsight.discover.hysteresis import LOOP, ForceEquation
 from rigsight.discover.result import Coefficient, Term
 from rigsight.discover.selection import STRONG, Selection, Trial, criterion
 from rigsight.effects import Effect
+from rigsight.records.periods import same_signal
 from rigsight.records.record import Record
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ _VAGUE = 0.05
 _FLOOR = 1.5
 _NOISY = 0.1
 """Noise floor, relative to the motion, from which terms may well hide in it."""
+_MOST_NAMED = 3
+_SAME_RATE = 1e-6
+"""Relative difference of sample times that come from columns of time."""
 _NEAR = 1.5
 """Factor of the held-out error within which another equation is nearly as good."""
 _FORCE_TERMS_OF = {"beta": "|x'| |F|^(n-1) F", "gamma": "x' |F|^n"}
@@ -61,6 +65,7 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
 def warnings_of(
     task: Task,
     estimation: Sequence[Record],
+    held_out: Sequence[Record],
     how: str,
     selection: Selection,
     chosen: Trial,
@@ -77,6 +82,7 @@ def warnings_of(
     sizes = [float(np.std(record[source])) for record in estimation]
     if max(sizes) < 1.2 * min(sizes):
         found.append(_one_amplitude(selection, chosen))
+    found += _same_input(source, estimation, held_out)
     best = criterion(chosen, selection.independent)
     rivals = [
         trial
@@ -103,8 +109,8 @@ def warnings_of(
         )
     if floor > _NOISY and likeliest:
         found.append(
-            f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change it by less; "
-            f"in doubt is {likeliest} first."
+            f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change it by less: "
+            f"every term left out is in doubt. Regression would take {likeliest} next, which in such noise proves nothing."
         )
     if excess > _FLOOR:
         found.append(
@@ -122,6 +128,24 @@ def warnings_of(
                 f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
             )
     return tuple(found)
+
+
+def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Record]) -> list[str]:
+    """Return which held-out records drive the rig just as a fitted one does."""
+    twins = {
+        record.name: fitted.name
+        for record in held_out
+        for fitted in estimation
+        if math.isclose(record.dt, fitted.dt, rel_tol=_SAME_RATE)
+        and same_signal(record[source], fitted[source])
+    }
+    if not twins:
+        return []
+    listed = "; ".join(f"'{name}' as '{fitted}'" for name, fitted in list(twins.items())[:_MOST_NAMED])
+    return [
+        f"Held-out records have the input of fitted ones: {listed}. There even wrong terms may fit; the error says little about "
+        "other motion. Add a validation record of another waveform or amplitude."
+    ]
 
 
 def _one_amplitude(selection: Selection, chosen: Trial) -> str:

@@ -80,6 +80,11 @@ def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
     ]
 
 
+def plain_terms(rig: Rig, has_spring: bool) -> list[Effect]:
+    """Return those of the offered effects that are a torque with one coefficient and nothing inside."""
+    return [effect for effect in offered_effects(rig, has_spring) if _is_plain(effect)]
+
+
 def _is_static(effect: Effect) -> bool:
     """Return True for a known signal of displacement, velocity and input: no state, no use of a torque it would change."""
     known = (effect.torque, effect.deflection, effect.drive, effect.delay)

@@ -380,7 +380,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     best = _fewest(pool, cost)
     for _ in range(_ROUNDS):
         shorter = _simpler(bench, best.support)
-        longer = [best.support | {name} for name in _next_terms(bench, best.support)]
+        longer = [best.support | {name} for name in next_terms(bench, best.support)]
         if len(best.support) >= _MOST_TERMS or at_floor(best):
             longer = []
         pool += [tried(frozenset(support)) for support in (*shorter, *longer)]
@@ -454,8 +454,8 @@ def _special_cases(bench: Bench, supports: Sequence[Support]) -> list[Support]:
     return [support for support in found if support not in supports]
 
 
-def _next_terms(bench: Bench, support: Support) -> list[str]:
-    """Return the terms that explain most of what a support leaves of the regression."""
+def next_terms(bench: Bench, support: Support) -> list[str]:
+    """Return the terms that explain most of what a support leaves of the regression, the first one first."""
     inside = [bench.candidates[name].column for name in sorted(support)]
     projected = replace(bench.projected, base=np.column_stack([bench.projected.base, *inside]))
     left = [name for name in bench.candidates if name not in support]

@@ -1,0 +1,141 @@
+"""What does the force look like that an equation lacks? A quick sparse regression on products of displacement and velocity.
+
+No cause is named and nothing is simulated: the terms describe what any cause must look like along these records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from rigsight.discover.library import candidates, plain_terms
+from rigsight.discover.motion import motion_of
+from rigsight.discover.own_regression import own_regression, rows_of
+from rigsight.discover.regression import alike, inclusion_probabilities
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.units import unit_text
+
+_TAKEN = 0.5
+_SAME_COLUMN = 0.995
+
+
+@dataclass(frozen=True)
+class ShapeTerm:
+    """A term of the force that is lacking.
+
+    Attributes
+    ----------
+    term
+        Its expression without the coefficient, in displacement x and velocity v about the rest position.
+    coefficient
+        Of the resisting force [unit].
+    unit
+        Of the coefficient.
+    inclusion
+        How often sparse regression takes it when stretches of the records are drawn anew.
+    """
+
+    term: str
+    coefficient: float
+    unit: str
+    inclusion: float
+
+
+@dataclass(frozen=True)
+class MissingForce:
+    """The shape of the force that an equation lacks.
+
+    Attributes
+    ----------
+    terms
+        The terms that sparse regression takes, the surest first; may be empty.
+    share
+        Share of what the equation leaves of the acceleration (or force, as power) that they explain; noise counts as left.
+    """
+
+    terms: tuple[ShapeTerm, ...]
+    share: float
+
+    @property
+    def sentence(self) -> str:
+        """The finding in words."""
+        if not self.terms:
+            return "No product of displacement x and velocity v describes the force that is lacking."
+        told = " and ".join(f"{t.coefficient:.3g} {t.term} ({t.unit})" for t in self.terms)
+        return (
+            f"Along these records the force that is lacking goes as {told} in displacement x and velocity v: "
+            f"that explains {self.share:.0%} of what the equations leave."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        terms = [
+            {"term": t.term, "coefficient": t.coefficient, "unit": t.unit, "inclusion": t.inclusion}
+            for t in self.terms
+        ]
+        return {"terms": terms, "share": self.share, "sentence": self.sentence}
+
+
+def missing_force(
+    rig: Rig,
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    noise: float,
+    rng: np.random.Generator,
+    no_spring: bool = False,
+) -> MissingForce:
+    """Regress what the rig's own terms leave of the motion.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        Estimation records.
+    values
+        Constants and re-identified parameters.
+    scales
+        Size of each base quantity.
+    noise
+        Noise floor of the first output.
+    rng
+        Source of the ensemble.
+    no_spring
+        True for an axis that has none.
+    """
+    motions = [motion_of(rig, record, values, noise) for record in records]
+    rows = rows_of(motions, scales["time"])
+    projected = own_regression(rig, no_spring, motions, rows)
+    library = candidates(plain_terms(rig, not no_spring), motions, rows, projected, scales, rig.is_driven)
+    library = [c for c in library if np.all(np.isfinite(c.column)) and np.any(c.column)]
+    if not library:
+        return MissingForce((), 0.0)
+    columns = np.column_stack([candidate.column for candidate in library])
+    # Of terms that these records cannot tell apart the first stands for both: a pendulum's sine is a cube until it swings far.
+    doubles = {second for _, second, _ in alike(projected, columns, _SAME_COLUMN)}
+    library = [candidate for i, candidate in enumerate(library) if i not in doubles]
+    columns = columns[:, [i for i in range(columns.shape[1]) if i not in doubles]]
+    inclusion = inclusion_probabilities(projected, columns, rng)
+    taken = [i for i in np.argsort(-inclusion) if inclusion[i] >= _TAKEN]
+    if not taken:
+        return MissingForce((), 0.0)
+    coefficients, share = projected.explained(columns[:, taken])
+    inertia = rig.motion.inertia
+    force = 1.0 if inertia is None else float(inertia.subs({s: values[s.name] for s in inertia.free_symbols}))
+    terms = []
+    for i, coefficient in zip(taken, coefficients, strict=True):
+        (parameter,) = library[i].effect.parameters
+        shape = sp.diff(library[i].effect.torque, sp.Symbol(parameter.name, real=True))
+        unit = unit_text(parameter.dimension, rig.units)
+        terms.append(ShapeTerm(_text(shape), float(coefficient) * force, unit, float(inclusion[i])))
+    return MissingForce(tuple(terms), share)
+
+
+def _text(shape: sp.Expr) -> str:
+    return str(shape).replace("**", "^").replace("*", " ")

@@ -1,0 +1,55 @@
+"""What do the rig's own terms explain? The regression that every further term is added to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigsight.discover.motion import Motion
+from rigsight.discover.regression import Projected
+from rigsight.discover.weak_form import Rows
+from rigsight.rigs import Rig
+
+_WINDOW = 0.75
+"""Width of a test function in natural periods: long enough to average the noise, short enough to see the motion bend."""
+_MOST_POINTS = 20_000
+
+
+def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> Rows:
+    """Return how signals become rows: windows of a rig whose angular frequency is ``1 / time``, or single points."""
+    if pointwise:
+        return Rows.pointwise(max(1, sum(motion.x.size for motion in motions) // _MOST_POINTS))
+    return Rows.weak(_WINDOW * 2.0 * np.pi * time, motions[0].dt)
+
+
+def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
+    """Return the regression of acceleration (or force, where the motion is prescribed) on the rig's own terms.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    no_spring
+        True for an axis that has none.
+    motions
+        Of all records.
+    rows
+        How signals become rows.
+    """
+    order = 2 if rig.is_driven else 0
+    blocks, targets = [], []
+    for motion in motions:
+        velocity, displacement = rows.velocity(motion), rows.of(motion.x)
+        one = np.ones_like(displacement)
+        if not rig.is_driven:
+            blocks.append(np.column_stack([velocity, displacement, one]))
+            targets.append(rows.of(motion.measured))
+            continue
+        drive = rows.of(motion.u)
+        own = (drive, -velocity, one) if no_spring else (drive, -velocity, -displacement, one)
+        blocks.append(np.column_stack(own))
+        targets.append(rows.acceleration(motion))
+    target = np.concatenate(targets)
+    independent = max(target.size * rows.independent_share(order), 10.0)
+    return Projected(np.concatenate(blocks), target, independent)
