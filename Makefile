@@ -30,8 +30,9 @@ check: $(INSTALLED)  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(INSTALLED)  ## measure the simulator against C and scipy
+bench: $(INSTALLED)  ## measure the simulator against C and scipy, and the time of a diagnosis
 	@$(BIN)/python benchmarks/simulation.py
+	@$(BIN)/python benchmarks/diagnosis.py
 
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small

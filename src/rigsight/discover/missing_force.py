@@ -11,17 +11,19 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from rigsight.discover.library import candidates, plain_terms
 from rigsight.discover.motion import motion_of
 from rigsight.discover.own_regression import own_regression, rows_of
-from rigsight.discover.regression import alike, inclusion_probabilities
+from rigsight.discover.regression import Projected, alike, inclusion_probabilities
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.units import unit_text
 
 _TAKEN = 0.5
 _SAME_COLUMN = 0.995
+_WORTH_TELLING = 0.02
+"""Share that a term must explain beside the others to be told."""
 
 
 @dataclass(frozen=True)
@@ -122,19 +124,37 @@ def missing_force(
     library = [candidate for i, candidate in enumerate(library) if i not in doubles]
     columns = columns[:, [i for i in range(columns.shape[1]) if i not in doubles]]
     inclusion = inclusion_probabilities(projected, columns, rng)
-    taken = [i for i in np.argsort(-inclusion) if inclusion[i] >= _TAKEN]
+    taken = [int(i) for i in np.argsort(-inclusion) if inclusion[i] >= _TAKEN]
+    taken = _worth_telling(projected, columns, taken)
     if not taken:
         return MissingForce((), 0.0)
     coefficients, share = projected.explained(columns[:, taken])
-    inertia = rig.motion.inertia
-    force = 1.0 if inertia is None else float(inertia.subs({s: values[s.name] for s in inertia.free_symbols}))
+    force = 1.0
+    if rig.is_driven:
+        # The drive's force is known: per unit of acceleration it gives the inertia that goes with these terms.
+        gain = rig.motion.drive_gain
+        drive, *_ = projected.solved(columns[:, taken])[0]
+        force = float(gain.subs({s: values[s.name] for s in gain.free_symbols})) / drive
     terms = []
     for i, coefficient in zip(taken, coefficients, strict=True):
         (parameter,) = library[i].effect.parameters
         shape = sp.diff(library[i].effect.torque, sp.Symbol(parameter.name, real=True))
-        unit = unit_text(parameter.dimension, rig.units)
+        unit = rig.with_unit(parameter).unit
         terms.append(ShapeTerm(_text(shape), float(coefficient) * force, unit, float(inclusion[i])))
     return MissingForce(tuple(terms), share)
+
+
+def _worth_telling(projected: Projected, columns: NDArray[np.float64], taken: Sequence[int]) -> list[int]:
+    """Leave out terms, one by one, that the others hardly miss."""
+    kept = list(taken)
+    while kept:
+        share = projected.explained(columns[:, kept])[1]
+        without = [projected.explained(columns[:, [i for i in kept if i != out]])[1] for out in kept]
+        least = int(np.argmax(without))
+        if share - without[least] >= _WORTH_TELLING:
+            break
+        del kept[least]
+    return kept
 
 
 def _text(shape: sp.Expr) -> str:
