@@ -41,6 +41,10 @@ DEFAULT_ACCURACY = 1e-4
 """Relative accuracy of simulations inside a fit: below the noise of any bench."""
 _MOST_SUBSTEPS = 16
 """A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
+_MOST_ROUNDS = 4
+"""Fits that follow each other with finer steps."""
+_WORTH_REFINING = 1e-3
+"""Share of the cost that finer steps must promise to remove."""
 _STATE_RANGE = 20.0
 """How far an initial state may move from its guess, in units of its size."""
 _LEAST_RANGE = 1e-9
@@ -181,24 +185,31 @@ class GreyBoxFit:
         known = None if self.memory is None else self.memory.recall(key)
         if known is not None:
             problem.n_evaluations = known["evaluations"] - 1
+            problem.substeps = list(known["substeps"])
             return self._result(problem, np.array(known["theta"]), known["success"], known["message"], finish)
-        solution = least_squares(
-            problem.residual,
-            theta,
-            jac=problem.jacobian,
-            bounds=(lower, upper),
-            method="trf",
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=0.1 * tolerance,
-            gtol=1e-3 * tolerance,
-            max_nfev=max_evaluations,
-        )
+        for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
+            solution = least_squares(
+                problem.residual,
+                theta,
+                jac=problem.jacobian,
+                bounds=(lower, upper),
+                method="trf",
+                x_scale="jac",
+                ftol=tolerance,
+                xtol=0.1 * tolerance,
+                gtol=1e-3 * tolerance,
+                max_nfev=max_evaluations,
+            )
+            theta = solution.x
+            # A time constant on its way to zero is held back where steps chosen for a longer one become unstable.
+            if not (finish and substeps is None and problem.refined(theta)):
+                break
         success = bool(solution.status > 0)
-        result = self._result(problem, solution.x, success, solution.message, finish)
+        result = self._result(problem, theta, success, solution.message, finish)
         if self.memory is not None:
-            outcome = {"theta": solution.x.tolist(), "success": success, "message": solution.message}
-            self.memory.remember(key, {**outcome, "evaluations": result.n_evaluations})
+            outcome = {"theta": theta.tolist(), "success": success, "message": solution.message}
+            steps = {"evaluations": result.n_evaluations, "substeps": problem.substeps}
+            self.memory.remember(key, {**outcome, **steps})
         return result
 
     def _key(
@@ -363,6 +374,26 @@ class _Problem:
                 )
             except SimulationError:
                 self.substeps[i] = _MOST_SUBSTEPS
+
+    def refined(self, theta: NDArray[np.float64]) -> bool:
+        """Double the substeps if the cost would then fall further from here; return True if so."""
+        before = self.substeps
+        within_reach = self._removable(theta)
+        self.substeps = [min(2 * n, _MOST_SUBSTEPS) for n in before]
+        self._last = None
+        if self.substeps != before and self._removable(theta) > within_reach + _WORTH_REFINING:
+            self._best = float("inf")
+            return True
+        self.substeps, self._last = before, None
+        return False
+
+    def _removable(self, theta: NDArray[np.float64]) -> float:
+        """Return the share of the cost that a full Gauss-Newton step promises to remove."""
+        evaluation = self.at(theta)
+        if not np.isfinite(evaluation.cost):
+            return 0.0
+        _, projection = _compressed(evaluation)
+        return float(projection @ projection) / max(evaluation.cost, 1e-300)
 
     def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a vector with the same cost and the same projection on the derivatives as the residuals."""

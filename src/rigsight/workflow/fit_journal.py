@@ -87,4 +87,5 @@ def _checked(entry: Mapping[str, Any]) -> Mapping[str, Any]:
         "success": bool(entry["success"]),
         "message": str(entry["message"]),
         "evaluations": int(entry["evaluations"]),
+        "substeps": [int(value) for value in entry["substeps"]],
     }
