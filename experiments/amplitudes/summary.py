@@ -8,37 +8,42 @@ from pathlib import Path
 
 Errors = dict[tuple[str, str], dict[str, float]]
 """(signal, quantity) -> record -> error."""
+Failures = dict[tuple[str, str], list[str]]
+"""(model, what went wrong) -> records."""
 
 _LABELS = {"identify": "linear", "calibrate": "Bouc-Wen", "discover": "discovered"}
 _SHOWN = {
     ("u -> psi", "magnitude_db"): ("dB", "Magnitude u -> psi: RMS error in dB on sweeps", "sweep", "{:.2f}", 1.0),
-    ("u -> psi", "phase_rmse"): ("phase", "Phase u -> psi: RMSE (5.1) in rad on sweeps", "sweep", "{:.2f}", 1.0),
+    ("u -> psi", "phase_rmse"): ("phase", "Phase u -> psi: RMSE (5.1) in rad on sweeps", "sweep", "{:.3f}", 1.0),
     ("u -> psi", "magnitude_rmse"): (
         "magnitude", "Magnitude u -> psi: RMSE (5.1) in 1e-3 rad/A on sweeps", "sweep", "{:.2f}", 1e3
     ),
     ("psi", "step_rmse"): ("step", "Step, psi: RMSE in 1e-3 rad over 4 s", "step", "{:.3f}", 1e3),
-    ("psi", "free_run_nrmse"): ("free run", "Free run, psi: NRMSE in % on sweeps", "sweep", "{:.0f}", 100.0),
+    ("psi", "free_run_nrmse"): ("free run", "Free run, psi: NRMSE in % on sweeps", "sweep", "{:.1f}", 100.0),
 }  # fmt: skip
 
 
-def read_errors(out: Path) -> tuple[dict[str, Errors], Errors]:
-    """Return the errors by model, and the noise floors, from all comparisons that are finished; the joint config first."""
+def read_errors(out: Path) -> tuple[dict[str, Errors], Errors, Failures]:
+    """Return errors by model, noise floors and failures from all comparisons that are finished; the joint config first."""
     models: dict[str, Errors] = {}
     floors: Errors = {}
+    failures: Failures = {}
     for file in sorted(out.glob("*/compare/comparison.csv"), key=_order):
         config = file.parents[1].name
         with file.open(encoding="utf-8", newline="") as stream:
             for row in csv.DictReader(stream):
-                if not row["value"]:
-                    continue
                 label = row["model"]
                 if label in _LABELS:
                     label = f"{_LABELS[label]}, {config.replace('_', ' ')}"
+                if not row["value"]:
+                    records = failures.setdefault((label, row["problem"]), [])
+                    records += [row["record"]] if row["record"] not in records else []
+                    continue
                 key = (row["signal"], row["quantity"])
                 models.setdefault(label, {}).setdefault(key, {})[row["record"]] = float(row["value"])
                 if row["noise_floor"]:
                     floors.setdefault(key, {})[row["record"]] = float(row["noise_floor"])
-    return models, floors
+    return models, floors, failures
 
 
 def _order(file: Path) -> tuple[bool, str, float]:
@@ -47,12 +52,16 @@ def _order(file: Path) -> tuple[bool, str, float]:
 
 
 def summary_text(out: Path) -> str:
-    """Return the tables as Markdown, best of each column in bold; the truth itself stands below the line."""
-    models, floors = read_errors(out)
+    """Return the tables as Markdown; bold is what prints as the best of its column, the truth itself left out."""
+    models, floors, failures = read_errors(out)
     if not models:
         return "Nothing was compared.\n"
     blocks = ["\n".join(_table(models, floors, key)) for key in _SHOWN]
-    return "\n\n".join([*blocks, "\n".join(_sentences(models))]).rstrip() + "\n"
+    told = [
+        f"- '{model}' failed on {', '.join(records)}: {problem}"
+        for (model, problem), records in failures.items()
+    ]
+    return "\n\n".join([*blocks, "\n".join([*told, *_sentences(models)])]).rstrip() + "\n"
 
 
 def _table(models: Mapping[str, Errors], floors: Errors, key: tuple[str, str]) -> Iterator[str]:
@@ -64,15 +73,16 @@ def _table(models: Mapping[str, Errors], floors: Errors, key: tuple[str, str]) -
     yield f"|---{'|---:' * len(heads)}|"
     rivals = [name for name in models if name != "iwan_tables"]
     best = {
-        r: min((models[n][key][r] for n in rivals if r in models[n].get(key, {})), default=0.0)
+        r: form.format(
+            factor * min((models[n][key][r] for n in rivals if r in models[n].get(key, {})), default=0.0)
+        )
         for r in records
     }
     for name in [*rivals, *(n for n in models if n == "iwan_tables")]:
         errors = models[name].get(key, {})
         cells = [form.format(factor * errors[r]) if r in errors else "failed" for r in records]
         bold = [
-            f"**{c}**" if name in rivals and errors.get(r) == best[r] else c
-            for r, c in zip(records, cells, strict=True)
+            f"**{c}**" if name in rivals and c == best[r] else c for r, c in zip(records, cells, strict=True)
         ]
         yield f"| {'iwan_tables (the truth)' if name == 'iwan_tables' else name} | {' | '.join(bold)} |"
     known = floors.get(key, {})

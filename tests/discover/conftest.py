@@ -38,6 +38,8 @@ TRUTHS = {
         ("bouc_wen_hysteresis",),
         {"k": 300.0, "a": 0.25, "A": 1.0, "beta": 1200.0 * 1700**0.5, "gamma": 500.0 * 1700**0.5, "n": 1.5},
     ),
+    # The sliders let go from 0.03 to 6 mm, the range that sweeps of these amplitudes pass through.
+    "Iwan": Truth(("iwan_hysteresis",), {"k": 600.0, "a": 0.15, "x_s": 1e-2, "q": -0.3}),
     "monomial": Truth(("monomial_x1_v1",), {"c_11": 200.0}),
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ CASES = {
     "quadratic": ({"quadratic_damping"}, 0.01),
     "Bouc-Wen, n = 1": ({"bouc_wen_hysteresis"}, 0.05),
     "Bouc-Wen, n = 1.5": ({"bouc_wen_hysteresis"}, 0.3),
+    "Iwan": ({"iwan_hysteresis"}, 0.005),
     "monomial": ({"monomial_x1_v1"}, 0.05),
 }
 
@@ -52,12 +54,32 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, make_t
             assert term.inclusion < 0.5, term.name
 
 
+@pytest.mark.parametrize(
+    ("truth", "there", "rival"),
+    [
+        ("Iwan", "iwan_hysteresis", "bouc_wen_hysteresis"),
+        ("Bouc-Wen, n = 1", "bouc_wen_hysteresis", "iwan_hysteresis"),
+    ],
+)
+def test_one_hysteresis_is_not_taken_for_the_other(
+    truth: str, there: str, rival: str, make_task: Make
+) -> None:
+    _, task = make_task(truth, 2e-5)
+    found = discover(task)
+    assert [term.name for term in found.kept] == [there]
+    assert found.held_out_error < 1.1
+    assert {term.name: term.inclusion for term in found.terms}.get(rival, 0.0) < 0.5
+
+
 def test_too_much_noise_to_decide_is_said(make_task: Make) -> None:
     # Noise as large as the motion at the middle amplitude hides the friction.
     _, task = make_task("Coulomb", 5e-3, seconds=5.0)
     found = discover(task)
     assert found.kept == ()
-    assert any("too high to decide" in warning and "in doubt" in warning for warning in found.warnings)
+    assert any(
+        "too high to decide" in warning and "every term left out is in doubt" in warning
+        for warning in found.warnings
+    )
     # Less of it shows the friction, and that its size is vague.
     _, task = make_task("Coulomb", 2e-3, seconds=5.0)
     (friction,) = discover(task).kept
@@ -73,6 +95,17 @@ def test_one_amplitude_is_warned_of(make_task: Make) -> None:
     assert any("told apart" in w and "elsewhere they are untested" in w for w in discover(task).warnings)
     _, task = make_task("Coulomb", 1e-3, amplitudes=(0.6,), seconds=5.0)
     assert any("Nearly as good there is" in warning for warning in discover(task).warnings)
+
+
+def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_task: Make) -> None:
+    _, task = make_task("linear", 2e-5, amplitudes=(0.3, 0.6))
+    assert not any("input of fitted ones" in warning for warning in discover(task).warnings)
+    # Another measurement of the same sweep: other noise, and it starts a second later.
+    _, again = make_task("linear", 2e-5, amplitudes=(0.6,), seed=1, validation=False)
+    twin = replace(again.records[0].slice(200, None), name="again", role="validation")
+    estimation = tuple(record for record in task.records if record.role == "estimation")
+    found = discover(replace(task, records=(*estimation, twin)))
+    assert any("'again' as 'sweep_0.6'" in warning for warning in found.warnings)
 
 
 def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None:

@@ -115,3 +115,29 @@ Stage(Path({str(tmp_path)!r}) / "stage", {{}}, work).ensure()
     assert stage.ensure()
     assert {path.name for path in (tmp_path / "stage").iterdir()} == {"whole", "settings.json"}
     assert [path.name for path in tmp_path.iterdir()] == ["stage"]
+
+
+def test_the_table_marks_all_that_print_as_the_best_and_says_why_a_model_failed(
+    experiment: ModuleType, tmp_path: Path
+) -> None:
+    import summary
+
+    head = "model,record,role,kind,amplitude,signal,quantity,unit,value,noise_floor,n_values,best,problem\n"
+    row = "{},sweep_1.00A,validation,sweep,1,u -> psi,magnitude_db,dB,{},0.5,9,no,{}\n"
+    for config, value, problem in (
+        ("joint", "0.211", ""), ("amplitude_0.50", "0.209", ""), ("amplitude_0.75", "", "it ran away.")
+    ):  # fmt: skip
+        folder = tmp_path / config / "compare"
+        folder.mkdir(parents=True)
+        truth = row.format("iwan_tables", "0.1", "")
+        (folder / "comparison.csv").write_text(head + row.format("discover", value, problem) + truth)
+    # Without a single number a model has no line; this one has one elsewhere.
+    step = "discover,step_1.00A,validation,step,1,psi,step_rmse,rad,0.001,0.0001,9,no,\n"
+    with (tmp_path / "amplitude_0.75/compare/comparison.csv").open("a") as file:
+        file.write(step)
+    lines = summary.summary_text(tmp_path).splitlines()
+    assert "| discovered, joint | **0.21** |" in lines
+    assert "| discovered, amplitude 0.50 | **0.21** |" in lines
+    assert "| discovered, amplitude 0.75 | failed |" in lines
+    assert "| iwan_tables (the truth) | 0.10 |" in lines
+    assert "- 'discovered, amplitude 0.75' failed on sweep_1.00A: it ran away." in lines

@@ -1,12 +1,15 @@
-"""Does a signal repeat exactly, and after how many samples?"""
+"""Does a signal repeat itself, or another one, and after how many samples?"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import correlate
 
 _SAME = 1e-3
 """Largest difference between two periods of one signal, relative to its standard deviation."""
+_ALIKE = 0.01
+"""Largest RMS difference of two signals that count as the same, relative to the standard deviation: both may be measured."""
 
 
 def repeated_period(samples: NDArray[np.float64]) -> int | None:
@@ -25,3 +28,22 @@ def repeated_period(samples: NDArray[np.float64]) -> int | None:
         if np.max(np.abs(samples[lag:] - samples[:-lag])) <= _SAME * size:
             return int(lag)
     return None
+
+
+def same_signal(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
+    """Return True if the shorter of two signals is a stretch of the longer one, amplitude and mean included.
+
+    Parameters
+    ----------
+    first, second
+        Samples, shape (n_samples,) each, at the same sample time.
+    """
+    short, long = sorted((first, second), key=len)
+    mean, size = float(np.mean(short)), float(np.std(short))
+    if size == 0.0:
+        return False
+    part, whole = short - mean, long - mean
+    energy = np.concatenate([[0.0], np.cumsum(whole**2)])
+    squares = energy[part.size :] - energy[: -part.size] + float(part @ part)
+    squares -= 2.0 * correlate(whole, part, mode="valid", method="fft")
+    return bool(np.min(squares) <= part.size * (_ALIKE * size) ** 2)
