@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from rigsight.diagnose.characterize import fit_linear
 from rigsight.diagnose.gap_parts import Localization
 from rigsight.diagnose.localize import localize
-from rigsight.diagnose.result import STAGES, Trace
+from rigsight.diagnose.result import STAGES, NoiseFloor, Trace
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
@@ -234,3 +235,29 @@ def test_a_clean_path_says_so() -> None:
     true = as_given(bench, GEAR)
     where, _ = localized(bench, true, true, true)
     assert "No leg of the path has a gap" in where.sentence
+
+
+def test_the_floor_of_a_band_follows_the_noise_where_it_was_seen_alone() -> None:
+    """Noise below 6 rad/s only: the bands there carry the floor, those above nothing; white noise spreads over all."""
+    records = measured(AXIS, ["coulomb_friction"], {**STAGE, "T_c": 0.5})
+    bench = workbench(AXIS, records, STAGE)
+    true = as_given(bench, STAGE)
+    shown = traces(bench, true, true, true)
+    rng = np.random.default_rng(0)
+    slow = scipy.signal.sosfiltfilt(
+        scipy.signal.butter(4, 6.0 * DT / np.pi, output="sos"), rng.standard_normal(4000)
+    )
+    seen = NoiseFloor("x", "m", NOISE, "stretches in which the input rests", stretches=((slow, DT),))
+
+    def localized_with(*floors: NoiseFloor) -> Localization:
+        return localize(bench, shown, "validation", true, true, true, np.random.default_rng(0), floors=floors)
+
+    colored, white = localized_with(seen), localized_with()
+    assert (colored.noise_shape, white.noise_shape) == ({"x": "measured"}, {"x": "white"})
+    for where in (colored, white):
+        total = sum(part.noise_floor**2 for part in where.by_band)
+        assert total == pytest.approx(where.by_record[0].noise_floor ** 2, rel=0.5)
+    fast = [part.noise_floor for part in colored.by_band if part.omega_low > 12.0]
+    assert max(fast) < 0.05 * max(part.noise_floor for part in colored.by_band)
+    spread = [part.noise_floor for part in white.by_band if part.omega_low > 12.0]
+    assert max(spread) == max(part.noise_floor for part in white.by_band)

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import NoiseFloor
+from rigsight.diagnose.result import NoiseFloor, Stretches
 from rigsight.records.periods import repeated_period
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -45,7 +45,7 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
         if holding:
-            std, method = _noise_floor(rig, signal.name, holding)
+            std, method, stretches = _noise_floor(rig, signal.name, holding)
             spread = max(float(np.std(record[signal.name])) for record in holding)
             size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
             floors.append(
@@ -55,48 +55,53 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
                     max(std, _SMALLEST * size),
                     method,
                     lower_bound=method == _WHITE_ONLY or (not rig.is_driven and method == _AT_REST),
+                    stretches=stretches,
                 )
             )
     return tuple(floors)
 
 
-def _noise_floor(rig: Rig, output: str, records: Sequence[Record]) -> tuple[float, str]:
+def _noise_floor(rig: Rig, output: str, records: Sequence[Record]) -> tuple[float, str, Stretches]:
     source = rig.inputs[0].name
     repeated = _repeated(source, output, records)
-    if repeated is not None:
-        return repeated, "repeated periods of the input"
+    if repeated:
+        squares = [np.var(group, axis=0, ddof=1) for group, _ in repeated]
+        left = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]
+        scatter = float(np.sqrt(np.mean([float(np.mean(square)) for square in squares])))
+        return scatter, "repeated periods of the input", tuple(left)
     top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
     if not rig.is_driven:
         # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
         top = min(top, float(np.median([_roughness(record[output]) for record in records])))
     quiet = [q for record in records for q in _quiet_stretches(record, source, output)]
     if quiet:
-        return max(float(np.median(quiet)), top), _AT_REST
-    return top, _WHITE_ONLY
+        deviations = [float(np.std(stretch)) for stretch, _ in quiet]
+        return max(float(np.median(deviations)), top), _AT_REST, tuple(quiet)
+    return top, _WHITE_ONLY, ()
 
 
-def _repeated(source: str, output: str, records: Sequence[Record]) -> float | None:
-    """Return the scatter over repetitions of the same input, within records and from record to record."""
+def _repeated(source: str, output: str, records: Sequence[Record]) -> list[tuple[NDArray[np.float64], float]]:
+    """Return groups of answers to the same input, shape (n_repetitions, n_samples), within records and from one to the next."""
     segments = []
     for record in records:
         period = repeated_period(record[source])
         if period is None:
-            segments.append((record[source], record[output], False))
+            segments.append((record[source], record[output], False, record.dt))
             continue
         count = record.n_samples // period
         # The first period still holds the transient.
         for i in range(1 if count > 1 else 0, count):
             part = slice(i * period, (i + 1) * period)
-            segments.append((record[source][part], record[output][part], count > 1))
-    squares: list[float] = []
+            segments.append((record[source][part], record[output][part], count > 1, record.dt))
+    groups: list[tuple[NDArray[np.float64], float]] = []
     used: set[int] = set()
-    for i, (first_input, first_output, first_settled) in enumerate(segments):
+    for i, (first_input, first_output, first_settled, dt) in enumerate(segments):
         if i in used:
             continue
         size = float(np.std(first_input)) or 1.0
         group, settled = [first_output], first_settled
         for j in range(i + 1, len(segments)):
-            other_input, other_output, other_settled = segments[j]
+            other_input, other_output, other_settled, _ = segments[j]
             if other_input.size != first_input.size or j in used:
                 continue
             if np.max(np.abs(other_input - first_input)) <= _SAME_INPUT * size:
@@ -106,12 +111,12 @@ def _repeated(source: str, output: str, records: Sequence[Record]) -> float | No
         if len(group) > 1:
             # Whole records may start in different motion; by their second half they have forgotten it.
             start = 0 if settled else first_input.size // 2
-            squares.append(float(np.mean(np.var(np.array(group)[:, start:], axis=0, ddof=1))))
-    return float(np.sqrt(np.mean(squares))) if squares else None
+            groups.append((np.array(group)[:, start:], dt))
+    return groups
 
 
-def _quiet_stretches(record: Record, source: str, output: str) -> list[float]:
-    """Return the standard deviations of the output in the settled part of long stretches of constant input."""
+def _quiet_stretches(record: Record, source: str, output: str) -> list[tuple[NDArray[np.float64], float]]:
+    """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
     samples = record[source]
     span = float(np.ptp(samples))
     still = np.abs(np.diff(samples)) <= _QUIET_INPUT * span
@@ -130,7 +135,7 @@ def _quiet_stretches(record: Record, source: str, output: str) -> list[float]:
         # A drift or a decaying oscillation is not noise. What is as rough as white noise is no oscillation.
         steady = trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300
         if steady and (deviation <= 3.0 * scatter or not _is_free_motion(settled)):
-            found.append(deviation)
+            found.append((settled - np.mean(settled), record.dt))
     return found
 
 

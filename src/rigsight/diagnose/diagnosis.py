@@ -164,8 +164,6 @@ def diagnose(
         task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on, rng
     )
     lacking = _missing_force(bench, linear, no_spring, rng) if judgement.verdict == "unknown" else None
-    if lacking is not None:
-        diagnosis = replace(diagnosis, notes=(*diagnosis.notes, lacking.sentence))
     return replace(diagnosis, data_quality=quality, missing_force=lacking)
 
 
@@ -304,7 +302,7 @@ def _assembled(
         advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
         if is_effect
         else (),
-        localization=localize(bench, traces, scored_on, before, linear, after, rng),
+        localization=localize(bench, traces, scored_on, before, linear, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),

@@ -8,9 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-NOISE_SHAPE = "white"
-"""Spectrum that the noise floor is given over bands: one number per output says how much noise there is, not where."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class GapPart:
@@ -149,7 +146,10 @@ class PathPart(GapPart):
 
 @dataclass(frozen=True)
 class Localization:
-    """The gap split by record, amplitude, band, state, time and signal path; `sentence` says what the paths tell."""
+    """The gap split by record, amplitude, band, state, time and signal path; `sentence` says what the paths tell.
+
+    ``noise_shape`` tells for each output how its noise floor is spread over bands: as ``"measured"``, or as ``"white"`` noise.
+    """
 
     by_record: tuple[RecordPart, ...] = ()
     by_amplitude: tuple[AmplitudePart, ...] = ()
@@ -158,6 +158,7 @@ class Localization:
     by_time: tuple[TimePart, ...] = ()
     by_path: tuple[PathPart, ...] = ()
     sentence: str = ""
+    noise_shape: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields of ``diagnosis.json`` that begin with ``gap_by_``, and the sentence."""
@@ -172,7 +173,7 @@ class Localization:
         lists: dict[str, Any] = {
             name: [part.to_json() for part in entries] for name, entries in parts.items()
         }
-        return {**lists, "path_evidence": self.sentence, "noise_floor_shape": NOISE_SHAPE}
+        return {**lists, "path_evidence": self.sentence, "noise_floor_shape": dict(self.noise_shape)}
 
 
 def _plain(value: Any) -> Any:

@@ -19,7 +19,7 @@ from rigsight.diagnose.gap_parts import (
 )
 from rigsight.diagnose.paths import path_parts, path_sentence
 from rigsight.diagnose.quantify import budget_intervals
-from rigsight.diagnose.result import STAGES, Trace
+from rigsight.diagnose.result import STAGES, NoiseFloor, Stretches, Trace
 from rigsight.diagnose.state_plane import state_parts
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.metrics import rms
@@ -27,6 +27,8 @@ from rigsight.metrics import rms
 _STRETCHES = 24
 """Stretches of time into which a record is cut."""
 _FEWEST_SAMPLES = 20
+_LEAST_NOISE = 250
+"""Samples of noise alone below which its spectrum is not worth a guess."""
 
 
 def localize(
@@ -37,6 +39,7 @@ def localize(
     linear: Scored,
     after: Scored,
     rng: np.random.Generator,
+    floors: Sequence[NoiseFloor] = (),
 ) -> Localization:
     """Return the gap split in every way.
 
@@ -52,17 +55,21 @@ def localize(
         The given simulation, the re-identified equations, the model of the verdict.
     rng
         Source of the resampling behind the intervals.
+    floors
+        Noise floors with their stretches; the noise of an output without any is taken to be white.
     """
+    stretches = {floor.output: _long_enough(floor.stretches) for floor in floors}
     scored = [trace for trace in traces if trace.role == scored_on]
     by_path = path_parts(bench, before, linear, after)
     return Localization(
         by_record=tuple(_by_record(traces, scored_on, bench.noise, rng)),
         by_amplitude=tuple(_by_amplitude(bench, traces, scored_on)),
-        by_band=tuple(_by_band(scored, bench.noise)),
+        by_band=tuple(_by_band(scored, bench.noise, stretches)),
         by_state=state_parts(bench, linear, scored),
         by_time=tuple(_by_time(scored, bench.noise)),
         by_path=by_path,
         sentence=path_sentence(by_path, bench.rig),
+        noise_shape={output: "measured" if stretches.get(output) else "white" for output in bench.noise},
     )
 
 
@@ -116,7 +123,9 @@ def _by_amplitude(bench: Workbench, traces: Sequence[Trace], scored_on: str) -> 
     return parts
 
 
-def _by_band(scored: Sequence[Trace], noise: Mapping[str, float]) -> list[BandPart]:
+def _by_band(
+    scored: Sequence[Trace], noise: Mapping[str, float], stretches: Mapping[str, Stretches]
+) -> list[BandPart]:
     parts = []
     for output, std in noise.items():
         holding = [trace for trace in scored if output in trace.measured]
@@ -133,7 +142,9 @@ def _by_band(scored: Sequence[Trace], noise: Mapping[str, float]) -> list[BandPa
             )
             for stage in STAGES
         }
-        floor = np.average([_white(std, trace.dt, edges) for trace in holding], axis=0, weights=weights)
+        floor = _colored(std, stretches.get(output, ()), edges)
+        if floor is None:
+            floor = np.average([_white(std, trace.dt, edges) for trace in holding], axis=0, weights=weights)
         total = float(np.sum(powers["reidentified"]))
         for i in range(edges.size - 1):
             parts.append(
@@ -150,6 +161,19 @@ def _by_band(scored: Sequence[Trace], noise: Mapping[str, float]) -> list[BandPa
                 )
             )
     return parts
+
+
+def _long_enough(stretches: Stretches) -> Stretches:
+    return tuple((noise, dt) for noise, dt in stretches if noise.size >= _LEAST_NOISE)
+
+
+def _colored(std: float, stretches: Stretches, edges: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the power of the noise in each band from stretches of noise alone, shape (n_bands,); None without any."""
+    if not stretches:
+        return None
+    powers = [band_powers(noise, dt, edges) for noise, dt in stretches]
+    mean = np.average(powers, axis=0, weights=[noise.size for noise, _ in stretches])
+    return np.asarray(mean * std**2 / float(np.sum(mean)))
 
 
 def _white(std: float, dt: float, edges: NDArray[np.float64]) -> NDArray[np.float64]:

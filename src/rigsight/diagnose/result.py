@@ -123,11 +123,16 @@ class Advice:
         }
 
 
+Stretches = tuple[tuple[NDArray[np.float64], float], ...]
+"""Pieces of noise alone, shape (n_samples,) each, with their sample time [s]."""
+
+
 @dataclass(frozen=True)
 class NoiseFloor:
     """Standard deviation of what no model can explain in an output, and how it was found.
 
-    ``lower_bound`` says that only white noise was seen: colored noise and disturbances may stand above it.
+    ``lower_bound`` says that only part of the noise was seen: colored noise and disturbances may stand above it. ``stretches``
+    are pieces of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise.
     """
 
     output: str
@@ -135,6 +140,7 @@ class NoiseFloor:
     std: float
     method: str
     lower_bound: bool = False
+    stretches: Stretches = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)

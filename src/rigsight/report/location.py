@@ -80,6 +80,11 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     )
     figures = []
     if bands:
+        spread = (
+            "spread over frequency as in the stretches of noise alone"
+            if diagnosis.localization.noise_shape.get(output) == "measured"
+            else "taken to be spread evenly over frequency"
+        )
         said = [
             (
                 f"above {p.omega_low:.3g} rad/s"
@@ -95,7 +100,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
                 f"{key}-bands",
                 f"Bars of the gap by band of frequency. {_told(said, last)}",
                 f"By frequency. {_largest(said)} The squares of the bars add up to the square of the gap; the noise floor is "
-                "taken to be spread evenly over frequency.",
+                f"{spread}.",
             )
         )
     if states:

@@ -46,6 +46,8 @@ class Summary:
         diagnosis = self.diagnosis
         yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
         yield text(verdict_sentence(diagnosis))
+        if diagnosis.missing_force is not None:
+            yield text(diagnosis.missing_force.sentence)
         if diagnosis.ambiguous_with:
             yield text(ambiguity_sentence(diagnosis))
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:
