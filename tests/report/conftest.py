@@ -21,6 +21,7 @@ from rigsight.diagnose.gap_parts import (
     TimePart,
 )
 from rigsight.diagnose.result import Advice, Candidate, Diagnosis, Estimate, NoiseFloor, OutputGap, Trace
+from rigsight.discover.missing_force import MissingForce, ShapeTerm
 from rigsight.report import render_report
 
 NOISE = {"psi": 4e-4, "y": 3e-5, "force": 12.0}
@@ -212,7 +213,12 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
             "notes": (),
             "localization": Localization(),
         },
-        "unknown": {**nothing, "verdict": "unknown", "where": ("yaw_dynamics",)},
+        "unknown": {
+            **nothing,
+            "verdict": "unknown",
+            "where": ("yaw_dynamics",),
+            "missing_force": MissingForce((ShapeTerm("v^3", 14.3, "N m s^3/rad^3", 1.0),), 0.98),
+        },
         "not finite": {**one, "gap": {"psi": OutputGap(float("nan"), float("inf"), 0.01, 0.009)}},
         "no validation": {
             "scored_on": "estimation",

@@ -162,3 +162,8 @@ def test_parameters_have_intervals_inside_their_own_range(page_of: Callable[[str
         "k_3 (\u22123.100 \u00b1 0.020) \u00b7 10 5 \u22123.139 \u00b7 10 5 to \u22123.061 \u00b7 10 5"
         in words
     )
+
+
+def test_an_unknown_gap_is_described_by_the_force_that_is_lacking(page_of: Callable[[str], str]) -> None:
+    assert "14.3 v^3 (N m s^3/rad^3)" in page_of("unknown")
+    assert "v^3" not in page_of("effect")

@@ -59,3 +59,9 @@ def test_one_experiment_is_named_and_the_rest_left_to_the_report(variant: Callab
     assert "To tell Coulomb friction apart, drive a sweep of amplitude 1.25 A from 0.5 to 40 rad/s" in text
     assert "differ by 23 standard deviations of the noise" in text
     assert "Stribeck friction apart" not in text
+
+
+def test_an_unknown_gap_is_described_by_the_force_that_is_lacking(
+    variant: Callable[[str], Diagnosis],
+) -> None:
+    assert "14.3 v^3 (N m s^3/rad^3)" in " ".join(printed(variant("unknown")))
