@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.blind import Trial, draw_trial, n_trials, subject_of
+from rigsight.blind.campaign import draw_rig
 from rigsight.blind.subjects import TIERS, Subject
 from rigsight.simulate import compose, simulate
 
@@ -78,3 +79,9 @@ def test_records_look_alike_whatever_is_hidden(cubic: Trial) -> None:
         assert (one.name, one.role, one.kind, one.hold, one.n_samples, one.dt) == (
             two.name, two.role, two.kind, two.hold, two.n_samples, two.dt,
         )  # fmt: skip
+
+
+def test_the_weights_sine_gets_an_axis_that_swings_wide() -> None:
+    """On a running gear that turns by milliradians it is a cube, and leaves no gap at all."""
+    rigs = [draw_rig(np.random.default_rng(seed), None, swings_wide=True) for seed in range(20)]
+    assert {linear.rig.name for linear in rigs} == {"axis"}

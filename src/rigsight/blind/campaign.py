@@ -86,7 +86,7 @@ def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> Li
         True for an axis whose displacement must reach a radian.
     """
     drawn = RUNNING_GEAR if rng.random() < 0.6 else AXIS
-    rig = rig or drawn
+    rig = rig or (AXIS if swings_wide else drawn)
     if rig is RUNNING_GEAR:
         inertia = 0.56 * math.exp(rng.uniform(-0.4, 0.4))
         omega = rng.uniform(8.0, 18.0)
