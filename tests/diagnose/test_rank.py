@@ -113,3 +113,13 @@ def test_a_worse_model_far_above_the_floor_may_tie_within_what_the_best_leaves(s
 
 def test_an_output_that_was_not_measured_does_not_count() -> None:
     np.testing.assert_array_equal(noise_vector(["psi", "y"], {"psi": 2.0}), [2.0, np.inf])
+
+
+def test_with_one_output_a_late_drive_is_named_before_a_late_sensor(scored, white) -> None:
+    """Both are the same records there; the other one stays among those that cannot be told from it."""
+    late_sensor = scored(("sensor_delay",), white)
+    late_drive = scored(("input_delay",), 1.0001 * white)
+    found = ranked(late_sensor, late_drive)
+    assert found.order[0] is late_drive
+    assert found.tied == (late_sensor,)
+    assert found.probabilities[0] == pytest.approx(0.75, abs=0.02)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.block_means import RESAMPLES, block_means
 from rigsight.diagnose.workbench import Scored
+from rigsight.effects.effect import Place
 
 _TIE = 0.01
 """Relative difference of held-out errors that no engineer would build a decision on."""
@@ -67,7 +68,9 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])
-    prior = _PRIOR_PER_EFFECT ** np.array([len(m.effects) + _likened(m, usable) for m in usable])
+    prior = _PRIOR_PER_EFFECT ** np.array(
+        [len(m.effects) + _likened(m, usable) + _late_drive_in_disguise(m) for m in usable]
+    )
     # In each resample the models with the fewest numbers within the tolerance of the best share the win.
     within = resampled <= floor * (1.0 + tolerance)
     fewest = np.min(np.where(within, n_free, np.iinfo(np.int64).max), axis=1, keepdims=True)
@@ -99,6 +102,12 @@ def _likened(model: Scored, others: Sequence[Scored]) -> bool:
         and any(set(effect.parents) & (set(other.names) - set(model.names)) for effect in model.effects)
         for other in others
     )
+
+
+def _late_drive_in_disguise(model: Scored) -> bool:
+    """Return True for a sensor's effect on a rig with one output, where a late sensor and a late drive are the same records."""
+    one_output = len(model.fit.structure.rig.outputs) == 1
+    return one_output and any(effect.place is Place.SENSOR for effect in model.effects)
 
 
 def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -72,7 +72,8 @@ def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool 
             "unknown",
             best,
             f"{nearest} but leaves {best.excess:.3g} times the noise floor; a cause that is named must leave less than "
-            f"{MOST_LEFT:g} times.",
+            f"{MOST_LEFT:g} times. A disturbance that shows only while the rig moves would look the same: repeat one record, and "
+            "what differs is disturbance.",
         )
     if best.excess > at_floor and closed < _HALF:
         return Judgement("unknown", best, f"{nearest}, which is less than half.")
