@@ -138,6 +138,10 @@ def _drawn(design: Design, seed: int, trial: int, attempt: int) -> Trial:
     return Trial(linear, given, seen, withheld, key)
 
 
+_MOST_DISTURBED = 0.5
+"""Share of the sensor noise that a disturbance may reach in the plant's displacement."""
+
+
 class _Bench:
     """A linear rig with its experiments, sizes and noise."""
 
@@ -223,6 +227,7 @@ class _Bench:
         """Return every experiment's record, disturbed and noisy, and set the noise floor."""
         plant = self._plant(effects, values)
         force = self._disturbance_size(of_disturbance)
+        force *= self._damped(plant, self._rest(effects, None), force)
         records, passed = [], []
         for experiment in self.experiments:
             disturbance = _draw_disturbance(experiment, force, of_disturbance)
@@ -230,16 +235,33 @@ class _Bench:
             clean = plant.respond(
                 experiment.waveform, disturbance, start, -_REST_TIME, DT, experiment.n_samples
             )
+            calm = plant.respond(
+                experiment.waveform, lambda _: 0.0, start, -_REST_TIME, DT, experiment.n_samples
+            )
             seen = {
                 name: clean[:, i] + of_noise.normal(scale=self.noise[name], size=experiment.n_samples)
                 for i, name in enumerate(self.outputs)
             }
             records.append(experiment.record(**seen))
-            passed.append(self._passed(disturbance, experiment))
+            passed.append(clean - calm)
         for i, name in enumerate(self.outputs):
             through = math.sqrt(float(np.mean(np.concatenate([p[:, i] for p in passed]) ** 2)))
             self.floor[name] = math.hypot(self.noise[name], through)
         return records
+
+    def _damped(self, plant: Plant, rest: NDArray[np.float64], force: float) -> float:
+        """Return the factor that keeps a disturbance below the sensor noise in the plant too.
+
+        A spring that is loose, or nearly all memory, yields to a disturbance that the linear rig hardly shows.
+        """
+        experiment = self.experiments[0]
+        disturbance = _draw_disturbance(experiment, force, np.random.default_rng(0))
+        disturbed, calm = (
+            plant.respond(experiment.waveform, drive, rest, -_REST_TIME, DT, experiment.n_samples)
+            for drive in (disturbance, lambda _: 0.0)
+        )
+        seen = math.sqrt(float(np.mean((disturbed[:, 0] - calm[:, 0]) ** 2)))
+        return min(1.0, _MOST_DISTURBED * self.noise[self.outputs[0]] / max(seen, 1e-300))
 
     def _disturbance_size(self, rng: np.random.Generator) -> float:
         """Return the force whose way through the linear rig is seen as a part of the sensor noise."""
