@@ -23,6 +23,7 @@ from scipy.optimize import least_squares
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP, Coordinates
 from rigsight.identify.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit_result import FitResult
 from rigsight.records.record import Record
@@ -50,10 +51,7 @@ _STATE_RANGE = 20.0
 _LEAST_RANGE = 1e-9
 """Least unit of a limited state, in units of its size: a play of zero has no range."""
 _WORSE = 1e3
-_FIRST_SAMPLES = 7
 _FIRST_SUBSTEPS = 4
-_RESTING = 1e-3
-"""Share of its range within which an input rests."""
 _FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
 """Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
 
@@ -122,8 +120,8 @@ class GreyBoxFit:
         missing = np.full(record.n_samples, np.nan)
         measured = np.column_stack([record.signals.get(n, missing) for n in names])
         weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
-        first_state = _first_state(self.structure, record)
-        return _Data(record, record_input(self.structure, record), measured, weights, first_state)
+        guess = first_state(self.structure, record)
+        return _Data(record, record_input(self.structure, record), measured, weights, guess)
 
     def fit(
         self,
@@ -233,7 +231,7 @@ class GreyBoxFit:
         ranges = np.where(self._limited, self.state_sizes(p[:, None])[:, 0], 0.0)
         found = []
         for data, guess in zip(self._data, guesses, strict=True):
-            at_rest = _state_at_rest(self.structure, data.record, guess)
+            at_rest = state_at_rest(self.structure, data.record, guess)
             lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
             n_samples = data.record.n_samples
             with np.errstate(all="ignore"):
@@ -486,38 +484,3 @@ def _compressed(evaluation: _Evaluation) -> tuple[NDArray[np.float64], NDArray[n
     inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
     projection = inverse * (vectors.T @ (evaluation.gradient / size))
     return (root[:, None] * vectors.T) * size, projection
-
-
-def _first_state(structure: Structure, record: Record) -> NDArray[np.float64]:
-    """Guess the initial state from the first samples: measured outputs, their slope, no memory, settled lags."""
-    state = np.zeros(len(structure.states))
-    if not structure.rig.is_driven:
-        return state
-    count = min(_FIRST_SAMPLES, record.n_samples)
-    time = np.arange(count) * record.dt
-    displacement = record[structure.rig.outputs[0].name][:count]
-    slope, level = np.polyfit(time, displacement, 1)
-    state[0], state[1] = level, slope
-    for i, (name, dimension) in enumerate(
-        zip(structure.state_names, structure.state_dimensions, strict=True)
-    ):
-        if name in record and i > 1:
-            state[i] = float(np.mean(record[name][:count]))
-        elif dimension == "input":
-            state[i] = record[structure.rig.inputs[0].name][0]
-    return state
-
-
-def _state_at_rest(structure: Structure, record: Record, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the guess without motion: the mean of the outputs for as long as the input rests."""
-    state = guess.copy()
-    if not structure.rig.is_driven:
-        return state
-    drive = record[structure.rig.inputs[0].name]
-    moving = np.flatnonzero(np.abs(drive - drive[0]) > _RESTING * float(np.ptp(drive)))
-    count = max(_FIRST_SAMPLES, int(moving[0]) if moving.size else record.n_samples)
-    state[0], state[1] = float(np.mean(record[structure.rig.outputs[0].name][:count])), 0.0
-    for i, name in enumerate(structure.state_names):
-        if name in record and i > 1:
-            state[i] = float(np.mean(record[name][:count]))
-    return state
