@@ -9,7 +9,7 @@ out/discovery.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -164,8 +164,11 @@ def main(name: str, noise: float, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    main(
-        sys.argv[1],
-        float(sys.argv[2]) if len(sys.argv) > 2 else 1e-5,
-        int(sys.argv[3]) if len(sys.argv) > 3 else 0,
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("case", choices=CASES)
+    parser.add_argument("noise", nargs="?", type=float, default=1e-5, help="of psi [rad], default 1e-5")
+    parser.add_argument("seed", nargs="?", type=int, default=0)
+    asked = parser.parse_args()
+    main(asked.case, asked.noise, asked.seed)
