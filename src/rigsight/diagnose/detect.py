@@ -5,7 +5,7 @@ which the input rests (sensor noise and the disturbance that passes through the 
 responds (white sensor noise only: a lower bound).
 
 An element's input is itself measured, and its noise reaches the force only while the element moves: what a force shows at rest is
-a lower bound as well.
+a lower bound as well: an assumption that the dampers on a bench suggested, whose forces no effect explains to that floor.
 """
 
 from __future__ import annotations

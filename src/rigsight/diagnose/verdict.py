@@ -16,8 +16,9 @@ _WORTHWHILE = 1.1
 MOST_LEFT = 1.3
 """RMS in units of a measured noise floor that a named cause may leave.
 
-What is true leaves the floor itself, known to a few percent, and what disturbs the rig only when it moves. A relative of an
-unknown cause may close 99 % of a large gap and still leaves more.
+An assumption, between what true causes left in the first blind draws (up to 1.15) and what relatives of unknown ones left of
+large gaps (from 2.4). What is true leaves the floor itself, known to a few percent, and what disturbs the rig only when it
+moves. A relative of an unknown cause may close 99 % of a large gap and still leaves more.
 """
 _HALF = 0.5
 """Share of the re-identified gap that an effect must close to be named its cause, where the floor is only a lower bound.
