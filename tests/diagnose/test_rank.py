@@ -11,8 +11,8 @@ from rigsight.diagnose.rank import Ranking, noise_vector, rank
 N = 4000
 
 
-def ranked(*models: Scored, seed: int = 0) -> Ranking:
-    return rank(models, np.ones(1), np.random.default_rng(seed))
+def ranked(*models: Scored, seed: int = 0, gap: float = 1.0) -> Ranking:
+    return rank(models, np.ones(1), np.random.default_rng(seed), gap)
 
 
 @pytest.fixture
@@ -109,6 +109,16 @@ def test_a_worse_model_far_above_the_floor_may_tie_within_what_the_best_leaves(s
         best = scored(("cubic_stiffness",), level * white, n_free=5)
         second = scored(("end_stop",), 1.07 * level * white, n_free=5)
         assert len(ranked(best, second).tied) == expected
+
+
+def test_of_a_large_gap_the_last_thousandth_decides_nothing(scored, white) -> None:
+    """4 % of the floor are a thousandth of a gap of 50 times the floor: the simpler model is named, the other one told."""
+    richer = scored(("end_stop",), white, n_free=6)
+    simpler = scored(("free_play",), 1.04 * white, n_free=5)
+    assert ranked(richer, simpler, gap=3.0).order[0] is richer
+    found = ranked(richer, simpler, gap=50.0)
+    assert found.order[0] is simpler
+    assert found.tied == (richer,)
 
 
 def test_an_output_that_was_not_measured_does_not_count() -> None:

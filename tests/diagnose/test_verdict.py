@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.verdict import AT_FLOOR, MOST_LEFT, Judgement, judge
+from rigsight.diagnose.verdict import AT_FLOOR, MOST_LEFT, Judgement, judge, most_left
 
 ABOVE, BELOW = 1.001, 0.999
 
@@ -52,7 +52,15 @@ def test_above_a_measured_floor_the_nearest_relative_is_not_the_cause(verdict) -
     found = verdict(100.0, 100.0, MOST_LEFT * ABOVE)
     assert found.verdict == "unknown"
     assert "cubic_stiffness" in found.reason
-    assert "1.3 times the noise floor" in found.reason
+    assert "1.6 times the noise floor" in found.reason
+
+
+@pytest.mark.parametrize(("gap", "allowed"), [(2.0, 1.3), (7.0, 1.3), (9.0, 1.4), (13.0, 1.6), (100.0, 1.6)])
+def test_of_a_larger_gap_a_cause_may_leave_more(verdict, gap: float, allowed: float) -> None:
+    """A twentieth of the gap, between 1.3 and 1.6 times the floor."""
+    assert most_left(gap) == pytest.approx(allowed)
+    assert verdict(gap, gap, allowed * BELOW).verdict == "effect"
+    assert verdict(gap, gap, allowed * ABOVE).verdict == "unknown"
 
 
 def test_above_a_lower_bound_an_effect_must_close_half_of_the_gap(verdict) -> None:

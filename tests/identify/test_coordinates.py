@@ -44,7 +44,7 @@ def test_what_is_not_free_keeps_its_value(coordinates: Coordinates) -> None:
 def test_a_linear_coordinate_is_the_value_in_characteristic_units(coordinates: Coordinates) -> None:
     theta = coordinates.from_values(VALUES)
     stiffness = SCALES["force"] / SCALES["x"]
-    assert theta[FREE.index("k")] == pytest.approx(VALUES["k"] / stiffness, rel=1e-12)
+    assert theta[FREE.index("d")] == pytest.approx(VALUES["d"] / (stiffness * SCALES["time"]), rel=1e-12)
     assert theta[FREE.index("x_off")] == pytest.approx(VALUES["x_off"] / SCALES["x"], rel=1e-12)
 
 
@@ -69,6 +69,27 @@ def test_half_a_pair_is_searched_as_itself() -> None:
     alone = Coordinates.of(STRUCTURE, ("m", "beta"), VALUES, SCALES)
     assert alone.pairs == ()
     assert alone.from_values(VALUES)[1] == pytest.approx(VALUES["beta"] * SCALES["x"], rel=1e-12)
+
+
+def test_a_spring_with_memory_moves_as_two_stiffnesses(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES)
+    whole, elastic = FREE.index("k"), FREE.index("a")
+    stiffness = SCALES["force"] / SCALES["x"]
+    assert np.exp(theta[whole]) == pytest.approx(0.6 * VALUES["k"] / stiffness, rel=1e-12)
+    assert theta[elastic] == pytest.approx(0.4 * VALUES["k"] / stiffness, rel=1e-12)
+
+
+def test_more_memory_leaves_the_stiffness_without_it(coordinates: Coordinates) -> None:
+    theta = coordinates.from_values(VALUES)
+    theta[FREE.index("k")] += 3.0
+    p = dict(zip(STRUCTURE.names, coordinates.to_parameters(theta), strict=True))
+    assert p["a"] * p["k"] == pytest.approx(VALUES["a"] * VALUES["k"], rel=1e-12)
+    assert p["k"] > 10.0 * VALUES["k"]
+
+
+def test_a_share_whose_stiffness_is_held_is_searched_as_itself() -> None:
+    alone = Coordinates.of(STRUCTURE, ("m", "a"), VALUES, SCALES)
+    assert alone.from_values(VALUES)[1] == pytest.approx(VALUES["a"], rel=1e-12)
 
 
 @pytest.mark.parametrize(

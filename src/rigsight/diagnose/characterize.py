@@ -18,16 +18,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
+from numpy.typing import NDArray
 
-from rigsight.diagnose.starts import start_values, with_own_values
+from rigsight.diagnose.starts import restart_values, start_values, with_own_values
 from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.identify import EffectRegression, FitResult
+from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
 from rigsight.records.record import Record
 from rigsight.simulate import Structure
 
 _LOOK_EVALUATIONS = 25
+_GLIMPSE_EVALUATIONS = 8
+_MOST_STARTS = 4
+"""Starts that are fitted further; which of more they are, the first few evaluations of each tell."""
 _PIECE = 4.0
 """Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
 
@@ -237,26 +241,46 @@ def look_at(
     special = {name: value for effect in effects for name, value in effect.special_cases.items()}
     structure = bench.composed(effects, special)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
-    fit = bench.problem(structure, bench.look, _LOOK_ACCURACY)
     starts = list(start_values(bench, structure, effects[-1], base, parents))
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
+    nearest = _looked(bench, structure, free, starts, substeps)
+    return Look(effects, structure, free, nearest, _mean_square(nearest[0]))
+
+
+def _looked(
+    bench: Workbench,
+    structure: Structure,
+    free: tuple[str, ...],
+    starts: Sequence[Mapping[str, float]],
+    substeps: Sequence[int] | None = None,
+) -> tuple[FitResult, ...]:
+    """Fit to the liveliest stretches: in pieces from every start, from the best places in one."""
+    fit = bench.problem(structure, bench.look, _LOOK_ACCURACY)
     pieces = [_pieces(bench, [record], _PIECE) for record in bench.look]
     in_pieces = bench.problem(structure, [piece for parts in pieces for piece in parts], _LOOK_ACCURACY)
     of_pieces = None
     if substeps is not None:
         of_pieces = [n for n, parts in zip(substeps, pieces, strict=True) for _ in parts]
-    first = [
-        in_pieces.fit(start, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, of_pieces)
-        for start in starts
-    ]
+
+    def tried(
+        start: Mapping[str, float], states: Sequence[NDArray[np.float64]] | None, most: int
+    ) -> FitResult:
+        return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
+
+    if len(starts) > _MOST_STARTS:
+        glimpses = sorted(
+            (tried(start, None, _GLIMPSE_EVALUATIONS) for start in starts), key=lambda f: f.cost
+        )
+        first = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_MOST_STARTS]]
+    else:
+        first = [tried(start, None, _LOOK_EVALUATIONS) for start in starts]
     near = [
         fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
         for found in _distinct(first, alike=float("inf"))
     ]
-    nearest = _distinct(near)
-    return Look(effects, structure, free, nearest, _mean_square(nearest[0]))
+    return _distinct(near)
 
 
 def widened(
@@ -278,20 +302,33 @@ def widened(
     lowest = min((look.nearest for look in looks), default=float("inf"))
 
     def one(look: Look) -> Look:
-        whole = bench.problem(look.structure, bench.estimation, _LOOK_ACCURACY)
-        fits = [
-            whole.fit(near.values, look.free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
-            for near in look.fits
-        ]
-        return replace(look, fits=_distinct(fits))
+        return replace(look, fits=_on_whole_records(bench, look.structure, look.free, look.fits, substeps))
 
     near = [look for look in looks if look.nearest <= _NEAR * lowest]
     return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in near))
 
 
+def _on_whole_records(
+    bench: Workbench,
+    structure: Structure,
+    free: tuple[str, ...],
+    fits: Sequence[FitResult],
+    substeps: Sequence[int] | None = None,
+) -> tuple[FitResult, ...]:
+    whole = bench.problem(structure, bench.estimation, _LOOK_ACCURACY)
+    return _distinct(
+        [
+            whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+            for near in fits
+        ]
+    )
+
+
 def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking."""
     scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising, look.nearest)
+    if promising:
+        scored = _restarted(bench, scored)
     special = look.effects[-1].special_cases
     if promising and special:
         structure = bench.composed(look.effects, {n: v for n, v in look.structure.fixed if n not in special})
@@ -299,6 +336,25 @@ def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     if promising:
         scored = _released(bench, scored, scored.fit.structure, bench.releasable_parameters(look.structure))
     return scored
+
+
+def _restarted(bench: Workbench, settled: Scored) -> Scored:
+    """Fit from the places to which its effects say that a fit may have to be moved; keep what lowers the cost."""
+    if settled.excess <= _WORTH_RELEASING:
+        return settled
+    structure, free = settled.fit.structure, settled.fit.free
+    starts = [start for effect in settled.effects for start in restart_values(structure, effect, settled.fit)]
+    looks = [_looked(bench, structure, free, [start]) for start in starts]
+    better = [
+        found
+        for look in looks
+        for found in _on_whole_records(bench, structure, free, look)
+        if found.cost < settled.fit.cost
+    ]
+    if not better:
+        return settled
+    again = _fitted(bench, settled.effects, structure, free, _distinct(better), True)
+    return again if again.fit.cost < settled.fit.cost else settled
 
 
 def _released(bench: Workbench, settled: Scored, structure: Structure, released: Sequence[str]) -> Scored:
@@ -320,7 +376,7 @@ def _fitted(
     promising: bool,
     nearest: float = float("inf"),
 ) -> Scored:
-    fit = bench.problem(structure, bench.estimation)
+    fit = bench.problem(structure, bench.estimation, DEFAULT_ACCURACY if promising else _LOOK_ACCURACY)
     evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
     tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
 
@@ -337,7 +393,7 @@ def _fitted(
     usable = [result for result in results if result.residuals]
     if not usable:
         return Scored(effects, results[0], (), (), float("inf"))
-    return bench.score(effects, min(usable, key=lambda result: result.cost))
+    return bench.score(effects, min(usable, key=lambda result: result.cost), roughly=not promising)
 
 
 def _pieces(bench: Workbench, records: Sequence[Record], periods: float) -> tuple[Record, ...]:

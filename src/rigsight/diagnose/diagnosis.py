@@ -152,9 +152,9 @@ def diagnose(
 
     rng = np.random.default_rng(seed)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    ranking = rank([*singles, *pairs], vector, rng)
+    ranking = rank([*singles, *pairs], vector, rng, linear.excess)
     if ranking.order and ranking.order[0].residuals:
-        ranking = _with_offset_rivals(bench, ranking, effects, vector, rng)
+        ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
         judgement = judge(before.excess, linear, ranking.order[0], lower_bound)
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
@@ -218,6 +218,7 @@ def _with_offset_rivals(
     effects: Sequence[Effect],
     noise: NDArray[np.float64],
     rng: np.random.Generator,
+    gap: float,
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force.
 
@@ -237,7 +238,7 @@ def _with_offset_rivals(
         if effect.signature.even_harmonics and bench.rig.offers(effect):
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng)
+    return rank([*ranking.order, *rivals], noise, rng, gap)
 
 
 def _assembled(

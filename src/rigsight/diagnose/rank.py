@@ -14,6 +14,12 @@ from rigsight.effects.effect import Place
 
 _TIE = 0.01
 """Relative difference of held-out errors that no engineer would build a decision on."""
+_INEXACT = 1e-3
+"""Share of the gap by which models may differ without being told apart: no form is exact, and what disturbs the rig bends it.
+
+An assumption: play whose rig is disturbed left 4 % more than a stop with a thousandth of a spring beside it, of a gap of 48
+times the noise floor.
+"""
 _PRIOR_PER_EFFECT = 1.0 / 3.0
 """Odds of one more effect between models with as many numbers and the same error."""
 _MODEL_ERROR = 0.1
@@ -39,7 +45,9 @@ class Ranking:
     tied: tuple[Scored, ...]
 
 
-def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Generator) -> Ranking:
+def rank(
+    models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Generator, gap: float = 1.0
+) -> Ranking:
     """Rank models by held-out error; the simplest of those that tie with the best is chosen.
 
     Parameters
@@ -50,6 +58,8 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
         Noise floor of each output, shape (n_outputs,).
     rng
         Source of the resampling.
+    gap
+        What the rig's own equations leave, re-identified, in units of the noise floor.
 
     References
     ----------
@@ -64,7 +74,8 @@ def rank(models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Ge
     means = np.mean(squares[draws], axis=1)
     errors = np.sqrt(np.mean(squares, axis=0))
     best = float(np.min(errors))
-    tolerance = np.hypot(_TIE, _MODEL_ERROR * max(best - 1.0, 0.0) / best)
+    inexact = (_MODEL_ERROR * max(best - 1.0, 0.0) + _INEXACT * gap) / best
+    tolerance = np.hypot(_TIE, inexact)
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])

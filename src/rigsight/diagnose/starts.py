@@ -42,7 +42,7 @@ def start_values(
     if effect.starts:
         for start in effect.starts:
             origin = base if start.parent is None else parents.get(start.parent)
-            if origin is not None:
+            if origin is not None and start.parent != effect.name:
                 own = _evaluated(bench, start.values, _known(origin, start.parent))
                 yield with_own_values(structure, effect, origin, {**rest, **own})
         return
@@ -50,6 +50,27 @@ def start_values(
     for combination in itertools.product(*(p.starts for p in fitted)):
         own = {p.name: c * size for p, c, size in zip(fitted, combination, sizes, strict=True)}
         yield with_own_values(structure, effect, base, {**rest, **own})
+
+
+def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iterator[dict[str, float]]:
+    """Yield values from which a fit with `effect` is worth trying once more, where it may have stopped beside the best one.
+
+    Parameters
+    ----------
+    structure
+        Equations of the fit.
+    effect
+        One of its effects.
+    fit
+        Where it stopped.
+    """
+    own = structure.values_of(effect, fit.values)
+    for start in effect.starts:
+        if start.parent == effect.name:
+            moved = {
+                n: float(f.subs({s: own[s.name] for s in f.free_symbols})) for n, f in start.values.items()
+            }
+            yield with_own_values(structure, effect, fit, moved)
 
 
 def with_own_values(

@@ -13,12 +13,12 @@ AT_LOWER_BOUND = 3.0
 """The same where the floor is only a lower bound: an assumption, white noise is taken to be at least a third of all."""
 _WORTHWHILE = 1.1
 """Factor by which a model must lower the held-out error to be believed to explain anything; an assumption."""
-MOST_LEFT = 1.3
-"""RMS in units of a measured noise floor that a named cause may leave.
+LEAST_LEFT, MOST_LEFT, _LEFT_OF_GAP = 1.3, 1.6, 0.05
+"""What a named cause may leave of a measured noise floor: a share of the gap, within these RMS in units of the floor.
 
-An assumption, between what true causes left in the first blind draws (up to 1.15) and what relatives of unknown ones left of
-large gaps (from 2.4). What is true leaves the floor itself, known to a few percent, and what disturbs the rig only when it
-moves. A relative of an unknown cause may close 99 % of a large gap and still leaves more.
+Assumptions, between what true causes left in the first blind draws (up to 1.15; where a disturbance moves a rig with memory more
+than the resting rig shows, up to 1.44 of a gap of 50) and what relatives of unknown ones left (from 1.5 of gaps below 5, from 4
+of larger ones). A relative of an unknown cause may close 99 % of a large gap and still leaves more.
 """
 _HALF = 0.5
 """Share of the re-identified gap that an effect must close to be named its cause, where the floor is only a lower bound.
@@ -35,6 +35,11 @@ class Judgement:
     verdict: Verdict
     model: Scored
     reason: str
+
+
+def most_left(gap: float) -> float:
+    """Return what a named cause may leave, in units of a measured noise floor, of a gap in the same units."""
+    return min(max(LEAST_LEFT, 1.0 + _LEFT_OF_GAP * (gap - 1.0)), MOST_LEFT)
 
 
 def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool = False) -> Judgement:
@@ -68,12 +73,13 @@ def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool 
         return Judgement("unknown", linear, "No effect of the catalogue lowers the held-out error.")
     closed = (linear.excess - best.excess) / (linear.excess - 1.0)
     nearest = f"The best candidate ({', '.join(best.names)}) closes {closed:.0%} of the re-identified gap"
-    if not lower_bound and best.excess > MOST_LEFT:
+    allowed = most_left(linear.excess)
+    if not lower_bound and best.excess > allowed:
         return Judgement(
             "unknown",
             best,
             f"{nearest} but leaves {best.excess:.3g} times the noise floor; a cause that is named must leave less than "
-            f"{MOST_LEFT:g} times. A disturbance that shows only while the rig moves would look the same: repeat one record, and "
+            f"{allowed:.3g} times. A disturbance that shows only while the rig moves would look the same: repeat one record, and "
             "what differs is disturbance.",
         )
     if best.excess > at_floor and closed < _HALF:

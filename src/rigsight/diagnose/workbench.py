@@ -15,6 +15,9 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 
+_ROUGH_ACCURACY = 1e-3
+_ROUGH_EVALUATIONS = 8
+
 
 @dataclass(frozen=True)
 class Scored:
@@ -148,9 +151,16 @@ class Workbench:
             and (self._has_spring or (effect.spring is None and effect.deflection is None))
         ]
 
-    def score(self, effects: tuple[Effect, ...], fit: FitResult) -> Scored:
-        """Simulate the scoring records with a fitted model; only their initial states are estimated."""
-        result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
+    def score(self, effects: tuple[Effect, ...], fit: FitResult, roughly: bool = False) -> Scored:
+        """Simulate the scoring records with a fitted model; only their initial states are estimated.
+
+        `roughly` is enough to place a model that is far from the best.
+        """
+        if roughly:
+            rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
+            result = rough.fit(fit.values, [], max_evaluations=_ROUGH_EVALUATIONS, tolerance=_ROUGH_ACCURACY)
+        else:
+            result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
         excess = result.weighted_rms if result.residuals else float("inf")
         return Scored(effects, fit, result.residuals, result.initial_states, excess)
 

@@ -111,6 +111,7 @@ BOUC_WEN_HYSTERESIS = Effect(
         ),
     ),
     energy=Energy.DISSIPATIVE,
+    elastic_share="a",
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque + (1 - a) * k * z,
     states=(

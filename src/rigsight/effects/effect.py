@@ -107,7 +107,8 @@ class Start:
         Parameter name -> value, of the parent's parameters, of ``k`` (the fitted stiffness) and of the characteristic sizes
         in `rigsight.effects.symbols`; the key ``"k"`` moves the stiffness itself.
     parent
-        Effect whose fit gives the symbols their values; None for the rig without effects.
+        Effect whose fit gives the symbols their values; None for the rig without effects. The effect itself, where its fit may
+        stop beside the best one and is worth trying once more from elsewhere.
     """
 
     values: dict[str, sp.Expr]
@@ -152,6 +153,9 @@ class Effect:
         Time by which that sensor is late [s].
     states
         States added, with their rates.
+    elastic_share
+        Parameter that is the share of the spring's stiffness without memory; a fit moves that stiffness and the rest of it, with
+        memory, because records determine those apart.
     searched_as
         Parameters that a fit moves as sum and difference.
     starts
@@ -178,6 +182,7 @@ class Effect:
     measured: sp.Expr | None = None
     measured_late: sp.Expr | None = None
     states: tuple[State, ...] = ()
+    elastic_share: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()
     starts: tuple[Start, ...] = ()
     special_cases: dict[str, float] = field(default_factory=dict)
@@ -186,7 +191,8 @@ class Effect:
     @property
     def parents(self) -> tuple[str, ...]:
         """Effects that this one contains as a special or limiting case."""
-        return tuple(dict.fromkeys(start.parent for start in self.starts if start.parent is not None))
+        others = (start.parent for start in self.starts if start.parent != self.name)
+        return tuple(dict.fromkeys(parent for parent in others if parent is not None))
 
     def null_values(self) -> dict[str, float]:
         """Return the parameter values at which the effect vanishes."""

@@ -60,6 +60,10 @@ _FROM_BOUC_WEN = Start(
 )
 """The same loop with its rounding spread over many sliders: where both fit, the one state is preferred to the six."""
 
+_STEP = _reaches[1] / _reaches[0]
+_AGAIN = tuple(Start({"x_s": x_s * _STEP**steps}, parent="iwan_hysteresis") for steps in (-3, -2, -1, 1))
+"""A fit may take the sliders for their neighbors, and stop there."""
+
 
 IWAN_HYSTERESIS = Effect(
     name="iwan_hysteresis",
@@ -97,6 +101,7 @@ IWAN_HYSTERESIS = Effect(
         ),
     ),
     energy=Energy.DISSIPATIVE,
+    elastic_share="a",
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque
     + (1 - a) * k * sum(w * z for w, z in zip(_weights, elements, strict=True)) / sum(_weights),
@@ -104,10 +109,16 @@ IWAN_HYSTERESIS = Effect(
         State(z, deflection_rate, "x", limit=reach * x_s) for z, reach in zip(elements, _reaches, strict=True)
     ),
     starts=(
-        _from_secant(0.03, 0.5, -0.3),
-        _from_secant(0.1, 2.0, -0.3),
-        _from_secant(0.3, 0.5, 0.0),
-        _from_secant(0.5, 2.0, 0.5),
+        _from_secant(0.03, 0.05, -0.4),
+        _from_secant(0.03, 0.2, -0.4),
+        _from_secant(0.1, 2.0, -0.4),
+        _from_secant(0.3, 0.15, -0.4),
+        _from_secant(0.3, 0.5, -0.4),
+        _from_secant(0.3, 1.5, -0.4),
+        _from_secant(0.5, 4.0, 0.4),
+        _from_secant(0.7, 0.4, 0.4),
+        _from_secant(0.7, 1.2, 0.4),
         _FROM_BOUC_WEN,
+        *_AGAIN,
     ),
 )

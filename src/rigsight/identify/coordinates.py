@@ -1,4 +1,8 @@
-"""Search coordinates: parameters in characteristic units, logarithms of positive ones, sums and differences of pairs."""
+"""Search coordinates: parameters in characteristic units, logarithms of positive ones, and what records tell apart.
+
+Those are sum and difference of a pair, and of a spring with memory the stiffness without memory and the one with it: where the
+latter is large, the product of the spring's stiffness and its elastic share is known far better than either.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,9 @@ from rigsight.units import characteristic_value
 STEP = 1e-4
 """Finite-difference step of a coordinate: far above the integrator's error, far below any curvature."""
 _MARGIN = 1e-9
+_LEAST_STIFFNESS = 1e-12
+_MOST_STIFFNESS = 1e12
+"""Range of a stiffness with memory, in characteristic units: its logarithm is searched."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +35,14 @@ class _Pair:
     def forward(self, theta: float, power: float) -> float:
         """Return the sum or difference, in characteristic units, of a coordinate."""
         return float(np.copysign(np.abs(theta) ** power, theta))
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Coordinates that stand for the logarithm of the stiffness with memory and for the one without."""
+
+    stiffness: int
+    share: int
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,7 @@ class Coordinates:
     scale: NDArray[np.float64]
     logarithmic: NDArray[np.bool_]
     pairs: tuple[_Pair, ...]
+    split: _Split | None
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
 
@@ -77,6 +93,11 @@ class Coordinates:
                 lower[first], upper[first] = pair.sum_range
                 lower[second], upper[second] = pair.difference_range
                 pairs.append(_Pair(first, second, pair.exponent))
+        split = _split(structure, free)
+        if split is not None:
+            most = min(upper[split.stiffness], _MOST_STIFFNESS)
+            lower[split.stiffness], upper[split.stiffness] = np.log(_LEAST_STIFFNESS), np.log(most)
+            lower[split.share], upper[split.share] = 0.0, most
         return cls(
             structure=structure,
             free=tuple(free),
@@ -85,6 +106,7 @@ class Coordinates:
             scale=scale,
             logarithmic=logarithmic,
             pairs=tuple(pairs),
+            split=split,
             lower=lower,
             upper=upper,
         )
@@ -101,6 +123,11 @@ class Coordinates:
             difference = pair.forward(theta[pair.second], power) * size
             p[self.index[pair.first]] = (total + difference) / 2.0
             p[self.index[pair.second]] = (total - difference) / 2.0
+        if self.split is not None:
+            stiffness, share = self.split.stiffness, self.split.share
+            whole = np.exp(theta[stiffness]) + theta[share]
+            p[self.index[stiffness]] = whole * self.scale[stiffness]
+            p[self.index[share]] = theta[share] / whole
         return p
 
     def from_values(self, values: Mapping[str, float]) -> NDArray[np.float64]:
@@ -117,6 +144,10 @@ class Coordinates:
             first, second = plain[pair.first], plain[pair.second]
             theta[pair.first] = pair.forward((first + second) / size, 1.0 / power)
             theta[pair.second] = pair.forward((first - second) / size, 1.0 / power)
+        if self.split is not None:
+            whole, elastic = own[self.split.stiffness], plain[self.split.share]
+            theta[self.split.stiffness] = np.log(max((1.0 - elastic) * whole, _LEAST_STIFFNESS))
+            theta[self.split.share] = elastic * whole
         width = np.minimum(self.upper - self.lower, 1e6)
         return np.clip(theta, self.lower + _MARGIN * width, self.upper - _MARGIN * width)
 
@@ -137,6 +168,17 @@ class Coordinates:
             change = self.to_parameters(moved) - self.to_parameters(theta)
             columns.append(change[self.index] / 1e-6)
         return np.array(columns).T.reshape(len(self.free), len(self.free))
+
+
+def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
+    """Return where the spring's stiffness and its elastic share stand, if a search moves both; of several effects the first."""
+    stiffness = structure.rig.motion.stiffness.name
+    for effect in structure.effects:
+        if effect.elastic_share is not None:
+            share = structure.parameter_name(effect, effect.elastic_share)
+            if stiffness in free and share in free:
+                return _Split(free.index(stiffness), free.index(share))
+    return None
 
 
 def _bounds(parameter: Parameter, scale: float) -> tuple[float, float]:
