@@ -1,0 +1,75 @@
+"""Which commands are there, in which order are they shown, and what surrounds them all?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.blind import blind
+from rigsight.cli.compare import compare
+from rigsight.cli.demo import demo
+from rigsight.cli.diagnose import diagnose
+from rigsight.cli.discover import discover
+from rigsight.cli.effects import list_effects
+from rigsight.cli.exit_codes import INTERRUPTED, leave
+from rigsight.cli.identify import identify
+from rigsight.cli.simulate import simulate
+from rigsight.cli.vary import vary
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "demo": demo,
+    "diagnose": diagnose,
+    "identify": identify,
+    "discover": discover,
+    "compare": compare,
+    "simulate": simulate,
+    "vary": vary,
+    "blind": blind,
+    "effects": list_effects,
+}
+"""In the order in which ``rigsight --help`` shows them."""
+
+app = typer.Typer(
+    name="rigsight",
+    help="Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks.",
+    epilog="'rigsight COMMAND --help' tells more. Start with 'rigsight demo'.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+def main() -> None:
+    """Run the command line."""
+    # Candidates are fitted side by side; matrix products that spread over the same processors only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    try:
+        app()
+    except KeyboardInterrupt:
+        leave("interrupted; nothing was written.", INTERRUPTED)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"rigsight {version('rigsight')}")
+        raise typer.Exit
+
+
+@app.callback()
+def rigsight(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks."""
+
+
+for _name, _command in COMMANDS.items():
+    app.command(_name)(_command)

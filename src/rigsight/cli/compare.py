@@ -1,0 +1,62 @@
+"""What does ``rigsight compare`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Campaign, Debug, Jobs, Quiet, ResultsFolder
+from rigsight.cli.terminal import command_line, show, show_files
+from rigsight.workflow.progress_display import listening
+
+
+def compare(
+    campaign: Campaign,
+    model: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MODEL...",
+            help="Each a model.json, the folder that holds one, or a published set such as hysteresis_r; NAME=MODEL names it.",
+        ),
+    ],
+    out: ResultsFolder = Path("comparison"),
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="How all frequency responses are estimated: local_rational, local_polynomial, h1 or thesis.",
+        ),
+    ] = "local_rational",
+    step_seconds: Annotated[
+        float, typer.Option(metavar="SECONDS", help="How long a step is compared, from its begin on.")
+    ] = 4.0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Score models on all records: frequency responses, steps and free runs, each beside its noise floor.
+
+    Writes comparison.json, comparison.csv, comparison.html and figures into DIR, all or none.
+    """
+    with told(debug), listening(quiet) as listener:
+        from rigsight.workflow.compare import run_compare
+
+        comparison = run_compare(
+            campaign,
+            model,
+            out,
+            method=method,
+            step_seconds=step_seconds,
+            n_jobs=jobs,
+            listener=listener,
+            command=command_line(),
+        )
+    if not quiet:
+        from rigsight.report import comparison_summary
+
+        show(comparison_summary(comparison))
+        show_files({"Page": out / "comparison.html", "Table": out / "comparison.csv"})

@@ -1,0 +1,56 @@
+"""What does ``rigsight diagnose`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Campaign, Debug, Jobs, OwnEffects, Quiet, ResultsFolder, Seed
+from rigsight.cli.terminal import command_line, show, show_files
+from rigsight.workflow.progress_display import listening
+
+
+def diagnose(
+    campaign: Campaign,
+    out: ResultsFolder = Path("diagnosis"),
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            show_default="the catalogue and your own",
+            help="Try only this effect. May be repeated.",
+        ),
+    ] = None,
+    effects: OwnEffects = None,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Say which effect a simulation misses, where it acts, and how far the gap shrinks with it.
+
+    Writes diagnosis.json, model.json and report.html into DIR, all or none.
+    """
+    with told(debug), listening(quiet) as listener:
+        from rigsight.workflow.diagnose import run_diagnose
+        from rigsight.workflow.own_effects import named, own_effects
+
+        own = own_effects(effects or [], listener=listener)
+        diagnosis = run_diagnose(
+            campaign,
+            out,
+            effects=named(effect or [], own),
+            own_effects=own,
+            seed=seed,
+            n_jobs=jobs,
+            listener=listener,
+            command=command_line(),
+        )
+    if not quiet:
+        from rigsight.report import summary
+
+        show(summary(diagnosis))
+        show_files({"Report": out / "report.html", "Model": out / "model.json"})

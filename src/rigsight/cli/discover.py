@@ -1,0 +1,59 @@
+"""What does ``rigsight discover`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Campaign, Debug, Jobs, Quiet, ResultsFolder, Seed
+from rigsight.cli.terminal import show, show_files
+from rigsight.workflow.progress_display import listening
+
+
+def discover(
+    campaign: Campaign,
+    out: ResultsFolder = Path("discovery"),
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="discrepancy: regress what the rig's own terms leave; full: the whole acceleration.",
+        ),
+    ] = "discrepancy",
+    pointwise: Annotated[
+        bool, typer.Option("--pointwise", help="Regress sample by sample instead of in the weak form.")
+    ] = False,
+    one_by_one: Annotated[
+        bool, typer.Option("--one-by-one", help="Discover on each estimation record alone as well.")
+    ] = False,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Find the governing equations behind the records by sparse regression and free-run simulation.
+
+    Writes discovery.json, model.json and discovery.svg into DIR, all or none.
+    """
+    with told(debug), listening(quiet) as listener:
+        from rigsight.workflow.discover import run_discover
+
+        found = run_discover(
+            campaign,
+            out,
+            method=method,
+            pointwise=pointwise,
+            one_by_one=one_by_one,
+            seed=seed,
+            n_jobs=jobs,
+            listener=listener,
+        )
+    if not quiet:
+        from rigsight.report.discovery import discovery_summary
+
+        show(discovery_summary(found))
+        show_files({"Results": out / "discovery.json", "Model": out / "model.json"})

@@ -1,0 +1,54 @@
+"""What does ``rigsight identify`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Campaign, Debug, Jobs, Quiet, ResultsFolder
+from rigsight.cli.terminal import show, show_files
+from rigsight.workflow.progress_display import listening
+
+
+def identify(
+    campaign: Campaign,
+    out: ResultsFolder = Path("identification"),
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="How frequency responses are estimated: local_rational, local_polynomial, h1 or thesis.",
+        ),
+    ] = "local_rational",
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            "--resolution",
+            metavar="RAD_S",
+            show_default="what each record gives",
+            help="Width in frequency wished for: of a local band, or between averaged frequencies.",
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Fit frequency responses and steps: the parameters of the linear rig, by record and for all together.
+
+    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR, all or none.
+    """
+    with told(debug), listening(quiet) as listener:
+        from rigsight.workflow.identify import run_identify
+
+        identification = run_identify(
+            campaign, out, method=method, resolution=resolution, n_jobs=jobs, listener=listener
+        )
+    if not quiet:
+        from rigsight.report import identification_summary
+
+        show(identification_summary(identification))
+        show_files({"Results": out / "identification.json", "Model": out / "model.json"})

@@ -1,0 +1,35 @@
+"""Which arguments and options do several commands share?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Campaign = Annotated[
+    Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
+]
+ResultsFolder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
+OwnEffects = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--effects",
+        metavar="FILE",
+        show_default="none",
+        help="A Python file that declares effects of your own; it is run. May be repeated.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        min=1,
+        show_default="one per processor",
+        help="Candidates fitted, records identified or trials run at the same time.",
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]

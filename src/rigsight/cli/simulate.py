@@ -1,0 +1,107 @@
+"""What does ``rigsight simulate`` accept, run and show, and how are its ``--column`` and ``--initial-state`` read?"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Debug, OwnEffects, Quiet
+from rigsight.errors import InputError
+from rigsight.workflow.progress_display import listening
+
+if TYPE_CHECKING:
+    from rigsight.records import ColumnMapping
+
+
+def simulate(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
+    ],
+    record: Annotated[
+        Path,
+        typer.Argument(metavar="RECORD", help="A CSV file with time and input; other columns are ignored."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            show_default="RECORD_simulated.csv in this folder",
+            help="CSV file to write.",
+        ),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--column",
+            metavar="SIGNAL=COLUMN",
+            help="Where a signal stands: u=current or u=2. May be repeated.",
+        ),
+    ] = None,
+    initial_state: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STATE=VALUE,...|estimated",
+            show_default="rest at the first input",
+            help="States that start elsewhere (psi=0.01,w=0), or 'estimated' from the outputs in the record.",
+        ),
+    ] = None,
+    effects: OwnEffects = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Predict the outputs of a model for the input of a record.
+
+    Writes a CSV with time, input and simulated outputs in SI units (t,u,psi,y; axis: t,u,x; element: t,x,force).
+    """
+    file = out or Path(f"{record.stem}_simulated.csv")
+    with told(debug), listening(quiet):
+        from rigsight.workflow.own_effects import own_effects
+        from rigsight.workflow.simulate import run_simulate
+
+        simulated = run_simulate(
+            model,
+            record,
+            file,
+            columns=_columns(column or []),
+            initial_state=_states(initial_state),
+            own_effects=own_effects(effects or [], check=False),
+        )
+    if not quiet:
+        typer.echo(f"{simulated.n_samples} samples simulated: {file}")
+
+
+def _columns(given: list[str]) -> dict[str, ColumnMapping]:
+    from rigsight.records import ColumnMapping
+
+    columns = {}
+    for text in given:
+        signal, sign, name = text.partition("=")
+        if not (signal and sign and name):
+            raise InputError(
+                f"--column '{text}' cannot be read; write SIGNAL=COLUMN, for instance u=current."
+            )
+        columns[signal.strip()] = ColumnMapping(int(name) if name.isascii() and name.isdigit() else name)
+    return columns
+
+
+def _states(given: str | None) -> dict[str, float] | Literal["estimated"]:
+    if given == "estimated":
+        return "estimated"
+    states = {}
+    for text in (given or "").split(",") if given else []:
+        name, _, value = text.partition("=")
+        try:
+            states[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(
+                f"--initial-state '{text}' cannot be read; write STATE=VALUE, for instance psi=0.01,w=0, or estimated."
+            ) from None
+        if not math.isfinite(states[name.strip()]):
+            raise InputError(f"--initial-state '{text}' must be a finite number.")
+    return states

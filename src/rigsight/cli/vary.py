@@ -1,0 +1,76 @@
+"""What does ``rigsight vary`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Debug, Quiet, ResultsFolder
+from rigsight.errors import InputError
+from rigsight.workflow.progress_display import listening
+
+
+def vary(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="A model.json, the folder that holds one, or a published set such as hysteresis_r.",
+        ),
+    ],
+    parameter: Annotated[
+        list[str],
+        typer.Option(metavar="NAME", help="The parameter to vary. May be repeated: one picture each."),
+    ],
+    low: Annotated[
+        float | None,
+        typer.Option("--from", metavar="VALUE", show_default="half the model's", help="First value."),
+    ] = None,
+    high: Annotated[
+        float | None,
+        typer.Option("--to", metavar="VALUE", show_default="twice the model's", help="Last value."),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Number of values.")] = 5,
+    amplitude: Annotated[float, typer.Option(help="Amplitude of the sweep, in the unit of the input.")] = 1.0,
+    lowest: Annotated[
+        float | None,
+        typer.Option(
+            metavar="OMEGA", show_default="1/12 of the natural frequency", help="Begin of the band [rad/s]."
+        ),
+    ] = None,
+    highest: Annotated[
+        float | None,
+        typer.Option(metavar="OMEGA", show_default="6 times the natural frequency", help="Its end [rad/s]."),
+    ] = None,
+    out: ResultsFolder = Path("vary"),
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Show how the frequency response of a model changes with a parameter.
+
+    Writes vary.svg, vary.png (vary_NAME.svg, ... where several parameters are named) and vary.json into DIR, all or none.
+    """
+    with told(debug), listening(quiet) as listener:
+        from rigsight.workflow.vary import run_vary, table_text
+
+        if (lowest is None) != (highest is None):
+            raise InputError("--lowest and --highest go together: give both, or neither.")
+        band = None if lowest is None or highest is None else (lowest, highest)
+        variations = run_vary(
+            model,
+            parameter,
+            out,
+            low=low,
+            high=high,
+            steps=steps,
+            amplitude=amplitude,
+            band=band,
+            listener=listener,
+        )
+    if not quiet:
+        for variation in variations:
+            typer.echo(table_text(variation) + "\n")
+        typer.echo(f"Pictures and numbers: {out}")

@@ -1,0 +1,117 @@
+"""What ``rigsight simulate`` predicts, and how it refuses broken models and options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+Run = Callable[..., tuple[int, str, str]]
+
+BROKEN_MODELS: dict[str, tuple[Callable[[dict[str, Any]], object] | str, tuple[str, ...]]] = {
+    "invalid json": ('{\n  "rig": "axis",\n}', ("model.json, line 3, column 1", "JSON")),
+    "no object": ("[1, 2]", ("one object",)),
+    "not finite": ('{"rig": "axis", "x": NaN}', ("NaN",)),
+    "repeated key": ('{"rig": "axis", "rig": "element"}', ("'rig' stands twice",)),
+    "too deep": ("[" * 100_000, ("model.json",)),
+    "other schema": (lambda m: m.update(schema_version=7), ("schema_version", "7", "reads 1")),
+    "unknown key": (lambda m: m.update(effect=[]), ("effect: unknown key", "Did you mean 'effects'")),
+    "missing key": (lambda m: m.pop("rig"), ("rig: is missing",)),
+    "unknown rig": (lambda m: m.update(rig="axes"), ("rig: is 'axes'", "Did you mean 'axis'")),
+    "unknown effect": (
+        lambda m: m.update(effects=["cubic_stifness"]),
+        ("effects: 'cubic_stifness'", "Did you mean 'cubic_stiffness'"),
+    ),
+    "effect twice": (lambda m: m["effects"].append("cubic_stiffness"), ("twice",)),
+    "effect of another rig": (
+        lambda m: m.update(rig="element", effects=["input_delay"]),
+        ("input_delay", "makes no sense"),
+    ),
+    "missing parameters": (
+        lambda m: (m["parameters"].pop("m"), m["effect_parameters"].clear()),
+        ("needs parameters.m, effect_parameters.k_3",),
+    ),
+    "unknown parameter": (lambda m: m["parameters"].update(k_3=1.0), ("parameters.k_3: unknown",)),
+    "out of range": (lambda m: m["parameters"].update(m=-1.0), ("parameters.m", "must lie in")),
+    "text for a number": (lambda m: m["parameters"].update(m="2"), ("parameters.m", "must be a number")),
+    "other unit": (lambda m: m["units"].update(k_3="N/mm^3"), ("units.k_3", "N/m^3", "Convert")),
+    "unknown hold": (lambda m: m.update(hold="linear"), ("hold", "Allowed", "foh")),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN_MODELS)
+def test_a_broken_model_gets_one_helpful_message(
+    case: str, axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    change, expected = BROKEN_MODELS[case]
+    model = write_model(text=change) if isinstance(change, str) else write_model(change)
+    out = tmp_path / "out" / "predicted.csv"
+    code, stdout, stderr = run("simulate", model, axis_campaign / "fit.csv", "--out", out)
+    assert code == 2, stderr
+    assert stdout == ""
+    assert stderr.startswith("rigsight: model.json")
+    assert "Traceback" not in stderr
+    for part in expected:
+        assert part in stderr
+    assert not out.parent.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--column", "u"], "SIGNAL=COLUMN"),
+        (["--column", "x=pos"], "does not read it"),
+        (["--column", "u=7"], "columns are 1 to 3"),
+        (["--initial-state", "x"], "STATE=VALUE"),
+        (["--initial-state", "x=inf"], "finite"),
+        (["--initial-state", "y=0.1"], "The model's states: x, w"),
+    ],
+)
+def test_options_of_simulate_are_checked(
+    arguments: list[str],
+    expected: str,
+    axis_campaign: Path,
+    write_model: Callable[..., Path],
+    tmp_path: Path,
+    run: Run,
+) -> None:
+    out = tmp_path / "out" / "predicted.csv"
+    code, _, stderr = run("simulate", write_model(), axis_campaign / "fit.csv", "-o", out, *arguments)
+    assert code == 2
+    assert expected in stderr
+    assert not out.parent.exists()
+
+
+def test_simulate_returns_what_the_model_was_made_from(
+    axis_campaign: Path,
+    axis_rows: dict[str, np.ndarray],
+    write_model: Callable[..., Path],
+    tmp_path: Path,
+    run: Run,
+) -> None:
+    out = tmp_path / "out" / "predicted.csv"
+    code, stdout, stderr = run("simulate", write_model().parent, axis_campaign / "score.csv", "--out", out)
+    assert code == 0, stderr
+    assert str(out) in stdout
+    assert out.read_text().startswith("t,u,x\n")
+    predicted = np.loadtxt(out, delimiter=",", skiprows=1)
+    measured = axis_rows["score.csv"]
+    np.testing.assert_allclose(predicted[:, :2], measured[:, :2], atol=1e-9)
+    assert np.std(predicted[:, 2] - measured[:, 2]) == pytest.approx(2e-5, rel=0.1)
+
+
+def test_simulate_maps_columns_and_starts_elsewhere(
+    axis_campaign: Path, write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    record = tmp_path / "drive.csv"
+    record.write_text("time;force\n" + "\n".join(f"{0.01 * i:.2f};0" for i in range(60)))
+    out = tmp_path / "predicted.csv"
+    options = ("--column", "t=time", "--column", "u=2", "--initial-state", "x=0.01,w=0")
+    code, stdout, _ = run("simulate", write_model(), record, "-o", out, *options, "--quiet")
+    assert (code, stdout) == (0, "")
+    x = np.loadtxt(out, delimiter=",", skiprows=1)[:, 2]
+    assert x[0] == 0.01
+    assert x.min() < -0.005
