@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
@@ -135,3 +136,36 @@ def write_model(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def outcome_like() -> Callable[..., Outcome]:
+    """Return an outcome of a blind trial, right unless it is told otherwise."""
+
+    def like(**changes: Any) -> Outcome:
+        content: dict[str, Any] = {
+            "design": "small", "seed": 1, "trial": "000", "fingerprint": "", "version": "1.0",
+            "kind": "single", "effects": ("backlash",), "rig": "axis", "noise": "low", "gap": 12.0, "tier": "clear",
+            "verdict": "effect", "named": ("backlash",), "right": True, "right_within_set": True, "place_right": True,
+            "probability": 0.9, "stated": 0.9, "held_out": 1.02,
+            "withheld": (WithheldError("withheld_1", "step", 0.85, 3000, 1.02),),
+            "parameters": (ParameterError("g", "backlash", -0.5), ParameterError("k", "rig", 1.5)),
+            "seconds": 20.0,
+        }  # fmt: skip
+        return Outcome(**(content | changes))
+
+    return like
+
+
+@pytest.fixture
+def wrong_outcome(outcome_like: Callable[..., Outcome]) -> Callable[..., Outcome]:
+    """Return an outcome of a trial of which the wrong effect was named."""
+
+    def like(**changes: Any) -> Outcome:
+        content: dict[str, Any] = {
+            "named": ("free_play",), "right": False, "right_within_set": False, "probability": 0.2, "stated": 0.75,
+            "parameters": (),
+        }  # fmt: skip
+        return outcome_like(**(content | changes))
+
+    return like

@@ -6,16 +6,16 @@ from typing import Any
 
 import pytest
 
-from rigsight.blind import outcome, summary
-from rigsight.blind.score import Outcome, Share, confusion, goals, reliability
+from rigsight.blind import Outcome, ParameterError, WithheldError, outcome
 
 
 def key(
-    kind: str, *effects: str, gap: float = 10.0, where: tuple[str, ...] = ("yaw_dynamics",)
+    kind: str, *effects: str, gap: float | None = 10.0, where: tuple[str, ...] = ("yaw_dynamics",)
 ) -> dict[str, Any]:
     return {
-        "trial": 3, "kind": kind, "effects": list(effects), "where": list(where) if effects else [],
-        "rig": "running_gear", "noise": "low", "gap": gap,
+        "design": "small", "seed": 1, "trial": "003",
+        "kind": kind, "effects": list(effects), "where": list(where) if effects else [],
+        "rig": "running_gear", "noise": "low", "gap": gap, "values": {"g": 1e-3, "k_c": 80.0},
     }  # fmt: skip
 
 
@@ -28,14 +28,29 @@ def diagnosis(
         "where": ["yaw_dynamics"] if effects else [],
         "ambiguous_with": [list(names) for names in alike],
         "candidates": [
-            {"effects": list(effects), "probability": p},
-            *({"effects": list(names), "probability": (1.0 - p) / len(alike)} for names in alike),
+            {"effects": list(effects), "probability": p, "parameters": ESTIMATES},
+            *(
+                {"effects": list(names), "probability": (1.0 - p) / len(alike), "parameters": {}}
+                for names in alike
+            ),
         ],
     }
 
 
+ESTIMATES = {
+    "g": {"value": 1.2e-3, "std": 1e-4, "unit": "rad"},
+    "k_c": {"value": 79.0, "std": 2.0, "unit": "N m/rad"},
+    "k_d": {"value": 2.0, "std": None, "unit": "N m s/rad"},
+}
+"""The last is not determined by the records, and its truth is not in the key."""
+SEEN = (
+    WithheldError("withheld_1", "multisine", 0.7, 8000, 1.0),
+    WithheldError("withheld_2", "step", 0.85, 2000, 2.0),
+)
+
+
 def held(truth: dict[str, Any], found: dict[str, Any] | None, **more: Any) -> Outcome:
-    return outcome(truth, found, more.get("held_out", 1.0), 10.0, more.get("message", ""))
+    return outcome(truth, found, more.get("withheld", SEEN), 10.0, "1.0", more.get("message", ""))
 
 
 @pytest.mark.parametrize(
@@ -71,32 +86,43 @@ def test_what_no_candidate_gets_is_the_probability_of_the_unknown() -> None:
     assert found.probability == found.stated == pytest.approx(0.7)
 
 
-def test_small_gaps_are_a_tier_of_their_own() -> None:
-    tiers = [held(key("single", "backlash", gap=gap), None).tier for gap in (1.2, 1.6, 5.0, 30.0)]
-    assert tiers == ["below", "faint", "clear", "strong"]
-    assert goals([held(key("single", "backlash", gap=2.0), None)])["singles_right"]["total"] == 0
+def test_a_failed_diagnosis_states_nothing() -> None:
+    found = held(key("outside", "drifting_sensor"), None, message="it failed")
+    assert (found.verdict, found.probability, found.stated) == ("failed", 0.0, 0.0)
 
 
-def test_the_wilson_interval_of_nine_in_ten() -> None:
-    # Wilson (1927): centre and width for 9 of 10 at 95 %.
-    assert Share(9, 10).interval == pytest.approx((0.5958, 0.9821), abs=1e-4)
-    assert Share(0, 0).interval == (0.0, 1.0)
+@pytest.mark.parametrize(
+    ("gap", "tier"),
+    [(1.2, "below"), (1.6, "faint"), (5.0, "clear"), (30.0, "strong"), (None, "not measured")],
+)
+def test_small_gaps_are_a_tier_of_their_own(gap: float | None, tier: str) -> None:
+    assert held(key("single", "backlash", gap=gap), None).tier == tier
 
 
-def test_many_outcomes_are_counted_by_truth_and_by_stated_probability() -> None:
-    outcomes = [
-        held(key("single", "backlash"), diagnosis("effect", "backlash", p=0.99), held_out=1.1),
-        held(key("single", "backlash"), diagnosis("effect", "free_play", p=0.7), held_out=3.0),
-        held(key("none"), diagnosis("none", p=0.97), held_out=1.0),
-        held(key("outside", "drifting_sensor"), diagnosis("effect", "sensor_lag", p=0.7), held_out=9.0),
-    ]
-    assert confusion(outcomes)["backlash"] == {"backlash": 1, "free_play": 1}
-    assert confusion(outcomes)["outside: drifting_sensor"] == {"sensor_lag": 1}
-    bins = {row["to"]: row["right"] for row in reliability(outcomes)}
-    assert (bins[1.0]["count"], bins[1.0]["total"]) == (2, 2)
-    assert (bins[0.8]["count"], bins[0.8]["total"]) == (0, 2)
-    found = summary(outcomes)
-    assert found["goals"]["singles_right"]["share"] == 0.5
-    assert found["goals"]["outside_named_above_half"]["count"] == 1
-    assert found["goals"]["held_out_median"] == pytest.approx(2.05)
-    assert found["by"]["kind"]["none"]["right"]["count"] == 1
+def test_a_key_that_does_not_say_where_scores_no_place() -> None:
+    assert held(key("outside", "drifting_sensor"), diagnosis("unknown")).place_right is False
+    silent = key("outside", "drifting_sensor") | {"where": None}
+    assert held(silent, diagnosis("unknown")).place_right is None
+
+
+def test_the_error_on_all_withheld_records_weighs_samples() -> None:
+    found = held(key("single", "backlash"), diagnosis("effect", "backlash"))
+    assert found.held_out == pytest.approx((0.8 * 1.0**2 + 0.2 * 2.0**2) ** 0.5)
+
+
+def test_one_record_that_cannot_be_simulated_leaves_no_error_of_all() -> None:
+    broken = (SEEN[0], WithheldError("withheld_2", "step", 0.85, 2000, None))
+    assert held(key("single", "backlash"), diagnosis("effect", "backlash"), withheld=broken).held_out is None
+
+
+def test_numbers_are_held_against_the_truth_in_standard_errors_where_the_verdict_is_right() -> None:
+    errors = held(key("single", "backlash"), diagnosis("effect", "backlash")).parameters
+    assert [(e.name, e.of) for e in errors] == [("g", "backlash"), ("k_c", "rig")]
+    assert [e.error for e in errors] == pytest.approx([2.0, -0.5])
+    assert held(key("single", "free_play"), diagnosis("effect", "backlash")).parameters == ()
+
+
+def test_the_numbers_of_a_control_are_the_rigs() -> None:
+    errors = held(key("none"), diagnosis("none")).parameters
+    assert all(isinstance(e, ParameterError) and e.of == "rig" for e in errors)
+    assert len(errors) == 2

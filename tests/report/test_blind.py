@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 
 from rich.console import Console
 
-from rigsight.blind import Outcome, summary
+from rigsight.blind import Outcome
 from rigsight.report.blind import BlindSummary
 
+from .blind_content import content_of
 
-def found(trial: int, right: bool) -> Outcome:
-    return Outcome(
-        trial=trial, kind="single", effects=("backlash",), rig="axis", noise="low", gap=12.0, tier="clear",
-        verdict="effect", named=("backlash",) if right else ("free_play",), right=right, right_within_set=right,
-        place_right=True, probability=0.9 if right else 0.2, stated=0.9 if right else 0.75, held_out=1.02, seconds=20.0,
-    )  # fmt: skip
+Like = Callable[..., Outcome]
 
 
 def shown(outcomes: list[Outcome]) -> str:
-    content = {
-        "n_trials": len(outcomes), "design": "small", "seed": 1, **summary(outcomes),
-        "trials": [o.to_json() for o in outcomes],
-    }  # fmt: skip
     console = Console(width=120, file=io.StringIO())
-    console.print(BlindSummary(content))
+    console.print(BlindSummary(content_of(outcomes)))
     return str(console.file.getvalue())  # type: ignore[attr-defined]
 
 
-def test_shares_come_with_counts_and_intervals() -> None:
-    text = shown([found(0, True), found(1, True), found(2, True), found(17, False)])
+def test_shares_come_with_counts_and_intervals(outcome_like: Like, wrong_outcome: Like) -> None:
+    text = shown([*(outcome_like(trial=f"{n:03d}") for n in range(3)), wrong_outcome(trial="017")])
     line = next(line for line in text.splitlines() if line.startswith("single effects right"))
     assert "75%" in line
     assert "3 of 4" in line
@@ -37,15 +30,21 @@ def test_shares_come_with_counts_and_intervals() -> None:
     assert "stated 0.75" in text
 
 
-def test_wrong_trials_are_listed_with_what_was_named_instead() -> None:
-    text = shown([found(0, True), found(17, False)])
+def test_wrong_trials_are_listed_with_what_was_named_instead(outcome_like: Like, wrong_outcome: Like) -> None:
+    text = shown([outcome_like(), wrong_outcome(trial="017")])
     line = next(line for line in text.splitlines() if line.startswith("017"))
     assert "backlash" in line
-    assert "-> free_play" in line
-    assert "Wrong trials" not in shown([found(0, True)])
+    assert "-> free play" in line
+    assert "Wrong trials" not in shown([outcome_like()])
 
 
-def test_nothing_tried_is_no_share() -> None:
-    text = shown([found(0, True)])
+def test_trials_of_several_benches_go_with_their_seed(wrong_outcome: Like) -> None:
+    text = shown([wrong_outcome(trial="017"), wrong_outcome(trial="017", seed=2)])
+    assert [line.split()[0] for line in text.splitlines() if "free play" in line] == ["1/017", "2/017"]
+    assert "1 of design small, seed 1 and 1 of design small, seed 2" in text
+
+
+def test_nothing_tried_is_no_share(outcome_like: Like) -> None:
+    text = shown([outcome_like()])
     line = next(line for line in text.splitlines() if line.startswith("controls right"))
     assert line.split()[-1] == "-"

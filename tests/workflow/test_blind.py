@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -11,17 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.blind import Trial, draw_trial, n_trials, subject_of
+from rigsight.blind import Outcome, Trial, draw_trial, n_trials, subject_of
 from rigsight.errors import InputError, RigsightError
 from rigsight.records import Record
 from rigsight.workflow import blind, blind_trial
-from rigsight.workflow.blind import run_blind
-from rigsight.workflow.blind_files import RUN_FILE, BenchFolder, read_json
-from rigsight.workflow.blind_trial import diagnose_trial, score_trial
+from rigsight.workflow.blind import rescore, run_blind
+from rigsight.workflow.blind_files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
+from rigsight.workflow.blind_scoring import score_trial
+from rigsight.workflow.blind_trial import diagnose_trial
 from rigsight.workflow.campaign import read_campaign
 
 SEED = 4711
-NUMBER = 617
+NAME = "617"
 """A number that would be seen wherever it leaks."""
 
 WATCHED = """
@@ -52,13 +54,13 @@ def trial() -> Trial:
 def bench(tmp_path: Path, trial: Trial) -> BenchFolder:
     folder = BenchFolder(tmp_path / "secret_bench")
     folder.settle("small", SEED)
-    folder.write_trial(NUMBER, trial)
+    folder.write_trial(NAME, trial)
     return folder
 
 
 def shortened(folder: BenchFolder, n_samples: int = 1500) -> None:
     """Leave the sweep of the middle amplitude and the first seconds of the step: enough to see no gap."""
-    place = folder.campaign(NUMBER)
+    place = folder.campaign(NAME)
     text = (place / "campaign.toml").read_text()
     head, *records = text.split("[[records]]")
     kept = [r for r in records if "record_2" in r or "record_4" in r]
@@ -69,10 +71,10 @@ def shortened(folder: BenchFolder, n_samples: int = 1500) -> None:
 
 
 def test_a_process_that_diagnoses_is_told_nothing_but_the_campaign(bench: BenchFolder) -> None:
-    diagnose_trial(bench, NUMBER, start=("-c", TELLS_ALL))
-    seen = read_json(bench.result(NUMBER) / "seen.json")
+    diagnose_trial(bench, NAME, start=("-c", TELLS_ALL))
+    seen = read_json(bench.result(NAME) / "seen.json")
     text = json.dumps(seen)
-    for secret in (str(SEED), str(NUMBER), "secret_bench", "keys", "small"):
+    for secret in (str(SEED), NAME, "secret_bench", "keys", "small"):
         assert secret not in text
     assert [Path(file).name for file in seen["files"]] == [
         "campaign.toml",
@@ -84,28 +86,28 @@ def test_a_process_that_diagnoses_is_told_nothing_but_the_campaign(bench: BenchF
 def test_a_diagnosis_runs_with_every_way_to_the_bench_barred(bench: BenchFolder) -> None:
     shortened(bench)
     watch = WATCHED.format(forbidden=str(bench.path))
-    diagnose_trial(bench, NUMBER, start=("-c", watch + "from rigsight.cli import main; main()"))
-    assert read_json(bench.result(NUMBER) / RUN_FILE)["message"] == ""
-    assert read_json(bench.result(NUMBER) / "diagnosis.json")["verdict"] in (
+    diagnose_trial(bench, NAME, start=("-c", watch + "from rigsight.cli import main; main()"))
+    assert read_json(bench.result(NAME) / RUN_FILE)["message"] == ""
+    assert read_json(bench.result(NAME) / "diagnosis.json")["verdict"] in (
         "none",
         "parameters",
         "unknown",
         "effect",
     )
-    assert score_trial(bench, NUMBER).kind == "none"
+    assert score_trial(bench, NAME).kind == "none"
 
 
 def test_the_bar_would_have_been_noticed(bench: BenchFolder) -> None:
-    peek = WATCHED.format(forbidden=str(bench.path)) + f"open({str(bench.key(NUMBER))!r})"
+    peek = WATCHED.format(forbidden=str(bench.path)) + f"open({str(bench.key(NAME))!r})"
     with pytest.raises(RigsightError, match="77"):
-        diagnose_trial(bench, NUMBER, start=("-c", peek))
-    assert not bench.diagnosed(NUMBER)
+        diagnose_trial(bench, NAME, start=("-c", peek))
+    assert not bench.diagnosed(NAME)
 
 
 def test_a_campaign_reads_as_it_was_drawn_and_withheld_records_stay_with_the_key(
     bench: BenchFolder, trial: Trial
 ) -> None:
-    campaign = read_campaign(bench.campaign(NUMBER))
+    campaign = read_campaign(bench.campaign(NAME))
     assert campaign.parameters == trial.given
     for read, drawn in zip(campaign.records, trial.records, strict=True):
         assert (read.name, read.role, read.kind, read.hold) == (
@@ -115,9 +117,15 @@ def test_a_campaign_reads_as_it_was_drawn_and_withheld_records_stay_with_the_key
             drawn.hold,
         )
         assert np.allclose(read["u"], drawn["u"], rtol=1e-9, atol=0.0)
-    campaign_files = {file.name for file in bench.campaign(NUMBER).iterdir()}
+    campaign_files = {file.name for file in bench.campaign(NAME).iterdir()}
     assert not any("withheld" in name for name in campaign_files)
-    assert all(bench.withheld(NUMBER, record.name).is_file() for record in trial.withheld)
+    for read, drawn in zip(bench.withheld_records(NAME, trial.linear.rig), trial.withheld, strict=True):
+        assert (read.name, read.kind, read.amplitude, read.hold) == (
+            drawn.name,
+            drawn.kind,
+            drawn.amplitude,
+            drawn.hold,
+        )
 
 
 def test_files_of_two_trials_differ_in_numbers_only(tmp_path: Path, trial: Trial) -> None:
@@ -131,12 +139,12 @@ def test_files_of_two_trials_differ_in_numbers_only(tmp_path: Path, trial: Trial
         key={**trial.key, "kind": "single", "effects": ["backlash"], "values": {"g": 1e-3}},
     )
     folder = BenchFolder(tmp_path)
-    folder.write_trial(1, trial)
-    folder.write_trial(2, other)
+    folder.write_trial("001", trial)
+    folder.write_trial("002", other)
     shapes = []
-    for number in (1, 2):
-        files = sorted(folder.campaign(number).iterdir())
-        toml = (folder.campaign(number) / "campaign.toml").read_text()
+    for name in ("001", "002"):
+        files = sorted(folder.campaign(name).iterdir())
+        toml = (folder.campaign(name) / "campaign.toml").read_text()
         rows = [file.read_text().splitlines() for file in files if file.suffix == ".csv"]
         widths = {len(field.lstrip("-")) for lines in rows for row in lines[1:] for field in row.split(",")}
         shapes.append(([f.name for f in files], toml, [(lines[0], len(lines)) for lines in rows], widths))
@@ -144,36 +152,95 @@ def test_files_of_two_trials_differ_in_numbers_only(tmp_path: Path, trial: Trial
     assert len(shapes[0][3]) == 1
 
 
-def test_a_bench_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    done: Counter[int] = Counter()
-
-    def make(folder: BenchFolder, design: str, seed: int, number: int) -> None:
-        if not folder.drawn(number):
-            done[number] += 1
-            folder.key(number).write_text(json.dumps({**KEY, "trial": number}))
-
-    def diagnose(folder: BenchFolder, number: int) -> None:
-        if number == 2 and done[2] == 1:
-            done[2] += 1
-            raise RigsightError("killed")
-        target = folder.result(number)
-        target.mkdir(parents=True)
-        (target / RUN_FILE).write_text(json.dumps({"seconds": 1.0, "message": "it failed"}))
-
-    monkeypatch.setattr(blind, "make_trial", make)
-    monkeypatch.setattr(blind, "diagnose_trial", diagnose)
-    with pytest.raises(RigsightError, match="killed"):
-        run_blind(tmp_path / "b", design="small", trials=4, seed=1, n_jobs=1)
-    content = run_blind(tmp_path / "b", design="small", trials=4, seed=1, n_jobs=1)
-    assert [t["trial"] for t in content["trials"]] == [0, 1, 2, 3]
-    assert (done[0], done[1], done[3]) == (1, 1, 1)
-    assert content["trials"][0]["verdict"] == "failed"
-    assert [w["trial"] for w in content["wrong"]] == [0, 1, 2, 3]
-
-
 KEY: dict[str, Any] = {
-    "kind": "none", "effects": [], "where": [], "rig": "axis", "noise": "low", "gap": 1.0, "noise_floor": {}, "withheld": {},
+    "design": "small", "seed": 1, "kind": "none", "effects": [], "where": [], "rig": "axis", "noise": "low", "gap": 1.0,
+    "values": {}, "noise_floor": {}, "withheld": [],
 }  # fmt: skip
+
+
+class Steps:
+    """Counts what is done to each trial, in place of the real steps; a trial may die at one of them, once."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.done: Counter[tuple[str, str]] = Counter()
+        self.dies: set[tuple[str, str]] = set()
+        for step in ("make", "diagnose", "score"):
+            patch.setattr(blind, f"{step}_trial", getattr(self, step))
+
+    def _count(self, step: str, name: str) -> None:
+        if (step, name) in self.dies:
+            self.dies.remove((step, name))
+            raise RigsightError("killed")
+        self.done[step, name] += 1
+
+    def make(self, folder: BenchFolder, design: str, seed: int, number: int) -> None:
+        name = trial_name(number)
+        if not folder.drawn(name):
+            self._count("make", name)
+            folder.key(name).write_text(json.dumps(KEY))
+
+    def diagnose(self, folder: BenchFolder, name: str) -> None:
+        if not folder.diagnosed(name):
+            self._count("diagnose", name)
+            target = folder.result(name)
+            target.mkdir(parents=True)
+            (target / RUN_FILE).write_text(json.dumps({"seconds": 1.0, "message": "it failed"}))
+
+    def score(self, folder: BenchFolder, name: str) -> Outcome:
+        self._count("score", name)
+        return score_trial(folder, name)
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> Steps:
+    return Steps(monkeypatch)
+
+
+@pytest.mark.parametrize("step", ["make", "diagnose", "score"])
+def test_a_bench_goes_on_where_it_was_stopped(tmp_path: Path, steps: Steps, step: str) -> None:
+    steps.dies.add((step, "002"))
+    with pytest.raises(RigsightError, match="killed"):
+        run_blind(tmp_path, design="small", trials=4, seed=1, n_jobs=1)
+    content = run_blind(tmp_path, design="small", trials=4, seed=1, n_jobs=1)
+    names = ["000", "001", "002", "003"]
+    assert [t["trial"] for t in content["trials"]] == names
+    assert steps.done == {(step, name): 1 for step in ("make", "diagnose", "score") for name in names}
+    assert content["trials"][0]["verdict"] == "failed"
+    assert [w["trial"] for w in content["wrong"]] == names
+
+
+def test_a_trial_with_a_row_is_left_alone(tmp_path: Path, steps: Steps) -> None:
+    run_blind(tmp_path, design="small", trials=2, seed=1, n_jobs=1)
+    before = steps.done.copy()
+    # Neither key nor results are needed any more.
+    shutil.rmtree(tmp_path / "results")
+    told: list[str] = []
+    content = run_blind(
+        tmp_path, design="small", trials=3, seed=1, n_jobs=1, listener=lambda step: told.append(step.detail)
+    )
+    assert content["n_trials"] == 3
+    assert steps.done - before == {("make", "002"): 1, ("diagnose", "002"): 1, ("score", "002"): 1}
+    assert "0 (done before)" in told
+
+
+def test_one_trial_alone_is_added_to_the_score(tmp_path: Path, steps: Steps) -> None:
+    run_blind(tmp_path, design="small", seed=1, only=[7], n_jobs=1)
+    content = run_blind(tmp_path, design="small", seed=1, only=[5], n_jobs=1)
+    assert [t["trial"] for t in content["trials"]] == ["005", "007"]
+    assert content["wrong"][1]["again"] == "rigsight blind --design small --seed 1 --trial 7 --out DIR"
+    assert steps.done["diagnose", "007"] == 1
+
+
+def test_rescoring_scores_what_is_diagnosed_and_runs_nothing(tmp_path: Path, steps: Steps) -> None:
+    run_blind(tmp_path, design="small", trials=2, seed=1, n_jobs=1)
+    (tmp_path / "keys" / "001.json").write_text(json.dumps({**KEY, "noise": "high"}))
+    (tmp_path / STORE_FILE).unlink()
+    content = rescore(tmp_path, n_jobs=1)
+    assert [t["noise"] for t in content["trials"]] == ["low", "high"]
+    assert steps.done["diagnose", "001"] == 1
+    assert rescore(tmp_path, n_jobs=1)["n_trials"] == 2
+    with pytest.raises(InputError, match="no blind bench"):
+        rescore(tmp_path / "elsewhere")
 
 
 def test_a_folder_of_another_bench_and_a_number_out_of_range_are_told(tmp_path: Path) -> None:
@@ -185,8 +252,8 @@ def test_a_folder_of_another_bench_and_a_number_out_of_range_are_told(tmp_path: 
 
 
 def test_a_failed_diagnosis_is_kept_with_its_reason(bench: BenchFolder) -> None:
-    diagnose_trial(bench, NUMBER, start=("-c", "import sys; sys.exit('rigsight: no good')"))
-    found = score_trial(bench, NUMBER)
+    diagnose_trial(bench, NAME, start=("-c", "import sys; sys.exit('rigsight: no good')"))
+    found = score_trial(bench, NAME)
     assert (found.verdict, found.right, found.message) == ("failed", False, "rigsight: no good")
 
 

@@ -1,23 +1,43 @@
-"""How good is a diagnosis whose truth is known? One outcome per trial, and what many of them add up to."""
+"""What came of one trial whose truth is known? The diagnosis is held against the key."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
 from typing import Any
 
-import numpy as np
-from scipy.stats import binomtest
-
+from rigsight.blind.parameter_errors import ParameterError, parameter_errors
 from rigsight.blind.subjects import TIERS
 
-_LEAST_PROBABILITY = 1e-3
-"""A truth that was given less counts as this much, or one trial alone would set the log score."""
-_BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
-_LARGE_GAP = TIERS["clear"][0]
+FAILED = "failed"
+"""Verdict of a diagnosis that ended with an error."""
+BELOW = "below"
+"""Tier of a gap that is smaller than the faintest."""
+UNMEASURED = "not measured"
+"""Tier of a gap whose size neither key nor diagnosis tells."""
+
+
+@dataclass(frozen=True)
+class WithheldError:
+    """What a diagnosed model leaves of one record that no diagnosis has seen.
+
+    Attributes
+    ----------
+    name, kind, amplitude
+        The record; amplitude [unit of the input].
+    n_samples
+        Its length.
+    error
+        RMS error over all outputs in units of the true noise floor, from the model and the input alone; None where there is no
+        model or it cannot be simulated.
+    """
+
+    name: str
+    kind: str
+    amplitude: float
+    n_samples: int
+    error: float | None
 
 
 @dataclass(frozen=True)
@@ -26,10 +46,16 @@ class Outcome:
 
     Attributes
     ----------
-    trial, kind, effects, rig, noise
-        From the key: number, kind of subject, hidden effects, rig, noise level.
+    design, seed, trial
+        Which trial it is: a number of a drawn bench as text, or the name of a campaign.
+    fingerprint
+        Of the files of a campaign written by somebody else and of its key; empty where design, seed and number say all.
+    version
+        The rigsight that scored it.
+    kind, effects, rig, noise
+        From the key: kind of subject, hidden effects, rig, noise level.
     gap
-        What the re-identified equations leave on validation records, in units of the true noise floor.
+        What the re-identified equations leave on validation records, in units of the true noise floor; None if not known.
     tier
         Strength by that gap; "below" where it is smaller than the faintest, "" where nothing is hidden.
     verdict, named
@@ -39,25 +65,34 @@ class Outcome:
     right_within_set
         Right, or the truth is among those that the diagnosis cannot tell from what it names.
     place_right
-        The places named are those of the hidden effects; None where nothing is hidden.
+        The places named are those of the hidden effects; None where nothing is hidden or the key does not say where.
     probability
         On the truth; for an effect from outside, what is left beside all candidates.
     stated
-        On what the verdict says.
+        On what the verdict says; 0 where there is none.
     held_out
-        RMS error on the withheld records in units of the true noise floor, from the model alone; None without a model.
+        RMS error on all withheld records in units of the true noise floor, from the model alone; None where one of them cannot
+        be simulated, or there is none.
+    withheld
+        The same record by record.
+    parameters
+        Errors of the numbers where the verdict is right.
     seconds
         Time of the diagnosis.
     message
         Why it failed.
     """
 
-    trial: int
+    design: str
+    seed: int
+    trial: str
+    fingerprint: str
+    version: str
     kind: str
     effects: tuple[str, ...]
     rig: str
     noise: str
-    gap: float
+    gap: float | None
     tier: str
     verdict: str
     named: tuple[str, ...]
@@ -67,6 +102,8 @@ class Outcome:
     probability: float
     stated: float
     held_out: float | None
+    withheld: tuple[WithheldError, ...]
+    parameters: tuple[ParameterError, ...]
     seconds: float
     message: str = ""
 
@@ -75,32 +112,12 @@ class Outcome:
         return asdict(self)
 
 
-@dataclass(frozen=True)
-class Share:
-    """How many of how many, with the Wilson interval of 95 %."""
-
-    count: int
-    total: int
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Interval of the share; everything where nothing was tried."""
-        if self.total == 0:
-            return 0.0, 1.0
-        found = binomtest(self.count, self.total).proportion_ci(confidence_level=0.95, method="wilson")
-        return float(found.low), float(found.high)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return count, total, share and interval."""
-        share = self.count / self.total if self.total else None
-        return {"count": self.count, "total": self.total, "share": share, "interval": list(self.interval)}
-
-
 def outcome(
     key: Mapping[str, Any],
     diagnosis: Mapping[str, Any] | None,
-    held_out: float | None,
+    withheld: Sequence[WithheldError],
     seconds: float,
+    version: str,
     message: str = "",
 ) -> Outcome:
     """Hold a diagnosis against its key.
@@ -108,18 +125,20 @@ def outcome(
     Parameters
     ----------
     key
-        As `draw_trial` makes it.
+        As `draw_trial` makes it. A key written by somebody else may hold a `fingerprint`, and None for `where` and `gap`.
     diagnosis
         Content of ``diagnosis.json``; None if the diagnosis failed.
-    held_out
-        See `Outcome`.
+    withheld
+        Errors on the withheld records.
     seconds
         Time of the diagnosis.
+    version
+        The rigsight that scores.
     message
-        Why it failed.
+        Why the diagnosis failed.
     """
     found = diagnosis or {
-        "verdict": "failed",
+        "verdict": FAILED,
         "effects": [],
         "where": [],
         "ambiguous_with": [],
@@ -134,144 +153,56 @@ def outcome(
     candidates = {frozenset(c["effects"]): float(c["probability"] or 0.0) for c in found["candidates"]}
     left = max(0.0, 1.0 - sum(candidates.values()))
     probability = left if kind == "outside" else candidates.get(truth, 0.0)
-    if verdict == "failed":
-        probability = 0.0
+    stated = left if verdict == "unknown" else candidates.get(named, 0.0)
+    if verdict == FAILED:
+        probability = stated = 0.0
+    gap = None if key["gap"] is None else float(key["gap"])
+    hides_a_place = bool(truth) and key["where"] is not None
     return Outcome(
-        trial=int(key["trial"]),
+        design=str(key["design"]),
+        seed=int(key["seed"]),
+        trial=str(key["trial"]),
+        fingerprint=str(key.get("fingerprint", "")),
+        version=version,
         kind=kind,
         effects=tuple(sorted(truth)),
         rig=str(key["rig"]),
         noise=str(key["noise"]),
-        gap=float(key["gap"]),
-        tier=_tier(float(key["gap"])) if truth else "",
+        gap=gap,
+        tier=_tier(gap) if truth else "",
         verdict=verdict,
         named=tuple(sorted(named)),
         right=right,
         right_within_set=right or within,
-        place_right=frozenset(found["where"]) == frozenset(key["where"]) if truth else None,
+        place_right=frozenset(found["where"]) == frozenset(key["where"]) if hides_a_place else None,
         probability=probability,
-        stated=left if verdict in ("unknown", "failed") else candidates.get(named, 0.0),
-        held_out=held_out,
+        stated=stated,
+        held_out=_over_all(withheld),
+        withheld=tuple(withheld),
+        parameters=_parameter_errors(key, found) if right and kind != "outside" else (),
         seconds=seconds,
         message=message,
     )
 
 
-def _tier(gap: float) -> str:
+def _tier(gap: float | None) -> str:
+    if gap is None:
+        return UNMEASURED
     reached = [tier for tier, (least, _) in TIERS.items() if gap >= least]
-    return reached[-1] if reached else "below"
+    return reached[-1] if reached else BELOW
 
 
-def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Return what many outcomes add up to, ready for ``blind.json``."""
-    return {
-        "goals": goals(outcomes),
-        "confusion": confusion(outcomes),
-        "reliability": reliability(outcomes),
-        "by": {name: _grouped(outcomes, label) for name, label in _GROUPINGS.items()},
-        "wrong": [o.trial for o in outcomes if not o.right],
-    }
+def _over_all(withheld: Sequence[WithheldError]) -> float | None:
+    """Return the RMS error over all samples of all records."""
+    errors = [(w.n_samples, w.error) for w in withheld if w.error is not None]
+    if not errors or len(errors) < len(withheld):
+        return None
+    return math.sqrt(sum(n * error**2 for n, error in errors) / sum(n for n, _ in errors))
 
 
-def truth_label(found: Outcome) -> str:
-    """Return what a trial hid, in words."""
-    prefix = "outside: " if found.kind == "outside" else ""
-    return prefix + (" + ".join(found.effects) or found.kind)
-
-
-def verdict_label(found: Outcome) -> str:
-    """Return what a diagnosis said, in words."""
-    return " + ".join(found.named) or found.verdict
-
-
-_GROUPINGS: dict[str, Callable[[Outcome], str]] = {
-    "kind": lambda o: o.kind,
-    "tier": lambda o: o.tier or "no effect",
-    "noise": lambda o: o.noise,
-    "rig": lambda o: o.rig,
-    "effect": truth_label,
-}
-
-
-def goals(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Return the figures for which the project has set itself goals."""
-    large = [o for o in outcomes if o.gap >= _LARGE_GAP]
-    singles = [o for o in large if o.kind == "single"]
-    pairs = [o for o in large if o.kind == "pair"]
-    faint = [o for o in outcomes if o.kind == "single" and o.tier == "faint"]
-    outside = [o for o in outcomes if o.kind == "outside"]
-    controls = [o for o in outcomes if o.kind in ("none", "parameters")]
-    known = [*singles, *pairs, *controls]
-    return {
-        "singles_right": _share(singles, lambda o: o.right),
-        "singles_right_within_set": _share(singles, lambda o: o.right_within_set),
-        "singles_place_right": _share(singles, lambda o: bool(o.place_right)),
-        "pairs_right": _share(pairs, lambda o: o.right),
-        "pairs_right_within_set": _share(pairs, lambda o: o.right_within_set),
-        "controls_right": _share(controls, lambda o: o.right),
-        "outside_unknown": _share(outside, lambda o: o.right),
-        "outside_unknown_large_gap": _share([o for o in outside if o.gap >= _LARGE_GAP], lambda o: o.right),
-        "outside_named_above_half": _share(outside, lambda o: bool(o.named) and o.stated > 0.5),
-        "faint_right": _share(faint, lambda o: o.right),
-        "faint_right_within_set": _share(faint, lambda o: o.right_within_set),
-        "mean_probability": _mean(o.probability for o in known),
-        "log_score": _mean(-math.log(max(o.probability, _LEAST_PROBABILITY)) for o in known),
-        "held_out_median": _median([*singles, *pairs]),
-        "seconds_median": float(np.median([o.seconds for o in outcomes])) if outcomes else None,
-    }
-
-
-def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, int]]:
-    """Return truth -> verdict -> number of trials."""
-    table: dict[str, Counter[str]] = {}
-    for found in outcomes:
-        table.setdefault(truth_label(found), Counter())[verdict_label(found)] += 1
-    return {truth: dict(counts.most_common()) for truth, counts in sorted(table.items())}
-
-
-def reliability(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """Return, for bins of the stated probability, its mean and the share of verdicts that were right."""
-    rows = []
-    for lower, upper in pairwise(_BINS):
-        inside = [o for o in outcomes if lower < o.stated <= upper or (lower == 0.0 and o.stated == 0.0)]
-        rows.append(
-            {
-                "from": lower,
-                "to": upper,
-                "stated": _mean(o.stated for o in inside),
-                "right": _share(inside, lambda o: o.right),
-            }
-        )
-    return rows
-
-
-def _grouped(outcomes: Sequence[Outcome], label: Callable[[Outcome], str]) -> dict[str, Any]:
-    groups: dict[str, list[Outcome]] = {}
-    for found in outcomes:
-        groups.setdefault(label(found), []).append(found)
-    return {value: _figures(groups[value]) for value in sorted(groups)}
-
-
-def _figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    hiding = [o for o in outcomes if o.place_right is not None]
-    return {
-        "right": _share(outcomes, lambda o: o.right),
-        "right_within_set": _share(outcomes, lambda o: o.right_within_set),
-        "place_right": _share(hiding, lambda o: bool(o.place_right)),
-        "mean_probability": _mean(o.probability for o in outcomes),
-        "held_out_median": _median(outcomes),
-    }
-
-
-def _share(outcomes: Sequence[Outcome], counts: Callable[[Outcome], bool]) -> dict[str, Any]:
-    return Share(sum(map(counts, outcomes)), len(outcomes)).to_json()
-
-
-def _mean(values: Iterable[float]) -> float | None:
-    listed = list(values)
-    return float(np.mean(listed)) if listed else None
-
-
-def _median(outcomes: Sequence[Outcome]) -> float | None:
-    errors = [o.held_out for o in outcomes if o.held_out is not None]
-    return float(np.median(errors)) if errors else None
+def _parameter_errors(key: Mapping[str, Any], found: Mapping[str, Any]) -> tuple[ParameterError, ...]:
+    effects = sorted(key["effects"])
+    named = next((c for c in found["candidates"] if sorted(c["effects"]) == effects), None)
+    if named is None:
+        return ()
+    return parameter_errors(str(key["rig"]), effects, named["parameters"], key["values"])

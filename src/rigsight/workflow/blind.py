@@ -1,24 +1,27 @@
-"""What `rigsight blind` does: drawn rigs whose effect is withheld are diagnosed, and scored by keys no diagnosis has seen."""
+"""What `rigsight blind` does: rigs whose effect is withheld are diagnosed, and scored by keys no diagnosis has seen."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed
-
-from rigsight.blind import Design, Outcome, n_trials, summary
-from rigsight.errors import InputError
-from rigsight.workflow.blind_files import BenchFolder
-from rigsight.workflow.blind_trial import diagnose_trial, make_trial, score_trial
-from rigsight.workflow.diagnose import versions
+from rigsight.blind import Design, Outcome, n_trials
+from rigsight.errors import InputError, nearest
+from rigsight.workflow.blind_execution import finished
+from rigsight.workflow.blind_external import ExternalBench
+from rigsight.workflow.blind_files import EXTERNAL, STORE_FILE, BenchFolder, read_json, trial_name
+from rigsight.workflow.blind_score_files import score_bench
+from rigsight.workflow.blind_scoring import score_trial
+from rigsight.workflow.blind_store import TrialStore
+from rigsight.workflow.blind_trial import diagnose_trial, make_trial
 from rigsight.workflow.kernels import checked_jobs
 from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.results import check_writable, json_text, write_together
+from rigsight.workflow.results import check_writable
 
-BLIND_FILE = "blind.json"
 RUNNING = "Blind trials"
+SCORING = "Scoring trials anew"
 
 
 def run_blind(
@@ -29,6 +32,7 @@ def run_blind(
     seed: int = 0,
     only: Sequence[int] = (),
     n_jobs: int | None = None,
+    cluster: str | None = None,
     listener: Listener = silent,
     command: str = "rigsight blind",
 ) -> dict[str, Any]:
@@ -45,9 +49,11 @@ def run_blind(
     seed
         Seed of all draws.
     only
-        Numbers of the trials to run; all if empty. The score covers every trial that is diagnosed.
+        Numbers of the trials to run; all if empty. The score covers every trial that has been scored.
     n_jobs
         Trials at the same time; None for one per processor.
+    cluster
+        Address of a Dask scheduler; None for this machine.
     listener
         Told of every finished trial.
     command
@@ -70,53 +76,143 @@ def run_blind(
         raise InputError(
             f"Trials are numbered from 0 to {total - 1}, got {', '.join(map(str, only)) or total}."
         )
-    folder = BenchFolder(Path(out))
+    folder = BenchFolder(Path(out).resolve())
     check_writable(folder.path)
     folder.settle(design, seed)
     numbers = list(only) or list(range(total))
-    waiting = [number for number in numbers if not folder.diagnosed(number)]
-    stage = Stage(RUNNING, len(numbers), listener)
-    for number in numbers:
-        if number not in waiting:
-            stage.finished(f"{number} (done before)")
-    parallel = Parallel(n_jobs=min(jobs, max(1, len(waiting))), return_as="generator_unordered", batch_size=1)
-    for number in parallel(delayed(_run_trial)(folder, design, seed, number) for number in waiting):
-        stage.finished(str(number))
-    diagnosed = [number for number in range(total) if folder.diagnosed(number)]
-    outcomes = list(
-        Parallel(n_jobs=min(jobs, max(1, len(diagnosed))))(delayed(score_trial)(folder, n) for n in diagnosed)
-    )
-    content = _content(folder, design, seed, outcomes, command)
-    write_together(folder.path, {BLIND_FILE: json_text(content)})
-    return content
+    with TrialStore(folder.path / STORE_FILE) as store:
+        scored = store.scored()
+        waiting = [number for number in numbers if trial_name(number) not in scored]
+        stage = Stage(RUNNING, len(numbers), listener)
+        for number in numbers:
+            if trial_name(number) in scored:
+                stage.finished(f"{number} (done before)")
+        run_one = functools.partial(_run_drawn, folder, design, seed)
+        for outcome in finished(run_one, waiting, jobs, cluster, folder=folder.path, say=_say(listener)):
+            store.add([outcome])
+            stage.finished(outcome.trial)
+        return score_bench(folder.path, store, command)
 
 
-def _run_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> int:
-    make_trial(folder, design, seed, number)
-    diagnose_trial(folder, number)
-    return number
-
-
-def _content(
-    folder: BenchFolder, design: Design, seed: int, outcomes: Sequence[Outcome], command: str
+def run_external(
+    campaigns: str | Path,
+    keys: str | Path,
+    out: str | Path,
+    *,
+    only: Sequence[str] = (),
+    n_jobs: int | None = None,
+    cluster: str | None = None,
+    listener: Listener = silent,
+    command: str = "rigsight blind",
 ) -> dict[str, Any]:
-    wrong = [
-        {
-            "trial": found.trial,
-            "report": str(folder.result(found.trial).relative_to(folder.path) / "report.html"),
-            "again": f"rigsight blind --design {design} --seed {seed} --trial {found.trial} --out DIR",
-        }
-        for found in outcomes
-        if not found.right
-    ]
-    return {
-        "schema_version": 1,
-        "design": design,
-        "seed": seed,
-        "n_trials": len(outcomes),
-        "command": command,
-        "versions": versions(),
-        **summary(outcomes),
-        "wrong": wrong,
-        "trials": [found.to_json() for found in outcomes],
-    }
+    """Diagnose and score campaigns that somebody else wrote; one that has changed since it was scored is done again.
+
+    Parameters
+    ----------
+    campaigns
+        Folder with a folder for each campaign.
+    keys
+        Folder with a key ``NAME.json`` for each of these folders; see `blind_external`.
+    out
+        Folder for the results.
+    only
+        Names of the campaigns to run; all if empty.
+    n_jobs, cluster, listener, command
+        As for `run_blind`.
+
+    Returns
+    -------
+    The content of ``blind.json``.
+
+    Raises
+    ------
+    InputError
+        If a campaign or a key cannot be used, or the results cannot be written.
+    RigsightError
+        If a diagnosis was ended from outside.
+    """
+    jobs = checked_jobs(n_jobs)
+    folder = ExternalBench(Path(out).resolve(), Path(campaigns).resolve(), Path(keys).resolve())
+    check_writable(folder.path)
+    names = folder.names()
+    for name in only:
+        if name not in names:
+            raise InputError(f"There is no campaign '{name}' in {folder.campaigns}.{nearest(name, names)}")
+    folder.settle_here()
+    wanted = list(only) or names
+    with TrialStore(folder.path / STORE_FILE) as store:
+        scored = store.scored()
+        waiting = [name for name in wanted if scored.get(name) != folder.fingerprint(name)]
+        stage = Stage(RUNNING, len(wanted), listener)
+        for name in wanted:
+            if name not in waiting:
+                stage.finished(f"{name} (done before)")
+        for outcome in finished(
+            functools.partial(_run, folder), waiting, jobs, cluster, folder=folder.path, say=_say(listener)
+        ):
+            store.add([outcome])
+            stage.finished(outcome.trial)
+        return score_bench(folder.path, store, command)
+
+
+def rescore(
+    out: str | Path,
+    *,
+    n_jobs: int | None = None,
+    cluster: str | None = None,
+    listener: Listener = silent,
+    command: str = "rigsight blind --rescore",
+) -> dict[str, Any]:
+    """Score every trial of a bench that has been diagnosed anew; nothing is drawn or diagnosed.
+
+    Parameters
+    ----------
+    out
+        Folder of the bench, drawn or of campaigns that somebody else wrote.
+    n_jobs, cluster, listener, command
+        As for `run_blind`.
+
+    Returns
+    -------
+    The content of ``blind.json``.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no bench, or key or results of a trial cannot be read.
+    """
+    jobs = checked_jobs(n_jobs)
+    folder = BenchFolder(Path(out).resolve())
+    if not folder.settings.is_file():
+        raise InputError(f"{out} holds no blind bench to score anew. Name its folder with --out.")
+    settings = read_json(folder.settings)
+    if settings.get("design") == EXTERNAL:
+        folder = ExternalBench(folder.path, Path(settings["campaigns"]), Path(settings["keys"]))
+    names = folder.all_diagnosed()
+    with TrialStore(folder.path / STORE_FILE) as store:
+        stage = Stage(SCORING, len(names), listener)
+        run_one: Callable[[str], Outcome] = functools.partial(score_trial, folder)
+        for outcome in finished(run_one, names, jobs, cluster, folder=folder.path, say=_say(listener)):
+            store.add([outcome])
+            stage.finished(outcome.trial)
+        return score_bench(folder.path, store, command)
+
+
+def _run_drawn(folder: BenchFolder, design: Design, seed: int, number: int) -> Outcome:
+    make_trial(folder, design, seed, number)
+    return _run(folder, trial_name(number))
+
+
+def _run(folder: BenchFolder, name: str) -> Outcome:
+    """Diagnose a trial, unless that has been done, and score it."""
+    diagnose_trial(folder, name)
+    return score_trial(folder, name)
+
+
+def _say(listener: Listener) -> Callable[[str], None]:
+    """Return what tells a listener that something waits: a stage of its own."""
+
+    def say(words: str) -> None:
+        Stage(words, 1, listener)
+
+    return say

@@ -94,9 +94,9 @@ def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> C
         raise InputError(
             f'{path.name}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
         )
-    files = [_inside(path, number, record) for number, record in enumerate(table.records, 1)]
+    files = [file_inside(path, number, record) for number, record in enumerate(table.records, 1)]
     records = tuple(
-        _read(path, rig, number, record, file)
+        read_listed_record(path, rig, number, record, file)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
     )
     notes = (
@@ -186,8 +186,23 @@ def _checked(
     return checked
 
 
-def _inside(path: Path, number: int, record: RecordTable) -> Path:
-    """Return the record's file; a campaign that was sent to someone must not read what is none of its business."""
+def file_inside(path: Path, number: int, record: RecordTable) -> Path:
+    """Return the file of a record; a campaign that was sent to someone must not read what is none of its business.
+
+    Parameters
+    ----------
+    path
+        The file that lists the record.
+    number
+        Place of the record in that file, from 1.
+    record
+        What is listed.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it lies outside the folder of `path`.
+    """
     key = f"{path.name}: record {number}: file"
     folder = path.parent.resolve()
     asked = Path(record.file)
@@ -205,7 +220,27 @@ def _inside(path: Path, number: int, record: RecordTable) -> Path:
     return path.parent / asked
 
 
-def _read(path: Path, rig: Rig, number: int, record: RecordTable, file: Path) -> Record:
+def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, file: Path) -> Record:
+    """Read a record as a file that lists it describes it.
+
+    Parameters
+    ----------
+    path
+        The file that lists the record.
+    rig
+        Rig whose signals it holds.
+    number
+        Place of the record in that file, from 1.
+    record
+        What is listed.
+    file
+        See `file_inside`.
+
+    Raises
+    ------
+    InputError
+        Naming the file that lists it, the record, and line and column of what cannot be used.
+    """
     key = f"{path.name}: record {number} ({record.file})"
     known = [TIME, *(signal.name for signal in (*rig.inputs, *rig.outputs))]
     columns = {}

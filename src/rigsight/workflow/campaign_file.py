@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -13,15 +13,22 @@ from rigsight.records import Hold, Kind, Role
 
 MOST_RECORDS = 1000
 LARGEST_FILE = 10_000_000
+_LISTS = ("records", "withheld")
+"""Keys that hold lists of records."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class _Table(BaseModel):
+class FileTable(BaseModel):
+    """A table of a file that somebody wrote: unknown keys and numbers in quotes are mistakes."""
+
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class ColumnTable(_Table):
+Checked = TypeVar("Checked", bound=FileTable)
+
+
+class ColumnTable(FileTable):
     """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset."""
 
     name: str | int
@@ -29,7 +36,7 @@ class ColumnTable(_Table):
     offset: Number = 0.0
 
 
-class RigTable(_Table):
+class RigTable(FileTable):
     """``[rig]``: which rig, the effects that the simulation in question has, its known constants and its parameters."""
 
     model: str
@@ -38,7 +45,7 @@ class RigTable(_Table):
     parameters: dict[str, Number] = {}
 
 
-class RecordTable(_Table):
+class RecordTable(FileTable):
     """``[[records]]``: one measured file, what it is for, and how it is written."""
 
     file: Annotated[str, Field(min_length=1)]
@@ -54,7 +61,7 @@ class RecordTable(_Table):
     comment: Annotated[str, Field(min_length=1)] | None = None
 
 
-class CampaignTable(_Table):
+class CampaignTable(FileTable):
     """The whole file."""
 
     title: str = ""
@@ -102,18 +109,29 @@ def read_campaign_table(path: Path) -> CampaignTable:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    return checked_file(path, data, CampaignTable)
+
+
+def checked_file(path: Path, data: dict[str, Any], table: type[Checked]) -> Checked:
+    """Return what a file holds as a table.
+
+    Raises
+    ------
+    InputError
+        Naming the file and, for each of the first mistakes, the key, what was got and what is allowed.
+    """
     try:
-        return CampaignTable.model_validate(data)
+        return table.model_validate(data)
     except ValidationError as error:
-        told = _messages(path, data, [dict(problem) for problem in error.errors(include_url=False)])
+        told = _messages(path, data, table, [dict(problem) for problem in error.errors(include_url=False)])
         more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
         raise InputError("\n".join(told[:5]) + more) from None
 
 
 def key_text(location: tuple[str | int, ...], data: dict[str, Any]) -> str:
     """Return a location as a user reads it: ``rig.constants.v``, ``record 2 (step.csv): role``."""
-    if len(location) >= 2 and location[0] == "records" and isinstance(location[1], int):
-        table = data["records"][location[1]]
+    if len(location) >= 2 and location[0] in _LISTS and isinstance(location[1], int):
+        table = data[location[0]][location[1]]
         file = table.get("file") if isinstance(table, dict) else None
         record = f"record {location[1] + 1}" + (f" ({file})" if isinstance(file, str) and file else "")
         rest = ".".join(map(str, location[2:]))
@@ -121,23 +139,25 @@ def key_text(location: tuple[str | int, ...], data: dict[str, Any]) -> str:
     return ".".join(map(str, location))
 
 
-def _messages(path: Path, data: dict[str, Any], problems: list[dict[str, Any]]) -> list[str]:
+def _messages(
+    path: Path, data: dict[str, Any], table: type[FileTable], problems: list[dict[str, Any]]
+) -> list[str]:
     """Return one line per mistake; an alternative that fails as a whole only repeats what another says in detail."""
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
     told = [
-        _tell(path, data, problem)
+        _tell(path, data, table, problem)
         for problem, key in zip(problems, keys, strict=True)
         if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
     ]
     return list(dict.fromkeys(told))
 
 
-def _tell(path: Path, data: dict[str, Any], problem: dict[str, Any]) -> str:
+def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
     key = key_text(location, data)
     kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
     if kind == "extra_forbidden":
-        allowed = _allowed_keys(location)
+        allowed = _allowed_keys(location, table)
         return f"{path.name}: {key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
     if kind == "missing":
         return f"{path.name}: {key}: is missing.{_how_to_write(location)}"
@@ -183,11 +203,10 @@ def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]
     return tuple(kept)
 
 
-def _allowed_keys(location: tuple[str | int, ...]) -> list[str]:
-    table: type[BaseModel] = CampaignTable
+def _allowed_keys(location: tuple[str | int, ...], table: type[FileTable]) -> list[str]:
     if location[0] == "rig" and len(location) > 1:
         table = RigTable
-    elif location[0] == "records" and len(location) > 1:
+    elif location[0] in _LISTS and len(location) > 1:
         table = ColumnTable if "columns" in location else RecordTable
     return list(table.model_fields)
 

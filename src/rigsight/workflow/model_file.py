@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -17,9 +16,10 @@ from rigsight.rigs import RIGS
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
+from rigsight.workflow.json_file import json_object
 
 MODEL_FILE = "model.json"
-LARGEST_FILE = 10_000_000
+_MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 _GROUPS = ("constants", "parameters", "effect_parameters")
@@ -56,7 +56,7 @@ def read_model(model: str | Path, own_effects: Iterable[Effect] = ()) -> Model:
         Naming file and key, or line and column, of what cannot be used, and the mend.
     """
     path = _locate(Path(model))
-    table = _checked_table(path, _data(path))
+    table = _checked_table(path, json_object(path, "model", _MEND))
     structure = _structure(path, table, own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 
@@ -98,46 +98,6 @@ def _locate(model: Path) -> Path:
             f"Folder {model} holds no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
         )
     return path
-
-
-def _data(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no model.")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); it is no model.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-    try:
-        data = json.loads(text, object_pairs_hook=_without_repeated_keys, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. "
-            f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
-        ) from None
-    except (_NoModelError, ValueError, RecursionError) as error:
-        raise InputError(f"{path.name}: {error}") from None
-    if not isinstance(data, dict):
-        raise InputError(f"{path.name}: must hold one object in braces, got a {type(data).__name__}.")
-    return data
-
-
-class _NoModelError(Exception):
-    """JSON that Python would read but that means nothing."""
-
-
-def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in content:
-            raise _NoModelError(f"the key '{key}' stands twice in one table; remove one.")
-        content[key] = value
-    return content
-
-
-def _refuse_constant(name: str) -> float:
-    raise _NoModelError(f"{name} is no number that a simulation can use; give finite numbers.")
 
 
 def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:

@@ -1,0 +1,109 @@
+"""What must a diagnosis reach to be believed, and has it?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rigsight.blind.score import Outcome
+from rigsight.blind.shares import mean, mean_interval, median, median_interval, share_of
+from rigsight.blind.subjects import TIERS
+
+_LEAST_PROBABILITY = 1e-3
+"""A truth that was given less counts as this much, or one trial alone would set the log score."""
+_LARGE_GAP = TIERS["clear"][0]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A figure that is to be at least, or at most, so large."""
+
+    target: float
+    at_most: bool = False
+
+    def reached(self, value: float) -> bool:
+        """Return True if a figure is good enough."""
+        return value <= self.target if self.at_most else value >= self.target
+
+
+GOALS: dict[str, Goal] = {
+    "singles_right": Goal(0.98),
+    "singles_place_right": Goal(0.99),
+    "controls_right": Goal(0.98),
+    "outside_unknown_large_gap": Goal(0.90),
+    "pairs_right": Goal(0.85),
+    "mean_probability": Goal(0.95),
+    "held_out_median": Goal(1.1, at_most=True),
+}
+"""For gaps of at least five times the noise floor; controls have none."""
+
+
+def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Return the figures for which there are goals, and those that stand beside them.
+
+    A gap that nobody has measured counts as a large one, or a failed diagnosis would not count at all.
+    """
+    large = [o for o in outcomes if o.gap is None or o.gap >= _LARGE_GAP]
+    singles = [o for o in large if o.kind == "single"]
+    pairs = [o for o in large if o.kind == "pair"]
+    faint = [o for o in outcomes if o.kind == "single" and o.tier == "faint"]
+    outside = [o for o in outcomes if o.kind == "outside"]
+    controls = [o for o in outcomes if o.kind in ("none", "parameters")]
+    known = [*singles, *pairs, *controls]
+    probabilities = [o.probability for o in known]
+    # A model that cannot be simulated on a withheld record is endlessly far from it.
+    errors = [math.inf if o.held_out is None else o.held_out for o in (*singles, *pairs) if o.withheld]
+    return {
+        "singles_right": share_of(singles, lambda o: o.right),
+        "singles_right_within_set": share_of(singles, lambda o: o.right_within_set),
+        "singles_place_right": share_of(
+            [o for o in singles if o.place_right is not None], lambda o: bool(o.place_right)
+        ),
+        "pairs_right": share_of(pairs, lambda o: o.right),
+        "pairs_right_within_set": share_of(pairs, lambda o: o.right_within_set),
+        "controls_right": share_of(controls, lambda o: o.right),
+        "outside_unknown": share_of(outside, lambda o: o.right),
+        "outside_unknown_large_gap": share_of([o for o in large if o.kind == "outside"], lambda o: o.right),
+        "outside_named_above_half": share_of(outside, lambda o: bool(o.named) and o.stated > 0.5),
+        "faint_right": share_of(faint, lambda o: o.right),
+        "faint_right_within_set": share_of(faint, lambda o: o.right_within_set),
+        "mean_probability": mean(probabilities),
+        "mean_probability_interval": list(mean_interval(probabilities)),
+        "mean_probability_total": len(probabilities),
+        "log_score": mean([-math.log(max(p, _LEAST_PROBABILITY)) for p in probabilities]),
+        "held_out_median": median(errors),
+        "held_out_median_interval": list(median_interval(errors)),
+        "held_out_median_total": len(errors),
+        "seconds_median": median([o.seconds for o in outcomes]),
+    }
+
+
+def targets(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return every goal beside its figure; `reached` is None where nothing was tried.
+
+    `decided` says that the interval of 95 % lies on one side of the goal: so many trials are enough to tell.
+    """
+    rows = []
+    for name, goal in GOALS.items():
+        figure = found[name]
+        counted = isinstance(figure, Mapping)
+        value = figure["share"] if counted else figure
+        total = figure["total"] if counted else found[f"{name}_total"]
+        low, high = figure["interval"] if counted else found[f"{name}_interval"]
+        # Where an end is open the interval goes on without limit.
+        ends = [-math.inf if low is None else low, math.inf if high is None else high]
+        rows.append(
+            {
+                "name": name,
+                "target": goal.target,
+                "at_most": goal.at_most,
+                "value": value,
+                "total": total,
+                "interval": [low, high],
+                "reached": None if total == 0 else goal.reached(math.inf if value is None else value),
+                "decided": total > 0 and len({goal.reached(end) for end in ends}) == 1,
+            }
+        )
+    return rows

@@ -1,0 +1,83 @@
+"""How sure is a figure that comes from so many trials? Shares, means and medians with intervals of 95 %."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from scipy.stats import binomtest, quantile_test
+
+Item = TypeVar("Item")
+
+_TWO_SIDED = 1.96
+"""Standard deviations of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of how many, with the Wilson interval of 95 %."""
+
+    count: int
+    total: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval of the share; everything where nothing was tried."""
+        if self.total == 0:
+            return 0.0, 1.0
+        found = binomtest(self.count, self.total).proportion_ci(confidence_level=0.95, method="wilson")
+        return float(found.low), float(found.high)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return count, total, share and interval."""
+        share = self.count / self.total if self.total else None
+        return {"count": self.count, "total": self.total, "share": share, "interval": list(self.interval)}
+
+
+def share_of(items: Sequence[Item], counts: Callable[[Item], bool]) -> dict[str, Any]:
+    """Return the share of items that count, ready for JSON."""
+    return Share(sum(map(counts, items)), len(items)).to_json()
+
+
+def mean(values: Sequence[float]) -> float | None:
+    """Return the mean; None of nothing."""
+    return float(np.mean(values)) if len(values) else None
+
+
+def mean_interval(probabilities: Sequence[float]) -> tuple[float, float]:
+    """Return where the mean of many such trials lies, by the central limit theorem; everything below two."""
+    if len(probabilities) < 2:
+        return 0.0, 1.0
+    middle = float(np.mean(probabilities))
+    half = _TWO_SIDED * float(np.std(probabilities, ddof=1)) / math.sqrt(len(probabilities))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def quantile(values: Sequence[float], share: float) -> float | None:
+    """Return the value that this share of all does not exceed; None of nothing, or where it is endless."""
+    if not len(values):
+        return None
+    found = float(np.quantile(values, share, method="inverted_cdf"))
+    return found if math.isfinite(found) else None
+
+
+def median(values: Sequence[float]) -> float | None:
+    """Return the median; None of nothing, or where half of all values are endless."""
+    if not len(values):
+        return None
+    # Sorted, because the mean of two endless values is no number.
+    ordered = np.sort(values)
+    low, high = float(ordered[(ordered.size - 1) // 2]), float(ordered[ordered.size // 2])
+    return 0.5 * (low + high) if math.isfinite(high) else None
+
+
+def median_interval(values: Sequence[float]) -> tuple[float | None, float | None]:
+    """Return where the median of many such trials lies, from order alone; None for an open end."""
+    if not len(values):
+        return None, None
+    found: Any = quantile_test(np.sort(values), p=0.5).confidence_interval(0.95)
+    low, high = (float(limit) if math.isfinite(limit) else None for limit in (found.low, found.high))
+    return low, high

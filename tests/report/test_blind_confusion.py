@@ -1,0 +1,35 @@
+"""No trial is lost between matrix and pairs, and what is right is marked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rigsight.blind import Outcome
+from rigsight.report.blind_confusion import confusion, pair_rows
+
+from .blind_content import content_of
+
+Like = Callable[..., Outcome]
+
+
+def test_every_trial_but_pairs_is_in_one_cell(outcome_like: Like, wrong_outcome: Like) -> None:
+    pair = ("backlash", "input_delay")
+    outcomes = [
+        outcome_like(),
+        wrong_outcome(),
+        wrong_outcome(named=pair),
+        wrong_outcome(verdict="failed", named=()),
+        outcome_like(kind="pair", effects=pair, named=pair),
+        outcome_like(kind="outside", effects=("fading_drive",), verdict="unknown", named=()),
+        outcome_like(kind="none", effects=(), verdict="none", named=()),
+    ]
+    found = confusion(content_of(outcomes))
+    assert found.heads == ["backlash", "free play", "none", "unknown", "several effects", "failed"]
+    assert list(found.rows) == ["backlash", "none", "outside: fading drive"]
+    assert sum(cell.count for row in found.rows.values() for cell in row) == len(outcomes) - 1
+    right = {
+        (truth, found.heads[i]) for truth, row in found.rows.items() for i, c in enumerate(row) if c.right
+    }
+    assert right == {("backlash", "backlash"), ("none", "none"), ("outside: fading drive", "unknown")}
+    assert found.rows["backlash"][0].share == 0.25
+    assert pair_rows(content_of(outcomes)) == [("both named", 1)]
