@@ -37,8 +37,8 @@ bench: $(INSTALLED)  ## measure the simulator against C and scipy, and the time 
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
 
-blind: $(INSTALLED)  ## the standard blind bench, 300 rigs
-	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind
+blind: $(INSTALLED)  ## the standard blind bench, 300 rigs; writes docs/blind.md
+	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
 clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)
 	rm -rf demo out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -71,5 +71,5 @@ def test_an_interrupted_diagnosis_leaves_nothing(stage: str, axis_campaign: Path
     assert process.returncode == 130, seen + stderr
     assert stdout == ""
     assert "Traceback" not in stderr
-    assert stderr.strip().endswith("interrupted; nothing was written.")
+    assert stderr.strip().endswith("interrupted; nothing was written; the same command goes on from there.")
     assert not out.parent.exists()

@@ -180,6 +180,21 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
     one = {"traces": diagnosis.traces[:1]}
     nothing = {**one, "effects": (), "where": (), "ambiguous_with": ()}
     hostile = "<script>alert(\"1\")</script> & $x_1$ 'q'"
+    nothing_given: dict[str, Any] = {
+        "gap": {
+            name: replace(gap, before=gap.reidentified, intervals={}) for name, gap in diagnosis.gap.items()
+        },
+        "traces": tuple(replace(own, before=own.reidentified) for own in diagnosis.traces),
+        "localization": replace(
+            diagnosis.localization,
+            **{
+                name: tuple(
+                    replace(part, before=part.reidentified) for part in getattr(diagnosis.localization, name)
+                )
+                for name in ("by_record", "by_amplitude", "by_band", "by_state", "by_time", "by_path")
+            },
+        ),
+    }
     changes: dict[str, dict[str, Any]] = {
         "effect": {},
         "two effects": {
@@ -248,8 +263,18 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
                 sentence=hostile,
             ),
         },
-        "nothing given": {
-            "traces": tuple(replace(own, before=own.reidentified) for own in diagnosis.traces),
+        "nothing given": nothing_given,
+        "nothing given, no gap": {**nothing, **nothing_given, "verdict": "none"},
+        "loops": {
+            "rig": "element",
+            "where": ("dynamics",),
+            "gap": {"force": OutputGap(0.3, 0.25, 0.012, 0.011)},
+            "noise_floors": (NoiseFloor("force", "N", 12.0, "repeated periods of the input"),),
+            "traces": (
+                trace("bench small", "estimation", ("force",), amplitude=0.01),
+                trace("bench large", "estimation", ("force",), amplitude=0.02),
+                trace("bench large again", "validation", ("force",), 700, amplitude=0.02),
+            ),
         },
         "advised": {
             **one,

@@ -73,7 +73,7 @@ def test_stages_that_are_the_same_simulation_are_drawn_once(
 ) -> None:
     assert list(curve_names(diagnosis)) == ["measured", "before", "reidentified", "after"]
     assert curve_names(variant("nothing given")) == {
-        "measured": "measured", "before": "re-identified", "after": "with effect",
+        "measured": "measured", "reidentified": "identified", "after": "with effect",
     }  # fmt: skip
     assert list(curve_names(variant("unknown"))) == ["measured", "before", "reidentified"]
-    assert curve_names(variant("parameters"))["reidentified"] == "better numbers"
+    assert curve_names(variant("two effects"))["after"] == "with effects"

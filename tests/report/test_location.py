@@ -38,8 +38,23 @@ def test_every_map_is_there_and_told_in_words(diagnosis: Diagnosis) -> None:
         assert label is not None
         assert "noise floor 0.9 %" in label[1]
     bands = str(maps.figures[0].image)
-    assert "Above 30 rad/s: given 8 %, re-identified 2.6 %, with effect 0.2 %, noise floor 0.9 %." in bands
+    assert (
+        "Above 30 rad/s: given simulation 8 %, re-identified 2.6 %, with effect 0.2 %, noise floor 0.9 %."
+        in bands
+    )
     assert "-1.5 N m forward and 1.2 N m backward" in str(maps.figures[1].image)
+
+
+def test_amplitudes_that_are_one_record_each_are_not_drawn_twice(diagnosis: Diagnosis) -> None:
+    alone = tuple(
+        replace(part, records=part.records[i : i + 1])
+        for i, part in enumerate(diagnosis.localization.by_amplitude)
+    )
+    (maps,) = output_maps(
+        replace(diagnosis, localization=replace(diagnosis.localization, by_amplitude=alone))
+    )
+    assert "records" not in [figure.key.split("-")[-1] for figure in maps.figures]
+    assert "0.25 A sweep_A0.25.csv; 0.75 A sweep_A0.75.csv." in maps.figures[2].caption
 
 
 def test_without_a_force_the_map_of_states_shows_the_residual_alone(diagnosis: Diagnosis) -> None:

@@ -13,7 +13,7 @@ from rigsight.diagnose.result import Diagnosis
 VOID = {"meta", "br", "img", "input", "link", "hr", "col"}
 VARIANTS = (
     "effect", "two effects", "own effect", "parameters", "none", "unknown", "no candidates", "not finite", "no validation",
-    "element", "hostile", "advised",
+    "element", "hostile", "advised", "nothing given", "nothing given, no gap", "loops",
 )  # fmt: skip
 
 
@@ -162,6 +162,26 @@ def test_parameters_have_intervals_inside_their_own_range(page_of: Callable[[str
         "k_3 (\u22123.100 \u00b1 0.020) \u00b7 10 5 \u22123.139 \u00b7 10 5 to \u22123.061 \u00b7 10 5"
         in words
     )
+
+
+@pytest.mark.parametrize("name", ["nothing given", "nothing given, no gap"])
+def test_where_nothing_was_given_the_page_speaks_of_no_given_simulation(
+    page_of: Callable[[str], str], name: str
+) -> None:
+    html = page_of(name)
+    # Names of curves and labels for screen readers count, the colors and names inside style and script do not.
+    said = re.sub(r"<style>.*?</style>|<script>.*?</script>", "", html, flags=re.DOTALL)
+    assert "identified" in said
+    assert re.findall(r".{0,40}(?:given sim|as given|re-identified|better numbers).{0,20}", said, re.I) == []
+    assert re.findall(r'"of":"before"', html) == []
+    assert "given simulation" in page_of("effect")
+
+
+def test_an_element_shows_its_force_over_its_motion(page_of: Callable[[str], str]) -> None:
+    html = page_of("loops")
+    assert 'href="#loops"' in html
+    assert "Force over x and over its rate, record bench small" in Page(html).words()
+    assert 'id="loops"' not in page_of("effect")
 
 
 def test_an_unknown_gap_is_described_by_the_force_that_is_lacking(page_of: Callable[[str], str]) -> None:

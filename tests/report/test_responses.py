@@ -24,14 +24,13 @@ def test_measured_and_simulated_go_through_one_estimator(diagnosis: Diagnosis) -
     assert 0.0 < found["u -> psi"].decibel["after"] < 1.0
 
 
-def test_there_is_no_response_of_a_step_an_element_or_windows(
+def test_there_is_no_response_of_a_step_or_an_element(
     diagnosis: Diagnosis, variant: Callable[[str], Diagnosis]
 ) -> None:
     step = replace(diagnosis.traces[0], kind="step")
     assert record_responses(diagnosis, step) == ()
     element = variant("element")
     assert record_responses(element, element.traces[0]) == ()
-    assert record_responses(variant("no validation"), diagnosis.traces[0]) == ()
 
 
 def test_a_simulation_that_left_the_numbers_leaves_the_others(diagnosis: Diagnosis) -> None:

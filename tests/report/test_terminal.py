@@ -24,7 +24,7 @@ def test_ten_lines_say_verdict_gap_ranking_and_parameters(diagnosis: Diagnosis) 
     text = "\n".join(lines)
     assert "Missing effect: rear axle, March" in text
     assert "down to 1.04 x the noise floor" in text
-    assert "42 % given, 13 % re-identified, 0.94 % after, floor 0.9 %" in text
+    assert "given simulation 42 %, re-identified 13 %, with effect 0.94 %, noise floor 0.9 %" in text
     assert (
         "Bouc-Wen hysteresis 91 % (1.04 x floor); Coulomb friction and cubic stiffness 6 % (1.06 x floor)"
         in text
@@ -59,6 +59,13 @@ def test_one_experiment_is_named_and_the_rest_left_to_the_report(variant: Callab
     assert "To tell Coulomb friction apart, drive a sweep of amplitude 1.25 A from 0.5 to 40 rad/s" in text
     assert "differ by 23 standard deviations of the noise" in text
     assert "Stribeck friction apart" not in text
+
+
+def test_where_nothing_was_given_there_is_no_given_simulation(variant: Callable[[str], Diagnosis]) -> None:
+    text = "\n".join(printed(variant("nothing given")))
+    assert "identified 13 %, with effect 0.94 %, noise floor 0.9 %" in text
+    assert "given" not in text
+    assert "re-identified" not in text
 
 
 def test_an_unknown_gap_is_described_by_the_force_that_is_lacking(

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from rigsight.diagnose.result import Diagnosis, Estimate
-from rigsight.report.quantities import Written, estimate_text, written
+from rigsight.report.quantities import Written, estimate_text, gap_percent, written
 from rigsight.report.wording import percent, verdict_sentence
 
 
@@ -52,6 +52,12 @@ def test_nearly_all_is_not_rounded_to_all() -> None:
 )
 def test_only_digits_that_the_records_support(value: float, std: float, expected: Written) -> None:
     assert written(value, std) == expected
+
+
+def test_gaps_are_written_as_people_do() -> None:
+    assert [gap_percent(x) for x in (0.00941, 0.42, 9.994, 14.37, 6420.0, 3.2e7, float("nan"))] == [
+        "0.941 %", "42 %", "999 %", "1400 %", "640000 %", "3.2e+09 %", "not finite",
+    ]  # fmt: skip
 
 
 def test_an_estimate_in_ascii() -> None:

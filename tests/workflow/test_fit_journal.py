@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -35,8 +36,10 @@ def journals(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path / "cache/unfinished"
 
 
-def diagnosed(campaign: Path, stop_at: str | None = None) -> Diagnosis:
+def diagnosed(campaign: Path, stop_at: str | None = None, said: list[Step] | None = None) -> Diagnosis:
     def listener(step: Step) -> None:
+        if said is not None:
+            said.append(step)
         if step.detail == stop_at:
             raise KeyboardInterrupt
 
@@ -56,6 +59,34 @@ def test_finished_fits_are_recalled_and_the_result_is_the_same(
     assert counted[2] == n_finished > 3
     assert not journal.exists()
     assert again.to_json() == whole.to_json()
+
+
+def test_it_is_said_once_that_a_diagnosis_goes_on(axis_campaign: Path, journals: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        diagnosed(axis_campaign, stop_at="cubic_stiffness")
+    (journal,) = journals.iterdir()
+    count = len({json.loads(line)["key"] for line in journal.read_text().splitlines()})
+    again: list[Step] = []
+    diagnosed(axis_campaign, said=again)
+    told = [step for step in again if step.stage.startswith("Going on")]
+    assert [(step.done, step.total) for step in told] == [(0, count), (count, count)]
+    assert told[0].stage == f"Going on: {count} fits done before the interruption"
+    fresh: list[Step] = []
+    diagnosed(axis_campaign, said=fresh)
+    assert not [step for step in fresh if step.stage.startswith("Going on")]
+
+
+def test_fits_of_a_campaign_that_was_changed_since_are_not_told_of(
+    axis_campaign: Path, journals: Path
+) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        diagnosed(axis_campaign, stop_at="cubic_stiffness")
+    for record in axis_campaign.glob("*.csv"):
+        head, *rows = record.read_text().splitlines()
+        record.write_text("\n".join([head, *rows[: len(rows) - 50]]) + "\n")
+    said: list[Step] = []
+    diagnosed(axis_campaign, said=said)
+    assert not [step for step in said if step.stage.startswith("Going on")]
 
 
 def test_a_torn_or_foreign_line_is_not_read(axis_campaign: Path, journals: Path, counted: list[int]) -> None:

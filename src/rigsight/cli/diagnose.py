@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import GOES_ON, told
 from rigsight.cli.options import Campaign, Debug, Jobs, OwnEffects, Quiet, ResultsFolder, Seed
 from rigsight.cli.terminal import command_line, show, show_files
 from rigsight.workflow.progress_display import listening
@@ -34,7 +34,7 @@ def diagnose(
 
     Writes diagnosis.json, model.json and report.html into DIR, all or none.
     """
-    with told(debug), listening(quiet) as listener:
+    with told(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
         from rigsight.workflow.own_effects import named, own_effects
 

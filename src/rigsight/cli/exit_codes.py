@@ -15,6 +15,8 @@ import typer
 from rigsight.errors import RigsightError
 
 DEFECT, BAD_INPUT, INTERRUPTED = 1, 2, 130
+GOES_ON = "nothing was written; the same command goes on from there"
+"""What an interrupted diagnosis leaves: no file, but the fits that it has done."""
 
 
 @contextlib.contextmanager

@@ -20,7 +20,10 @@ OwnEffects = Annotated[
         help="A Python file that declares effects of your own; it is run. May be repeated.",
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+Seed = Annotated[
+    int,
+    typer.Option("--seed", min=0, max=2**63 - 1, help="Seed of everything random."),
+]
 Jobs = Annotated[
     int | None,
     typer.Option(

@@ -142,7 +142,8 @@ def diagnose(
         )
     say("re-identified")
     before = _before(task, bench, estimation, linear)
-    say("given simulation")
+    if task.given:
+        say("given simulation")
     quality = data_quality(bench, task.records, linear)
     singles = fit_candidates(bench, linear, effects, n_jobs, progress)
 

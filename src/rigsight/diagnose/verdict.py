@@ -62,7 +62,7 @@ def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool 
     retuned = linear.excess * _WORTHWHILE < before_excess
     needs_effect = helps and linear.excess > AT_FLOOR
     if before_excess <= AT_FLOOR or (before_excess <= at_floor and not (needs_effect or retuned)):
-        return Judgement("none", linear, "The given simulation leaves no more than the noise floor.")
+        return Judgement("none", linear, "The simulation in question leaves no more than the noise floor.")
     if not needs_effect and linear.excess <= at_floor:
         if retuned:
             return Judgement(

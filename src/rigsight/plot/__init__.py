@@ -7,11 +7,14 @@ from rigsight.plot.diagnosis import comparison as comparison
 from rigsight.plot.diagnosis import detail_window as detail_window
 from rigsight.plot.diagnosis import gap_budget as gap_budget
 from rigsight.plot.diagnosis import ranking as ranking
+from rigsight.plot.diagnosis import step_window as step_window
 from rigsight.plot.drawing import DisplayScale as DisplayScale
 from rigsight.plot.drawing import display_scale as display_scale
 from rigsight.plot.drawing import envelope as envelope
 from rigsight.plot.drawing import style as style
 from rigsight.plot.drawing import svg_text as svg_text
+from rigsight.plot.force_loops import ForceLoop as ForceLoop
+from rigsight.plot.force_loops import force_loops as force_loops
 from rigsight.plot.frequency_responses import FittedCurve as FittedCurve
 from rigsight.plot.frequency_responses import Panel as Panel
 from rigsight.plot.frequency_responses import bode as bode
@@ -35,6 +38,7 @@ __all__ = [
     "DisplayScale",
     "ErrorPanel",
     "FittedCurve",
+    "ForceLoop",
     "Panel",
     "ResponsesPanel",
     "StepPanel",
@@ -44,6 +48,7 @@ __all__ = [
     "detail_window",
     "display_scale",
     "envelope",
+    "force_loops",
     "gap_amplitudes",
     "gap_bands",
     "gap_budget",
@@ -56,6 +61,7 @@ __all__ = [
     "model_styles",
     "overlaid_responses",
     "ranking",
+    "step_window",
     "style",
     "svg_text",
 ]

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.diagnose.result import Diagnosis, Stage, Trace
 from rigsight.plot.drawing import (
     FLOOR,
     GIVEN,
     MEASURED,
     OTHER,
     REIDENTIFIED,
+    STAGE_STYLES,
     WITH_EFFECT,
     envelope,
     in_style,
     line,
     new_figure,
     plain_log_ticks,
+    set_margins,
     shown_in,
 )
 
@@ -33,12 +35,54 @@ _WIDTH = 5.4
 _DETAIL_PERIODS = 5.0
 _DETAIL_SHARE = 1.0 / 12.0
 _DETAIL_MIN_SAMPLES = 60
+_SETTLED = 0.05
+"""Share of the way that is left when a step counts as settled."""
+_RINGING = 5.0
+"""Times the measured settling that a simulation is shown to ring."""
+_NOISE_REACHES = 5.0
+"""Standard deviations that not one of some thousand samples of noise exceeds."""
 _BINS = 250
 """Bins of a line in print, where the axis of a whole record is some 110 mm wide."""
 
 
+def step_window(trace: Trace, output: str) -> slice | None:
+    """Return the samples from just before the largest jump of the input until the output has settled; None without a jump."""
+    if trace.kind != "step" or not trace.inputs:
+        return None
+    jumps = np.abs(np.diff(next(iter(trace.inputs.values()))))
+    largest = float(np.max(jumps, initial=0.0))
+    if not largest > 0.0:
+        return None
+    start = int(np.argmax(jumps)) + 1
+    later = np.flatnonzero(jumps[start:] > 0.5 * largest)
+    stop = start + int(later[0]) + 1 if later.size else trace.t.size
+    settled = _settling(trace.measured[output][start:stop])
+    # A simulation that rings on is worth seeing too, but not until it has pressed the step itself together.
+    slowest = max(_settling(source[output][start:stop]) for source in (trace.before, trace.after))
+    length = max(_DETAIL_MIN_SAMPLES, round(1.25 * min(max(settled, slowest), _RINGING * settled)))
+    return slice(max(0, start - length // 8), min(stop, start + length))
+
+
+def _settling(after: NDArray[np.float64]) -> int:
+    """Return the number of samples after a step until what follows stays near its end."""
+    known = np.nan_to_num(after)
+    rest = known[-max(1, known.size // 10) :]
+    away = np.abs(known - np.mean(rest))
+    # Differences of neighbors are noise, however slowly the rest swings.
+    noise = float(np.std(np.diff(rest))) / np.sqrt(2.0) if rest.size > 1 else 0.0
+    moving = np.flatnonzero(away > max(_SETTLED * float(np.max(away)), _NOISE_REACHES * noise))
+    return int(moving[-1]) + 1 if moving.size else 1
+
+
 def detail_window(trace: Trace, output: str) -> slice:
-    """Return the samples around the place where the given simulation errs most: about five periods, or less of a short record."""
+    """Return the samples worth a look of their own.
+
+    Of a step, the step; of other records those around the place where the given simulation errs most: about five periods, or
+    less of a short record.
+    """
+    step = step_window(trace, output)
+    if step is not None:
+        return step
     residual = trace.measured[output] - trace.before[output]
     n = residual.size
     wide = _largest(residual, min(n, max(_DETAIL_MIN_SAMPLES, round(_DETAIL_SHARE * n))))
@@ -59,7 +103,9 @@ def _largest(residual: NDArray[np.float64], length: int) -> slice:
 
 
 @in_style
-def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None) -> Figure:
+def gap_budget(
+    diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None, is_given: bool = True
+) -> Figure:
     """Draw the gap of each output as a waterfall: given, taken away by better numbers and by the effect, left over, floor.
 
     Parameters
@@ -70,24 +116,29 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | 
         What the last step adds, e.g. ``"Adding cubic stiffness"``.
     labels
         Panel title by output; default is its name.
+    is_given
+        False where no simulation was given: the waterfall then starts at the identified equations.
     """
     outputs = list(diagnosis.gap)
     figure = new_figure(_WIDTH, 0.45 + 1.75 * max(1, len(outputs)))
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
     for ax, output in zip(axes, outputs, strict=False):
         gap = diagnosis.gap[output]
-        steps = [
-            ("Given simulation", 0.0, gap.before, GIVEN),
-            ("Better numbers", gap.before, gap.reidentified, REIDENTIFIED),
-            (after_label, gap.reidentified, gap.after, WITH_EFFECT),
-            ("Left over", 0.0, gap.after, MEASURED),
-        ]
-        if not diagnosis.effects:
-            steps[2:] = [("Left over", 0.0, gap.reidentified, MEASURED)]
+        steps = [("Identified", 0.0, gap.reidentified, REIDENTIFIED)]
+        if is_given:
+            steps = [
+                ("Given simulation", 0.0, gap.before, GIVEN),
+                ("Re-identified", gap.before, gap.reidentified, REIDENTIFIED),
+            ]
+        if diagnosis.effects:
+            steps.append((after_label, gap.reidentified, gap.after, WITH_EFFECT))
+        if len(steps) > 1:
+            steps.append(("Left over", 0.0, gap.after if diagnosis.effects else gap.reidentified, MEASURED))
         finite = [100.0 * v for v in (gap.before, gap.reidentified, gap.after) if np.isfinite(v)]
         right = max([*finite, 100.0 * gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0, 1e-12])
         for row, (name, start, stop, color) in enumerate(steps):
-            _waterfall_step(ax, row, name, 100.0 * start, 100.0 * stop, color, right)
+            is_total = row == 0 or name == "Left over"
+            _waterfall_step(ax, row, 100.0 * start, 100.0 * stop, color, right, is_total)
         if np.isfinite(gap.noise_floor):
             ax.axvline(100.0 * gap.noise_floor, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.2)
             ax.annotate(
@@ -102,19 +153,18 @@ def gap_budget(diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | 
         ax.set_title((labels or {}).get(output, output), pad=14)
         ax.grid(axis="x")
         ax.set_axisbelow(True)
-    axes[-1].set_xlabel("gap as NRMSE [% of the measured RMS]")
+    axes[-1].set_xlabel("gap [% of the measured RMS]")
     return figure
 
 
 def _waterfall_step(
-    ax: Axes, row: int, name: str, start: float, stop: float, color: str, right: float
+    ax: Axes, row: int, start: float, stop: float, color: str, right: float, is_total: bool
 ) -> None:
     if not (np.isfinite(start) and np.isfinite(stop)):
         ax.text(0.01 * right, row, "not finite", va="center", fontsize=8)
         return
     low, high = sorted((start, stop))
     ax.barh(row, high - low, left=low, height=0.62, color=color)
-    is_total = start == 0.0 and name in ("Given simulation", "Left over")
     text = f"{stop:.3g} %" if is_total else f"{'−' if stop <= start else '+'}{abs(stop - start):.3g} %"
     ax.text(high + 0.012 * right, row, text, va="center", fontsize=8.5, color=FLOOR)
 
@@ -171,10 +221,10 @@ def comparison(
     output: str,
     window: slice | None = None,
     after_label: str = "after",
-    before_label: str = "given simulation",
+    stages: Mapping[Stage, str] | None = None,
     marked: slice | None = None,
 ) -> Figure:
-    """Draw measured against simulated, given and after, with the residuals below.
+    """Draw measured against simulated, by default given and after, with the residuals below.
 
     Parameters
     ----------
@@ -186,8 +236,10 @@ def comparison(
         Name of the output.
     window
         Samples to draw; all where None.
-    after_label, before_label
-        What the simulations after and before the diagnosis are called in the legend.
+    after_label
+        What the simulation after the diagnosis is called in the legend.
+    stages
+        What is drawn instead of given and after, with its name in the legend.
     marked
         Samples to mark with a bar in a drawing of the whole record.
     """
@@ -195,40 +247,36 @@ def comparison(
 
     shown = window or slice(None)
     t = trace.t[shown]
-    measured, before, after = (
-        np.asarray(source[output][shown], dtype=np.float64)
-        for source in (trace.measured, trace.before, trace.after)
-    )
-    unit = diagnosis.units.get(output, "")
-    factor, unit = shown_in(unit, measured)
-    residuals = (before - measured, after - measured)
-    residual_factor, residual_unit = shown_in(diagnosis.units.get(output, ""), *residuals)
+    names = stages or {"before": "given simulation", "after": after_label}
+    measured = np.asarray(trace.measured[output][shown], dtype=np.float64)
+    errors: dict[Stage, NDArray[np.float64]] = {
+        stage: -trace.residual(stage, output)[shown] for stage in names
+    }
+    factor, unit = shown_in(diagnosis.units.get(output, ""), measured)
+    error_factor, error_unit = shown_in(diagnosis.units.get(output, ""), *errors.values())
 
     width, height = (3.5 if window else 6.6), 3.9
     figure = new_figure(width, height, layout=None)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    # Fixed margins in inches: constrained layout would take most of the time of a report with many records.
-    figure.subplots_adjust(
-        left=0.66 / width, right=1.0 - 0.14 / width, bottom=0.46 / height, top=1.0 - 0.34 / height, hspace=0.1
-    )
+    set_margins(figure, 0.66, 0.14, 0.46, 0.34, between=(0.0, 0.15))
     line(top, *_printed(t, measured * factor), MEASURED, "measured", linewidth=2.6, alpha=0.55)
-    line(top, *_printed(t, before * factor), GIVEN, before_label, linewidth=1.0, linestyle=(0, (5, 1.6)))
-    line(top, *_printed(t, after * factor), WITH_EFFECT, after_label, linewidth=1.0)
-    line(bottom, *_printed(t, residuals[0] * residual_factor), GIVEN, linewidth=0.8)
-    line(bottom, *_printed(t, residuals[1] * residual_factor), WITH_EFFECT, linewidth=0.8)
+    for stage, error in errors.items():
+        look = STAGE_STYLES[stage]
+        line(top, *_printed(t, (measured + error) * factor), label=names[stage], linewidth=1.0, **look)
+        line(bottom, *_printed(t, error * error_factor), color=look["color"], linewidth=0.8)
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), None)
     if floor is not None and np.isfinite(floor):
         bottom.axhspan(
-            -2 * floor * residual_factor, 2 * floor * residual_factor, color=FLOOR, alpha=0.12, linewidth=0
+            -2 * floor * error_factor, 2 * floor * error_factor, color=FLOOR, alpha=0.12, linewidth=0
         )
     top.set_ylabel(f"{output} [{unit}]")
-    bottom.set_ylabel(f"error [{residual_unit}]")
+    bottom.set_ylabel(f"error [{error_unit}]")
     bottom.set_xlabel("time [s]")
     for ax in (top, bottom):
         ax.grid()
         ax.margins(x=0.0)
         ax.yaxis.set_major_locator(MaxNLocator(5))
-        ax.yaxis.set_label_coords(-0.5 / (width - 0.8), 0.5)
+        ax.xaxis.set_major_locator(MaxNLocator(4 if window else 9))
     if not window:
         figure.legend(loc="upper left", ncols=3, fontsize=8.5, handlelength=2.2, columnspacing=1.4)
     if marked is not None:

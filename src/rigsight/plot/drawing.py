@@ -7,7 +7,7 @@ their last reference.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from rigsight.diagnose.result import Stage
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -30,6 +32,12 @@ WITH_EFFECT = "#0072b2"
 FLOOR = "#1d2126"
 OTHER = "#9aa4ae"
 """Okabe and Ito's palette: told apart by color-blind readers, and in gray by line style."""
+STAGE_STYLES: Mapping[Stage, Mapping[str, Any]] = {
+    "before": {"color": GIVEN, "linestyle": (0, (5, 1.6))},
+    "reidentified": {"color": REIDENTIFIED, "linestyle": (0, (2, 1))},
+    "after": {"color": WITH_EFFECT, "linestyle": "-"},
+}
+"""How the lines of each stage of a diagnosis are drawn."""
 
 STYLE: dict[Any, Any] = {
     "font.family": ["DejaVu Sans"],
@@ -39,6 +47,8 @@ STYLE: dict[Any, Any] = {
     "axes.edgecolor": "#8a939c",
     "axes.labelcolor": "#1d2126",
     "axes.titlelocation": "left",
+    # No tick label stands above an axis here; looking for one costs a tenth of the drawing.
+    "axes.titley": 1.0,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
     "xtick.color": "#3b434b",
@@ -56,6 +66,8 @@ STYLE: dict[Any, Any] = {
 _PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
 _PREFIXED = ("rad", "m", "N", "N m", "A", "V", "Pa", "W", "K")
 _ENVELOPE_BINS = 600
+_LABEL = 0.17
+"""From the edge of a figure to where the label of an axis ends [inch]."""
 
 
 @contextmanager
@@ -185,12 +197,58 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return figure
 
 
+def set_margins(
+    figure: Figure,
+    left: float,
+    right: float,
+    bottom: float,
+    top: float,
+    between: tuple[float, float] = (0.0, 0.0),
+) -> None:
+    """Place axes and their labels by the room around them; to find it by drawing takes as long as the drawing itself.
+
+    Parameters
+    ----------
+    figure
+        With a regular grid of axes and no layout engine.
+    left, right, bottom, top
+        Around all axes [inch].
+    between
+        Between columns and between rows [inch].
+    """
+    width, height = (float(size) for size in figure.get_size_inches())
+    shape = figure.axes[0].get_subplotspec()
+    assert shape is not None
+    rows, columns, _, _ = shape.get_geometry()
+    each_width = (width - left - right - (columns - 1) * between[0]) / columns
+    each_height = (height - bottom - top - (rows - 1) * between[1]) / rows
+    figure.subplots_adjust(
+        left=left / width,
+        right=1.0 - right / width,
+        bottom=bottom / height,
+        top=1.0 - top / height,
+        wspace=between[0] / each_width,
+        hspace=between[1] / each_height,
+    )
+    for ax in figure.axes:
+        ax.yaxis.set_label_coords((_LABEL - left) / each_width, 0.5)
+        ax.xaxis.set_label_coords(0.5, (_LABEL - bottom) / (ax.get_position().height * height))
+
+
 def svg_text(figure: Figure, key: str) -> str:
     """Return a figure as SVG, the same text for the same figure; `key` makes its ids."""
     import matplotlib as mpl
 
     stream = io.StringIO()
+    engine = figure.get_layout_engine()
     with style():
         mpl.rcParams["svg.hashsalt"] = key
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        if engine is not None:
+            # matplotlib would draw the whole figure once more, only to lay it out.
+            engine.execute(figure)
+            figure.set_layout_engine(None)
+        try:
+            figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        finally:
+            figure.set_layout_engine(engine)
     return stream.getvalue()

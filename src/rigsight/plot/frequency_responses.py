@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.frequency import FrequencyResponse
-from rigsight.plot.drawing import FLOOR, MEASURED, WITH_EFFECT, in_style, new_figure, plain_log_ticks
+from rigsight.plot.drawing import (
+    FLOOR,
+    MEASURED,
+    WITH_EFFECT,
+    in_style,
+    new_figure,
+    plain_log_ticks,
+    set_margins,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
 TWO_SIDED = 1.96
 """Standard deviations of a 95 % interval."""
 _MOST_LINES = 800
+_LEGEND_COLUMNS = 6
 _FACES = ("#440154", "#3b528b", "#21918c", "#5ec962", "#d8b40a", "#d55e00")
 """Viridis, its yellow darkened for white paper: in order also in gray, and for color-blind readers."""
 
@@ -108,9 +117,12 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "
     fitted_label
         What the dashed lines are called.
     """
-    figure = new_figure(4.6 * len(columns) + (1.4 if len(columns) == 1 else 0.0), 4.0)
-    axes = figure.subplots(1, len(columns), squeeze=False)[0]
     labels = list(dict.fromkeys(panel.label for panels in columns for panel in panels))
+    legend_rows = -(-(len(labels) + 1) // _LEGEND_COLUMNS)
+    width, height = 4.6 * len(columns) + (1.4 if len(columns) == 1 else 0.0), 3.8 + 0.2 * legend_rows
+    figure = new_figure(width, height, layout=None)
+    axes = figure.subplots(1, len(columns), squeeze=False)[0]
+    set_margins(figure, 0.72, 0.12, 0.48, 0.35 + 0.2 * legend_rows, between=(0.75, 0.0))
     colors = dict(zip(labels, _colors(len(labels)), strict=True))
     for ax, panels in zip(axes, columns, strict=True):
         values = []
@@ -141,7 +153,7 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "
         ax.grid()
     axes[0].plot([], [], color=FLOOR, linewidth=1.4, linestyle=(0, (4, 2)), label=fitted_label)
     handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper left", ncols=min(len(names), 6), fontsize=8.5)
+    figure.legend(handles, names, loc="upper left", ncols=min(len(names), _LEGEND_COLUMNS), fontsize=8.5)
     return figure
 
 

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigsight.diagnose.gap_parts import AmplitudePart, BandPart, GapPart, RecordPart, StatePart, TimePart
+from rigsight.diagnose.result import Stage
 from rigsight.plot.drawing import (
     FLOOR,
-    GIVEN,
     MEASURED,
-    REIDENTIFIED,
-    WITH_EFFECT,
+    STAGE_STYLES,
     in_style,
     new_figure,
+    set_margins,
     shown_in,
 )
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH = 5.4
+_LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
+"""Room for labels and ticks, and for a line of a legend [inch]."""
 _DASHES = (0, (4, 2))
 _PERCENT = 100.0
 _SHADES = 15
@@ -31,21 +33,18 @@ _SHADES = 15
 _FLOOR_LABEL = "noise floor"
 
 
-def _bars(ax: Axes, parts: Sequence[GapPart], after_label: str | None) -> None:
+def _bars(ax: Axes, parts: Sequence[GapPart], stages: Mapping[Stage, str]) -> None:
     """Draw the stages of each part beside each other on a logarithmic axis, the noise floor as a line over each group."""
-    stages = [("before", "given simulation", GIVEN), ("reidentified", "re-identified", REIDENTIFIED)]
-    if after_label is not None:
-        stages.append(("after", after_label, WITH_EFFECT))
     width = 0.8 / len(stages)
     values = [
-        getattr(part, stage) for part in parts for stage in ("before", "reidentified", "after", "noise_floor")
+        getattr(part, name) for part in parts for name in ("before", "reidentified", "after", "noise_floor")
     ]
     finite = [_PERCENT * v for v in values if np.isfinite(v) and v > 0.0]
     top = max(finite, default=1.0)
     # Three and a half decades: what lies lower is of no consequence, and would press the rest together.
     bottom = max(0.6 * min(finite, default=0.1), top / 3e3)
     index = np.arange(len(parts))
-    for i, (stage, label, color) in enumerate(stages):
+    for i, (stage, label) in enumerate(stages.items()):
         heights = [_PERCENT * getattr(part, stage) for part in parts]
         shown = [max(h, bottom) - bottom if np.isfinite(h) else 0.0 for h in heights]
         ax.bar(
@@ -53,7 +52,7 @@ def _bars(ax: Axes, parts: Sequence[GapPart], after_label: str | None) -> None:
             shown,
             width,
             bottom=bottom,
-            color=color,
+            color=STAGE_STYLES[stage]["color"],
             label=label,
         )
     for i, part in enumerate(parts):
@@ -77,6 +76,14 @@ def _bars(ax: Axes, parts: Sequence[GapPart], after_label: str | None) -> None:
     ax.set_axisbelow(True)
 
 
+def _bar_figure(lines: int = 2) -> tuple[Figure, Axes]:
+    """Return a figure for bars whose labels have this many lines."""
+    figure = new_figure(_WIDTH, 2.9, layout=None)
+    ax = figure.subplots()
+    set_margins(figure, _LEFT, _RIGHT, 0.34 + 0.14 * lines, _LEGEND)
+    return figure, ax
+
+
 def _percent_ticks(ax: Axes, bottom: float, top: float) -> None:
     from matplotlib.ticker import FixedLocator, NullLocator
 
@@ -92,25 +99,24 @@ def _legend(figure: Figure, ax: Axes) -> None:
     handles, labels = ax.get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda i: labels[i] == _FLOOR_LABEL)
     figure.legend(
-        [handles[i] for i in order], [labels[i] for i in order], loc="outside upper left", ncols=4, fontsize=8.5,
+        [handles[i] for i in order], [labels[i] for i in order], loc="upper left", ncols=4, fontsize=8.5,
         handlelength=1.8, columnspacing=1.4,
     )  # fmt: skip
 
 
 @in_style
-def gap_bands(parts: Sequence[BandPart], after_label: str | None) -> Figure:
+def gap_bands(parts: Sequence[BandPart], stages: Mapping[Stage, str]) -> Figure:
     """Draw what each stage leaves in each band of frequency; squares add up to that of the whole gap.
 
     Parameters
     ----------
     parts
         Bands of one output.
-    after_label
-        What the last stage is called; None leaves it out.
+    stages
+        What is drawn, with its name for people.
     """
-    figure = new_figure(_WIDTH, 2.9)
-    ax = figure.subplots()
-    _bars(ax, parts, after_label)
+    figure, ax = _bar_figure()
+    _bars(ax, parts, stages)
     labels = [_band_label(part) for part in parts]
     ax.set_xticks(range(len(parts)), labels, fontsize=8)
     ax.set_xlabel("frequency [rad/s]")
@@ -127,7 +133,7 @@ def _band_label(part: BandPart) -> str:
 
 
 @in_style
-def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], after_label: str | None) -> Figure:
+def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapping[Stage, str]) -> Figure:
     """Draw what each stage leaves of each record, relative to the record's own motion.
 
     Parameters
@@ -136,21 +142,22 @@ def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], after_label:
         Records of one output.
     labels
         What each is called.
-    after_label
-        What the last stage is called; None leaves it out.
+    stages
+        What is drawn, with its name for people.
     """
-    figure = new_figure(_WIDTH, 2.9)
-    ax = figure.subplots()
-    _bars(ax, parts, after_label)
+    figure, ax = _bar_figure(lines=1)
+    _bars(ax, parts, stages)
     ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
     ax.set_xlabel("record")
-    ax.set_ylabel("NRMSE [%]")
+    ax.set_ylabel("gap [%]")
     _legend(figure, ax)
     return figure
 
 
 @in_style
-def gap_amplitudes(parts: Sequence[AmplitudePart], labels: Sequence[str], after_label: str | None) -> Figure:
+def gap_amplitudes(
+    parts: Sequence[AmplitudePart], labels: Sequence[str], stages: Mapping[Stage, str]
+) -> Figure:
     """Draw what each stage leaves at each amplitude of the input, relative to the motion there.
 
     Parameters
@@ -159,45 +166,39 @@ def gap_amplitudes(parts: Sequence[AmplitudePart], labels: Sequence[str], after_
         Amplitudes of one output, in ascending order.
     labels
         What each is called.
-    after_label
-        What the last stage is called; None leaves it out.
+    stages
+        What is drawn, with its name for people.
     """
-    figure = new_figure(_WIDTH, 2.9)
-    ax = figure.subplots()
-    _bars(ax, parts, after_label)
+    figure, ax = _bar_figure()
+    _bars(ax, parts, stages)
     ax.set_xticks(range(len(parts)), list(labels), fontsize=8)
     ax.set_xlabel("amplitude of the input")
-    ax.set_ylabel("NRMSE [%]")
+    ax.set_ylabel("gap [%]")
     _legend(figure, ax)
     return figure
 
 
 @in_style
-def gap_times(parts: Sequence[TimePart], after_label: str | None) -> Figure:
+def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
     """Draw what each stage leaves over time, one panel per scored record, with the noise floor.
 
     Parameters
     ----------
     parts
         Stretches of one output, record by record.
-    after_label
-        What the last stage is called; None leaves it out.
+    stages
+        What is drawn, with its name for people.
     """
     records = list(dict.fromkeys(part.record for part in parts))
-    figure = new_figure(_WIDTH, 0.5 + 1.6 * len(records))
+    figure = new_figure(_WIDTH, 0.5 + 1.6 * len(records), layout=None)
     axes = figure.subplots(len(records), 1, squeeze=False)[:, 0]
-    stages: list[tuple[str, str, dict[str, Any]]] = [
-        ("before", "given simulation", {"color": GIVEN, "linestyle": (0, (5, 1.6))}),
-        ("reidentified", "re-identified", {"color": REIDENTIFIED, "linestyle": (0, (2, 1))}),
-    ]
-    if after_label is not None:
-        stages.append(("after", after_label, {"color": WITH_EFFECT}))
+    set_margins(figure, _LEFT, _RIGHT, 0.45, 0.55, between=(0.0, 0.5))
     for ax, record in zip(axes, records, strict=True):
         own = [part for part in parts if part.record == record]
         edges = [*(part.t_start for part in own), own[-1].t_end]
-        for stage, label, style in stages:
+        for stage, label in stages.items():
             levels = [_PERCENT * getattr(part, stage) for part in own]
-            ax.stairs(levels, edges, label=label, linewidth=1.4, baseline=None, **style)
+            ax.stairs(levels, edges, label=label, linewidth=1.4, baseline=None, **STAGE_STYLES[stage])
         ax.axhline(
             _PERCENT * own[0].noise_floor, color=FLOOR, linestyle=_DASHES, linewidth=1.2, label=_FLOOR_LABEL
         )
@@ -216,27 +217,34 @@ def gap_times(parts: Sequence[TimePart], after_label: str | None) -> Figure:
 
 @in_style
 def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
-    """Draw the residual over the plane of displacement and velocity and, where it is known, the force that is lacking.
+    """Draw the error over the plane of displacement and velocity and, where it is known, the force that is lacking.
 
     Parameters
     ----------
     parts
         Cells of one output.
     output
-        What the residual is of.
+        What the error is of.
     motion
         Symbol of the displacement.
     """
     with_force = any(np.isfinite(part.force_mean) for part in parts)
     figure = new_figure(_WIDTH, 3.0)
     axes = figure.subplots(1, 2 if with_force else 1, squeeze=False, sharey=True)[0]
-    _plane(axes[0], parts, [_PERCENT * part.reidentified for part in parts], "viridis", False, "residual [%]")
-    axes[0].set_title(f"residual of {output}")
+    _plane(axes[0], parts, [_PERCENT * part.reidentified for part in parts], "viridis", False, "error [%]")
+    axes[0].set_title(f"error of {output}")
     if with_force:
         force_unit = parts[0].units["force_mean"]
         forces = np.array([part.force_mean for part in parts])
         factor, shown = shown_in(force_unit, forces)
-        _plane(axes[1], parts, list(forces * factor), "RdBu_r", True, f"[{shown}]" if shown != "1" else "")
+        _plane(
+            axes[1],
+            parts,
+            list(forces * factor),
+            "RdBu_r",
+            True,
+            f"mean force [{shown}]" if shown != "1" else "mean force",
+        )
         axes[1].set_title("what the equations lack")
     x_unit, v_unit = parts[0].units["x_low"], parts[0].units["v_low"]
     factor, shown = _axis_scale(parts, x_unit)

@@ -18,6 +18,7 @@ from rigsight.plot.drawing import (
     in_style,
     new_figure,
     plain_log_ticks,
+    set_margins,
     shown_in,
 )
 from rigsight.plot.frequency_responses import (
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 _COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#000000")
 """Okabe and Ito's palette, its yellow darkened for white paper."""
 _MOST_TICKS = 5
+_LEGEND_COLUMNS = 4
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.2, 1, 1.2)))
 
 
@@ -125,8 +127,7 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
     styles
         Line style by model, see `model_styles`.
     """
-    figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 5.4)
-    axes = figure.subplots(2, len(panels), squeeze=False, sharex="col", height_ratios=[3, 2])
+    figure, axes = _responses_grid(2, len(panels), len(styles), 5.2)
     for column, panel in enumerate(panels):
         top, bottom = axes[:, column]
         measured = thinned(panel.measured)
@@ -160,8 +161,17 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
             ax.grid()
             ax.set_axisbelow(True)
     _legend(figure, list(axes[0]))
-    figure.align_ylabels(axes)
     return figure
+
+
+def _responses_grid(rows: int, columns: int, n_models: int, height: float) -> tuple[Figure, NDArray[Any]]:
+    """Return a figure of this height [inch] and, below a legend of these models, its axes, the upper row taller."""
+    legend_rows = -(-(n_models + 1) // _LEGEND_COLUMNS)
+    width = 4.6 * columns + (1.4 if columns == 1 else 0.0)
+    figure = new_figure(width, height + 0.2 * legend_rows, layout=None)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex="col", height_ratios=[3, 2][:rows])
+    set_margins(figure, 0.78, 0.1, 0.48, 0.35 + 0.2 * legend_rows, between=(0.85, 0.15))
+    return figure, axes
 
 
 @in_style
@@ -175,8 +185,7 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
     styles
         Line style by model, see `model_styles`.
     """
-    figure = new_figure(4.6 * len(panels) + (1.4 if len(panels) == 1 else 0.0), 3.6)
-    axes = figure.subplots(1, len(panels), squeeze=False)
+    figure, axes = _responses_grid(1, len(panels), len(styles), 3.4)
     for ax, panel in zip(axes[0], panels, strict=True):
         factor, unit = shown_in(panel.unit, panel.measured)
         ax.plot(panel.t, factor * panel.measured, color=MEASURED, linewidth=3.0, alpha=0.55, label="measured")
@@ -262,4 +271,4 @@ def _legend(figure: Figure, axes: Sequence[Axes]) -> None:
         handles, labels = ax.get_legend_handles_labels()
         for handle, label in zip(handles, labels, strict=True):
             entries.setdefault(label, handle)
-    figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=4, fontsize=8)
+    figure.legend(entries.values(), entries.keys(), loc="upper left", ncols=_LEGEND_COLUMNS, fontsize=8)

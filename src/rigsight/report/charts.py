@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.result import Diagnosis
 from rigsight.report.figures import PageFigure
-from rigsight.report.wording import after_label
+from rigsight.report.wording import stage_names
 
 _LEVELS = 65_534
 """Steps of a 16 bit number over a curve's range; the lowest number is left for values that are not finite."""
@@ -75,6 +75,16 @@ class ChartPanel:
 
 
 @dataclass(frozen=True)
+class Detail:
+    """A part worth looking at: its limits on the shared axis, what the button that shows it is called, and what it does."""
+
+    low: float
+    high: float
+    label: str
+    title: str
+
+
+@dataclass(frozen=True)
 class Chart:
     """A figure that reacts: its static drawing, which is printed and stands in where no script runs, and its curves.
 
@@ -98,18 +108,7 @@ class Chart:
 
 def curve_names(diagnosis: Diagnosis) -> dict[str, str]:
     """Return what is drawn of each record, with its name for people: measured, and the stages that differ."""
-    reidentified = after_label(diagnosis) if diagnosis.verdict == "parameters" else "re-identified"
-    names = {"measured": "measured", "before": "given simulation", "reidentified": reidentified}
-    if all(
-        np.array_equal(trace.before[output], trace.reidentified[output])
-        for trace in diagnosis.traces
-        for output in trace.measured
-    ):
-        # No parameters were given, so both are the same simulation.
-        names = {"measured": "measured", "before": reidentified}
-    if diagnosis.effects:
-        names["after"] = after_label(diagnosis)
-    return names
+    return {"measured": "measured", **{str(stage): name for stage, name in stage_names(diagnosis).items()}}
 
 
 def points_per_curve(n_curves: int) -> int:
@@ -139,7 +138,7 @@ def chart_data(
     names: Mapping[str, str],
     *,
     log: bool = False,
-    detail: tuple[float, float] | None = None,
+    detail: Detail | None = None,
 ) -> Markup:
     """Return a chart's curves as JSON for the page's script.
 
@@ -167,7 +166,13 @@ def chart_data(
         "label": f"{'angular frequency' if log else 'time'} [{unit}]",
         "log": log,
         "range": [_short(min(ends)), _short(max(ends))],
-        "detail": None if detail is None else [_short(limit) for limit in detail],
+        "detail": None
+        if detail is None
+        else {
+            "range": [_short(detail.low), _short(detail.high)],
+            "label": detail.label,
+            "title": detail.title,
+        },
         "names": dict(names),
         "panels": [_panel(panel, log) for panel in panels],
     }

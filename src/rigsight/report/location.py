@@ -12,7 +12,16 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
 from rigsight.report.sections import output_label
-from rigsight.report.wording import TIMES, after_label, effect_label, listed, percent, sentence_case
+from rigsight.report.wording import (
+    TIMES,
+    effect_label,
+    listed,
+    percent,
+    sentence_case,
+    stage_names,
+    stages_told,
+    told_unit,
+)
 from rigsight.rigs import RIGS
 
 
@@ -70,7 +79,8 @@ def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
 
 def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     where = diagnosis.localization
-    last = after_label(diagnosis) if diagnosis.effects else None
+    stages = stage_names(diagnosis)
+    rest = stages["reidentified"]
     bands = [part for part in where.by_band if part.output == output]
     states = [part for part in where.by_state if part.output == output]
     times = [part for part in where.by_time if part.output == output]
@@ -78,6 +88,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     amplitudes = sorted(
         (part for part in where.by_amplitude if part.output == output), key=lambda p: (p.amplitude, p.scored)
     )
+    one_record_each = 1 < len(amplitudes) == len(records) and all(len(p.records) == 1 for p in amplitudes)
     figures = []
     if bands:
         spread = (
@@ -96,11 +107,11 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         ]
         figures.append(
             page_figure(
-                plot.gap_bands(bands, last),
+                plot.gap_bands(bands, stages),
                 f"{key}-bands",
-                f"Bars of the gap by band of frequency. {_told(said, last)}",
-                f"By frequency. {_largest(said)} The squares of the bars add up to the square of the gap; the noise floor is "
-                f"{spread}.",
+                f"Bars of the gap by band of frequency. {_told(said, diagnosis)}",
+                f"By frequency. {_largest(said, rest)} The squares of the bars add up to the square of the gap; the "
+                f"noise floor is {spread}.",
             )
         )
     if states:
@@ -112,15 +123,11 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             page_figure(
                 plot.gap_states(states, output, motion),
                 f"{key}-states",
-                f"Map of the re-identified residual over the plane of states, largest with {gap_percent(worst.reidentified)} at "
+                f"Map of the error, {rest}, over the plane of states, largest with {gap_percent(worst.reidentified)} at "
                 f"{place}; noise floor {gap_percent(worst.noise_floor)}. {_lacking(states)}",
-                f"By state of the measured motion; the residual is largest at {place}; the noise floor is at "
+                f"By state of the measured motion, {rest}; the error is largest at {place}; the noise floor is at "
                 f"{gap_percent(worst.noise_floor)}."
-                + (
-                    " Right: the mean force that the re-identified equations lack there, with its sign."
-                    if lacking
-                    else ""
-                ),
+                + (" Right: the mean force that the equations lack there, with its sign." if lacking else ""),
             )
         )
     if len({p.amplitude for p in amplitudes}) > 1:
@@ -128,19 +135,26 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         said_of = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
         figures.append(
             page_figure(
-                plot.gap_amplitudes(amplitudes, labels, last),
+                plot.gap_amplitudes(amplitudes, labels, stages),
                 f"{key}-amplitudes",
-                f"Bars of the gap by amplitude of the input. {_told(said_of, last)}",
-                "By amplitude of the input, each relative to the motion there.",
+                f"Bars of the gap by amplitude of the input. {_told(said_of, diagnosis)}",
+                "By amplitude of the input, each relative to the motion there"
+                + (
+                    ": " + "; ".join(f"{_size(p)} {p.records[0]}" for p in amplitudes)
+                    if one_record_each
+                    else ""
+                )
+                + ".",
             )
         )
-    if len(records) > 1:
+    # Where each amplitude is one record, the picture is the same.
+    if len(records) > 1 and not one_record_each:
         labels = [str(i) for i, _ in enumerate(records, start=1)]
         figures.append(
             page_figure(
-                plot.gap_records(records, labels, last),
+                plot.gap_records(records, labels, stages),
                 f"{key}-records",
-                f"Bars of the gap by record. {_told([(p.record, p) for p in records], last)}",
+                f"Bars of the gap by record. {_told([(p.record, p) for p in records], diagnosis)}",
                 "By record, each relative to its own motion: "
                 + "; ".join(f"{i} {p.record} ({p.role})" for i, p in enumerate(records, start=1))
                 + ".",
@@ -150,9 +164,9 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
         worst_time = max(times, key=lambda p: p.reidentified)
         figures.append(
             page_figure(
-                plot.gap_times(times, last),
+                plot.gap_times(times, stages),
                 f"{key}-times",
-                f"Steps of the gap over time, largest after re-identification with {gap_percent(worst_time.reidentified)} from "
+                f"Steps of the gap over time, {rest} largest with {gap_percent(worst_time.reidentified)} from "
                 f"{worst_time.t_start:.4g} s to {worst_time.t_end:.4g} s of {worst_time.record}; noise floor "
                 f"{gap_percent(worst_time.noise_floor)}.",
                 "Over time within each scored record, relative to the motion of all of them.",
@@ -161,21 +175,19 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     return figures
 
 
-def _told(parts: Sequence[tuple[str, GapPart]], last: str | None) -> str:
+def _told(parts: Sequence[tuple[str, GapPart]], diagnosis: Diagnosis) -> str:
     """Return the bars in words, for who cannot see them."""
     sentences = []
     for name, part in parts:
-        after = f", {last} {gap_percent(part.after)}" if last is not None else ""
         sentences.append(
-            f"{sentence_case(name)}: given {gap_percent(part.before)}, re-identified {gap_percent(part.reidentified)}{after}, "
-            f"noise floor {gap_percent(part.noise_floor)}."
+            f"{sentence_case(name)}: {stages_told(diagnosis, part)}, noise floor {gap_percent(part.noise_floor)}."
         )
     return " ".join(sentences)
 
 
-def _largest(parts: Sequence[tuple[str, GapPart]]) -> str:
+def _largest(parts: Sequence[tuple[str, GapPart]], rest: str) -> str:
     name, part = max(parts, key=lambda entry: entry[1].share)
-    return f"{percent(part.share)} of what is left after re-identification lies at {name}."
+    return f"{percent(part.share)} of the gap ({rest}) lies at {name}."
 
 
 def _lacking(states: Sequence[StatePart]) -> str:
@@ -208,5 +220,9 @@ def _place(part: StatePart, motion: str) -> str:
 
 
 def _amplitude_label(part: AmplitudePart) -> str:
+    return f"{_size(part)}\n{'scored' if part.scored else 'fitted'}"
+
+
+def _size(part: AmplitudePart) -> str:
     scale = plot.display_scale(part.units["amplitude"], part.amplitude)
-    return f"{part.amplitude * scale.factor:.4g} {scale.unit}\n{'scored' if part.scored else 'fitted'}"
+    return f"{part.amplitude * scale.factor:.4g} {told_unit(scale.unit)}".strip()

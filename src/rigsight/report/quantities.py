@@ -77,11 +77,13 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 def gap_percent(value: float) -> str:
-    """Return an NRMSE as percent with three digits."""
+    """Return an NRMSE as percent with three digits, of a model that left the record with two."""
     if not math.isfinite(value):
         return "not finite"
-    # Above 1000 % the model has left the record, and digits mean nothing.
-    return f"{100.0 * value:.3g} %" if value < 10.0 else f"{100.0 * value:.1e} %"
+    if value < 10.0:
+        return f"{100.0 * value:.3g} %"
+    rounded = f"{100.0 * value:.1e}"
+    return f"{float(rounded):.0f} %" if value < 1e5 else f"{rounded} %"
 
 
 def column_label(column: Column) -> str:

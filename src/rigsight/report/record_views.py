@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight import plot
-from rigsight.diagnose.result import STAGES, Diagnosis, Trace
+from rigsight.diagnose.result import STAGES, Diagnosis, Stage, Trace
 from rigsight.metrics import nrmse
 from rigsight.report.charts import (
     Chart,
     ChartPanel,
     Curve,
+    Detail,
     chart_data,
     curve_names,
     points_per_curve,
@@ -25,7 +26,7 @@ from rigsight.report.quantities import gap_percent
 from rigsight.report.response_charts import response_chart
 from rigsight.report.responses import PathResponse
 from rigsight.report.sections import output_label
-from rigsight.report.wording import after_label
+from rigsight.report.wording import sentence_case, stage_names, told_unit
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class RecordView:
     title, facts
         Name, and role, kind, amplitude, length in words.
     rows
-        Output, gap given, gap after.
+        Output, and what each stage leaves of it in words.
     charts
         Each output over time, then each signal path over frequency.
     missing
@@ -51,7 +52,7 @@ class RecordView:
     key: str
     title: str
     facts: str
-    rows: list[tuple[str, str, str]]
+    rows: list[tuple[str, str]]
     charts: list[Chart]
     missing: list[str] = field(default_factory=list)
     is_open: bool = True
@@ -70,6 +71,7 @@ def record_views(
         Frequency responses by record.
     """
     names = curve_names(diagnosis)
+    stages = stage_names(diagnosis)
     n_pictures = sum(len(trace.measured) for trace in diagnosis.traces)
     most_points = points_per_curve((2 * len(names) - 1) * n_pictures)
     ordered = sorted(diagnosis.traces, key=lambda trace: trace.role != diagnosis.scored_on)
@@ -80,12 +82,7 @@ def record_views(
             title=trace.record,
             facts=_facts(diagnosis, trace),
             rows=[
-                (
-                    output_label(diagnosis, output),
-                    gap_percent(nrmse(-trace.residual("before", output), trace.measured[output])),
-                    gap_percent(nrmse(-trace.residual("after", output), trace.measured[output])),
-                )
-                for output in trace.measured
+                (output_label(diagnosis, output), _left(trace, output, stages)) for output in trace.measured
             ],
             charts=[
                 *(
@@ -102,6 +99,13 @@ def record_views(
             ],
             is_open=trace.role == diagnosis.scored_on,
         )
+
+
+def _left(trace: Trace, output: str, stages: Mapping[Stage, str]) -> str:
+    return ", ".join(
+        f"{name} {gap_percent(nrmse(-trace.residual(stage, output), trace.measured[output]))}"
+        for stage, name in stages.items()
+    )
 
 
 def _time_chart(
@@ -137,13 +141,21 @@ def _time_chart(
         ),
     ]
     window = plot.detail_window(trace, output)
+    is_step = plot.step_window(trace, output) is not None
+    begin, end = float(trace.t[window.start]), float(trace.t[window.stop - 1])
+    first = names[stages[0]]
+    detail = (
+        Detail(begin, end, "Step", "Show the step")
+        if is_step
+        else Detail(begin, end, "Largest error", f"Show where it errs most, {first}")
+    )
     title = f"Measured and simulated {output_label(diagnosis, output)}, record {trace.record}"
     data = chart_data(
         title,
         ("t", "s"),
         panels,
         names,
-        detail=(float(trace.t[window.start]), float(trace.t[window.stop - 1])),
+        detail=detail,
     )
     thinned = ""
     if measured.size > most_points:
@@ -156,9 +168,9 @@ def _time_chart(
     )
     return Chart(
         key,
-        _drawings(diagnosis, trace, output, window, names, key),
+        _drawings(diagnosis, trace, output, window, detail, key),
         data,
-        f"{caption[:1].upper()}{caption[1:]}{thinned}",
+        f"{sentence_case(caption)}{thinned}",
     )
 
 
@@ -176,35 +188,36 @@ def _largest(values: NDArray[np.float64], limit: float) -> float:
 
 
 def _drawings(
-    diagnosis: Diagnosis, trace: Trace, output: str, window: slice, names: Mapping[str, str], key: str
+    diagnosis: Diagnosis, trace: Trace, output: str, window: slice, detail: Detail, key: str
 ) -> tuple[PageFigure, ...]:
-    """Return the static drawings: the whole record and, of records that were scored, a detail."""
-    label, before = after_label(diagnosis), names["before"]
-    is_scored = trace.role == diagnosis.scored_on
-    begin, end = trace.t[window.start], trace.t[window.stop - 1]
+    """Return the static drawings: the whole record and, of steps and of records that were scored, a detail."""
+    names = stage_names(diagnosis)
+    # First and last alone: on paper nothing can be taken away.
+    drawn = {stage: names[stage] for stage in (next(iter(names)), list(names)[-1])}
+    has_detail = trace.role == diagnosis.scored_on or plot.step_window(trace, output) is not None
     what = f"{output_label(diagnosis, output)}, record {trace.record}"
     whole = page_figure(
         plot.comparison(
             diagnosis,
             trace,
             output,
-            after_label=label,
-            before_label=before,
-            marked=window if is_scored else None,
+            stages=drawn,
+            marked=window if has_detail else None,
         ),
         f"{key}-whole",
-        f"Measured and simulated {what}, {before} and {label}, with the errors below.",
-        "The black bar marks the detail.",
+        f"Measured and simulated {what}, {' and '.join(drawn.values())}, with the errors below.",
+        "The black bar marks the detail." if has_detail else "",
     )
-    if not is_scored:
+    if not has_detail:
         return (whole,)
-    detail = page_figure(
-        plot.comparison(diagnosis, trace, output, window),
+    span = f"{detail.low:.4g} s to {detail.high:.4g} s"
+    near = page_figure(
+        plot.comparison(diagnosis, trace, output, window, stages=drawn),
         f"{key}-detail",
-        f"Detail of {what} from {begin:.4g} s to {end:.4g} s.",
-        f"Where it errs most, {before}: {begin:.4g} s to {end:.4g} s.",
+        f"Detail of {what} from {span}.",
+        sentence_case(f"{detail.title.removeprefix('Show ')}: {span}."),
     )
-    return whole, detail
+    return whole, near
 
 
 def _facts(diagnosis: Diagnosis, trace: Trace) -> str:
@@ -213,6 +226,6 @@ def _facts(diagnosis: Diagnosis, trace: Trace) -> str:
     scale = plot.display_scale(unit, abs(trace.amplitude or 0.0))
     facts = [f"{trace.role} record", trace.kind]
     if trace.amplitude is not None:
-        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {scale.unit}".strip())
+        facts.append(f"amplitude {trace.amplitude * scale.factor:.4g} {told_unit(scale.unit)}".strip())
     length = float(trace.t[-1] - trace.t[0]) if trace.t.size else 0.0
     return ", ".join([*facts, f"{length:.4g} s", f"{trace.t.size} samples"])

@@ -11,23 +11,24 @@ from importlib.resources import files
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from rigsight.diagnose.result import Diagnosis
+from rigsight.diagnose.result import STAGES, Diagnosis
 from rigsight.effects import Effect
 from rigsight.report import location, sections
 from rigsight.report.equations import equation_groups, known_effects
+from rigsight.report.loop_figures import loop_figures
 from rigsight.report.quantities import Written
 from rigsight.report.record_views import record_views
 from rigsight.report.response_charts import amplitude_figures
 from rigsight.report.responses import record_responses
 from rigsight.report.wording import (
     advice_sentences,
-    after_label,
     ambiguity_sentence,
     basis_sentence,
     effects_label,
     excess,
     percent,
     sentence_case,
+    stage_names,
     times_floor,
     verdict_name,
     verdict_sentence,
@@ -70,10 +71,10 @@ def render_report(
             verdict_sentence=verdict_sentence(diagnosis),
             ambiguity_sentence=ambiguity_sentence(diagnosis),
             basis_sentence=basis_sentence(diagnosis),
-            after_label=sentence_case(after_label(diagnosis)),
+            stages=stage_names(diagnosis),
             rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
             effects=sections.effect_summaries(diagnosis, known),
-            left=[times_floor(excess(diagnosis, stage)) for stage in ("before", "reidentified", "after")],
+            left={stage: times_floor(excess(diagnosis, stage)) for stage in STAGES},
             probability=next(
                 (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
             )
@@ -91,6 +92,7 @@ def render_report(
             parameters=sections.parameter_rows(diagnosis, known),
             equations=equation_groups(diagnosis, known),
             amplitude_figures=amplitude_figures(diagnosis, responses),
+            loops=loop_figures(diagnosis),
             records=list(record_views(diagnosis, responses)),
             advice=advice_sentences(diagnosis),
             findings=sections.finding_rows(diagnosis),

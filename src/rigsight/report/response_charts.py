@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +10,13 @@ from numpy.typing import NDArray
 from rigsight import plot
 from rigsight.diagnose.result import STAGES, Diagnosis, Stage
 from rigsight.frequency import FrequencyResponse
-from rigsight.plot.drawing import GIVEN, REIDENTIFIED, WITH_EFFECT
+from rigsight.plot.drawing import STAGE_STYLES
 from rigsight.plot.frequency_responses import TWO_SIDED, decibel, thinned
 from rigsight.report.charts import Chart, ChartPanel, Curve, chart_data, curve_names
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.responses import PathResponse
-from rigsight.report.wording import sentence_case
+from rigsight.report.wording import sentence_case, told_unit
 
-_STYLES: dict[Stage, dict[str, Any]] = {
-    "before": {"color": GIVEN, "linestyle": (0, (5, 1.6))},
-    "reidentified": {"color": REIDENTIFIED, "linestyle": (0, (2, 1))},
-    "after": {"color": WITH_EFFECT, "linestyle": "-"},
-}
 _PRINTED_LINES = 200
 """Lines of a response in a static drawing."""
 _BELOW = 3.0
@@ -85,7 +79,7 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
                 {names[stage]: thinned(response.simulated[stage], _PRINTED_LINES) for stage in stages},
             )
         ],
-        {names[stage]: _STYLES[stage] for stage in stages},
+        {names[stage]: STAGE_STYLES[stage] for stage in stages},
     )
     return Chart(
         key,
@@ -133,12 +127,12 @@ def _overlaid(
         )
         for label, response in labeled
     ]
-    told = ", ".join(f"{label} {response.decibel[stage]:.2g} dB" for label, response in labeled)
+    told = ", ".join(f"{response.decibel[stage]:.2g} dB at {label}" for label, response in labeled)
     return page_figure(
         plot.overlaid_responses([panels], "simulated"),
         key,
         f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {told}.",
-        f"Measured (lines) against {name} (dashed). RMS distance: {told}.",
+        f"Measured (solid) against {name} (dashed). RMS distance: {told}.",
     )
 
 
@@ -155,7 +149,7 @@ def _by_amplitude(
     for amplitude, record in known:
         for response in responses.get(record, ()):
             if response.path == path:
-                label = f"{amplitude:.4g} {unit}".strip()
+                label = f"{amplitude:.4g} {told_unit(unit)}".strip()
                 again = sum(own.split(" (")[0] == label for own in labels) + 1
                 labels.append(label if again == 1 else f"{label} ({again})")
                 found.append((labels[-1], response))

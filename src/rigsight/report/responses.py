@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast, get_args
@@ -10,18 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.compare.response_error import (
+    SignalPath,
     measured_responses,
     response_error,
     signal_paths,
     simulated_response,
     without_shares,
 )
-from rigsight.diagnose.result import STAGES, Diagnosis, Trace
+from rigsight.diagnose.result import Diagnosis, Trace
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.record_response import Method
 from rigsight.records import Record
 from rigsight.records.record import Hold, Kind
+from rigsight.report.windowed_responses import windowed_response
+from rigsight.report.wording import stage_names
 from rigsight.rigs import RIGS
 
 _METHOD: Method = "local_rational"
@@ -54,7 +58,7 @@ class PathResponse:
 def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, ...]:
     """Return the responses of one record, path by path; none of a step, of an element, or where nothing stands out.
 
-    None either of records that are scored in windows: their simulations begin anew in each, and their spectra say nothing.
+    Records that are scored in windows are read in windows too, see `windowed_response`.
 
     Parameters
     ----------
@@ -65,23 +69,24 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
     """
     rig = RIGS.get(diagnosis.rig)
     signals = {*trace.inputs, *trace.measured}
-    if rig is None or not rig.is_driven or diagnosis.windows is not None:
+    if rig is None or not rig.is_driven:
         return ()
     if not {rig.inputs[0].name, rig.outputs[0].name} <= signals:
         return ()
     paths = signal_paths(rig)
     found = []
-    measured, _ = measured_responses(_record(diagnosis, trace, trace.measured), paths, _METHOD)
+    measured = _measured(diagnosis, trace, paths)
+    stages = stage_names(diagnosis)
     for path in paths:
         own = measured.get(path.name)
         if own is None or own.omega.size < _FEWEST_LINES:
             continue
         simulated: dict[str, FrequencyResponse] = {}
         decibel: dict[str, float] = {}
-        for stage in STAGES:
+        for stage in stages:
             outputs: Mapping[str, NDArray[np.float64]] = getattr(trace, stage)
             try:
-                response = simulated_response(_record(diagnosis, trace, outputs), path, _METHOD, own)
+                response = _simulated(diagnosis, trace, outputs, path, own)
                 decibel[stage] = response_error(own, response).decibel
             except InputError:
                 # A simulation that left the numbers, or does not move: the other stages are still worth seeing.
@@ -89,6 +94,35 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
             simulated[stage] = without_shares(response)
         found.append(PathResponse(path.name, without_shares(own), simulated, decibel))
     return tuple(found)
+
+
+def _measured(
+    diagnosis: Diagnosis, trace: Trace, paths: tuple[SignalPath, ...]
+) -> Mapping[str, FrequencyResponse]:
+    record = _record(diagnosis, trace, trace.measured)
+    if diagnosis.windows is None:
+        return measured_responses(record, paths, _METHOD)[0]
+    found = {}
+    for path in paths:
+        if trace.kind == "step" or path.response not in record:
+            continue
+        with contextlib.suppress(InputError):
+            found[path.name] = windowed_response(record, diagnosis.windows, path, _METHOD, clear=True)
+    return found
+
+
+def _simulated(
+    diagnosis: Diagnosis,
+    trace: Trace,
+    outputs: Mapping[str, NDArray[np.float64]],
+    path: SignalPath,
+    measured: FrequencyResponse,
+) -> FrequencyResponse:
+    record = _record(diagnosis, trace, outputs)
+    if diagnosis.windows is None:
+        return simulated_response(record, path, _METHOD, measured)
+    whole = windowed_response(record, diagnosis.windows, path, _METHOD, clear=False)
+    return whole.at(np.isin(whole.omega, measured.omega), "of those measured")
 
 
 def _record(diagnosis: Diagnosis, trace: Trace, outputs: Mapping[str, NDArray[np.float64]]) -> Record:

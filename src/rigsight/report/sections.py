@@ -8,19 +8,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigsight import plot
-from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.diagnose.result import STAGES, Diagnosis, Estimate
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written, written_limits
 from rigsight.report.wording import (
     TIMES,
-    after_label,
     effect_label,
     effects_label,
+    is_given,
     named_candidate,
     percent,
     sentence_case,
+    stages_told,
 )
 from rigsight.rigs import RIGS
 
@@ -65,17 +66,22 @@ def budget_figure(diagnosis: Diagnosis) -> PageFigure:
     label = (
         f"Adding {effects_label(diagnosis.effects)}" if len(diagnosis.effects) == 1 else "Adding the effects"
     )
+    given = is_given(diagnosis)
     alt = " ".join(
-        f"{output}: given {gap_percent(gap.before)}, re-identified {gap_percent(gap.reidentified)}, "
-        f"{after_label(diagnosis)} {gap_percent(gap.after)}, noise floor {gap_percent(gap.noise_floor)}."
+        f"{output}: {stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
         for output, gap in diagnosis.gap.items()
+    )
+    meaning = (
+        " Re-identified: the same equations with the numbers that fit best."
+        if given
+        else " No parameters were given: the rig's own equations with the numbers that fit best come first."
     )
     titles = {output: output_label(diagnosis, output) for output in diagnosis.gap}
     return page_figure(
-        plot.gap_budget(diagnosis, label, titles),
+        plot.gap_budget(diagnosis, label, titles, given),
         "figure-budget",
         f"Waterfall of the gap. {alt}",
-        "How the gap shrinks, step by step. The dashed line is what a perfect model would leave.",
+        f"How the gap shrinks, step by step; the dashed line is what a perfect model would leave.{meaning}",
     )
 
 
@@ -84,9 +90,7 @@ def budget_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return [
         {
             "output": output_label(diagnosis, output),
-            "before": gap_percent(gap.before),
-            "reidentified": gap_percent(gap.reidentified),
-            "after": gap_percent(gap.after),
+            **{stage: gap_percent(getattr(gap, stage)) for stage in STAGES},
             "noise_floor": gap_percent(gap.noise_floor),
             "closed": percent(gap.closed),
             "intervals": {stage: interval_text(limits, stage) for stage, limits in gap.intervals.items()},

@@ -21,6 +21,7 @@ from rigsight.report.wording import (
     effects_label,
     named_candidate,
     percent,
+    stages_told,
     verdict_name,
     verdict_sentence,
 )
@@ -79,9 +80,10 @@ def summary(diagnosis: Diagnosis) -> Summary:
 
 def _rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     for output, gap in diagnosis.gap.items():
-        stages = f"{gap_percent(gap.before)} given, {gap_percent(gap.reidentified)} re-identified"
-        after = f", {gap_percent(gap.after)} after" if diagnosis.effects else ""
-        yield f"gap in {output}", f"{stages}{after}, floor {gap_percent(gap.noise_floor)}"
+        yield (
+            f"gap in {output}",
+            f"{stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}",
+        )
     if diagnosis.candidates:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
     named = named_candidate(diagnosis)

@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from rigsight.diagnose.result import Candidate, Diagnosis
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigsight.diagnose.gap_parts import GapPart
+from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap, Stage
 from rigsight.diagnose.verdict import AT_FLOOR
+from rigsight.report.quantities import gap_percent
 
 TIMES = "\u00d7"
-_WITHOUT_EFFECT = "no effect, better numbers"
+_WITHOUT_EFFECT = "no effect, best numbers"
 _PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
 _SEPARATES = 1.0
 """RMS difference in standard deviations of the noise below which an experiment is no help."""
@@ -65,8 +70,36 @@ def verdict_name(diagnosis: Diagnosis) -> str:
 
 def after_label(diagnosis: Diagnosis) -> str:
     """Return what the simulation after the diagnosis is called in tables and legends."""
-    return {"effect": "with effect", "parameters": "better numbers", "none": "as given"}.get(
-        diagnosis.verdict, "re-identified"
+    return list(stage_names(diagnosis).values())[0 if diagnosis.verdict == "none" else -1]
+
+
+def is_given(diagnosis: Diagnosis) -> bool:
+    """Return whether a simulation was given at all; where none was, the first two stages are one and the same."""
+    pairs: list[tuple[ArrayLike, ArrayLike]] = [
+        (gap.before, gap.reidentified) for gap in diagnosis.gap.values()
+    ]
+    pairs += [
+        (trace.before[output], trace.reidentified[output])
+        for trace in diagnosis.traces
+        for output in trace.measured
+    ]
+    return any(not np.array_equal(first, second, equal_nan=True) for first, second in pairs)
+
+
+def stage_names(diagnosis: Diagnosis) -> dict[Stage, str]:
+    """Return the stages of the diagnosis that are different simulations, with their names for people."""
+    names: dict[Stage, str] = {"before": "given simulation", "reidentified": "re-identified"}
+    if not is_given(diagnosis):
+        names = {"reidentified": "identified"}
+    if diagnosis.effects:
+        names["after"] = "with effect" if len(diagnosis.effects) == 1 else "with effects"
+    return names
+
+
+def stages_told(diagnosis: Diagnosis, gap: OutputGap | GapPart) -> str:
+    """Return what each stage leaves: ``"given simulation 42 %, re-identified 13 %, with effect 0.94 %"``."""
+    return ", ".join(
+        f"{name} {gap_percent(getattr(gap, stage))}" for stage, name in stage_names(diagnosis).items()
     )
 
 
@@ -123,12 +156,14 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         )
     if diagnosis.verdict == "none":
         if not before > AT_FLOOR:
-            return f"There is no gap to explain: the given simulation leaves {times_floor(before)}."
-        return (
-            f"The gap is too small against the noise to have a cause: the given simulation leaves {times_floor(before)}, "
-            f"and better numbers do not change that much."
-        )
+            return f"There is no gap to explain: {_first(diagnosis)} {times_floor(before)}."
+        other = ", and better numbers do not change that much" if is_given(diagnosis) else ""
+        return f"The gap is too small against the noise to have a cause: {_first(diagnosis)} {times_floor(before)}{other}."
     return _unknown_sentence(diagnosis)
+
+
+def _first(diagnosis: Diagnosis) -> str:
+    return "the given simulation leaves" if is_given(diagnosis) else "the identified equations leave"
 
 
 def _effect_sentence(diagnosis: Diagnosis) -> str:
@@ -172,13 +207,17 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
     return f"These records cannot tell {effects_label(diagnosis.effects)} from {rivals}."
 
 
+def told_unit(unit: str) -> str:
+    """Return a unit as it stands behind a number; an axis calls the unit of its input just that."""
+    return "" if unit in ("input", "1") else unit
+
+
 def advice_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return, for each rival, the experiment that would tell it from the named effects."""
     unit = next(iter(diagnosis.units.values()), "")
     sentences = []
     for advice in diagnosis.advice:
-        # An axis calls the unit of its input just that.
-        size = f"amplitude {advice.amplitude:.3g} {'' if unit == 'input' else unit}".strip()
+        size = f"amplitude {advice.amplitude:.3g} {told_unit(unit)}".strip()
         band = ""
         if advice.band is not None:
             low, high = advice.band

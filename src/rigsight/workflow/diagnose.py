@@ -18,7 +18,7 @@ from rigsight.workflow.campaign import Campaign, read_campaign
 from rigsight.workflow.fit_journal import FitJournal
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.model_file import MODEL_FILE
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.progress import Listener, Stage, Step, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
 DIAGNOSIS_FILE = "diagnosis.json"
@@ -42,7 +42,7 @@ def run_diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records.
 
-    What an interrupted diagnosis of the same campaign has fitted is not fitted again.
+    What an interrupted diagnosis of the same campaign has fitted is not fitted again; the listener is told so.
 
     Parameters
     ----------
@@ -78,7 +78,10 @@ def run_diagnose(
     prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
-    with threadpool_limits(limits=1, user_api="blas"), FitJournal(Path(campaign)) as journal:
+    with (
+        threadpool_limits(limits=1, user_api="blas"),
+        FitJournal(Path(campaign), lambda count: _tell_going_on(count, listener)) as journal,
+    ):
         diagnosis = diagnose(
             task_of(read),
             candidates,
@@ -97,6 +100,13 @@ def run_diagnose(
             (*effects, *own_effects),
         )
     return diagnosis
+
+
+def _tell_going_on(count: int, listener: Listener) -> None:
+    """Say that an interrupted diagnosis is taken up again; in its results, which are the same, nothing tells."""
+    stage = f"Going on: {count} fit{'' if count == 1 else 's'} done before the interruption"
+    listener(Step(stage, "", 0, count))
+    listener(Step(stage, "", count, count))
 
 
 def task_of(campaign: Campaign) -> Task:

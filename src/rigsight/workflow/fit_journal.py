@@ -10,7 +10,7 @@ import contextlib
 import hashlib
 import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -28,13 +28,16 @@ class FitJournal:
     ----------
     campaign
         The campaign's file or folder; its path names the journal. What was fitted there is told apart by the keys of the fits.
+    going_on
+        Told how many fits are kept from before, once, when the first of them serves again.
     """
 
-    def __init__(self, campaign: Path) -> None:
+    def __init__(self, campaign: Path, going_on: Callable[[int], None] | None = None) -> None:
         name = hashlib.sha256(f"{version('rigsight')} {campaign.resolve()}".encode()).hexdigest()[:24]
         self._path = cache_folder() / "unfinished" / f"{name}.jsonl"
         self._known: dict[str, Mapping[str, Any]] = {}
         self._lock = threading.Lock()
+        self._going_on = going_on
         self.recalled = 0
         """Fits that did not have to be done again."""
 
@@ -65,6 +68,10 @@ class FitJournal:
         if found is not None:
             with self._lock:
                 self.recalled += 1
+                # Not before: a campaign that was changed since has the same path, and none of these fits.
+                is_first = self.recalled == 1
+            if is_first and self._going_on is not None:
+                self._going_on(len(self._known))
         return found
 
     def remember(self, key: str, outcome: Mapping[str, Any]) -> None:

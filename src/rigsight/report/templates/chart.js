@@ -95,7 +95,8 @@
       button("\u25c2", "Move left", () => this.move(-0.25));
       button("\u25b8", "Move right", () => this.move(0.25));
       button("All", "Show all", () => this.show(...this.whole));
-      if (this.data.detail) button("Largest error", "Show where the given simulation errs most", () => this.show(...this.data.detail));
+      const detail = this.data.detail;
+      if (detail) button(detail.label, detail.title, () => this.show(...detail.range));
       const used = new Set(this.panels.flatMap((panel) => panel.curves.map((curve) => curve.of)));
       for (const [of, label] of Object.entries(this.data.names)) {
         if (!used.has(of)) continue;
