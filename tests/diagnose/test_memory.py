@@ -59,7 +59,7 @@ def test_a_fit_that_took_the_sliders_for_their_neighbors_is_moved(fit_at) -> Non
     values = {**RIG, "k": 100.0, "a": 0.5, "x_s": 0.01, "q": -0.4}
     moved = list(restart_values(STRUCTURE, IWAN, fit_at(values)))
     steps = [np.log10(m["x_s"] / 0.01) * 6 / 2.7 for m in moved]
-    np.testing.assert_allclose(steps, [-3.0, -2.0, -1.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(steps, [-3.0, -2.0, -1.0, -0.5, -0.2, 0.2, 0.5, 1.0], atol=1e-9)
     for start in moved:
         assert {n: v for n, v in start.items() if n != "x_s"} == {
             n: v for n, v in values.items() if n != "x_s"

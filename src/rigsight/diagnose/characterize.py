@@ -32,6 +32,9 @@ _LOOK_EVALUATIONS = 25
 _GLIMPSE_EVALUATIONS = 8
 _MOST_STARTS = 4
 """Starts that are fitted further; which of more they are, the first few evaluations of each tell."""
+_MOST_RESTARTS = 4
+_WORTH_RESTARTING = 1e-3
+"""Share of the cost that a fit from elsewhere must remove to be followed."""
 _PIECE = 4.0
 """Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
 
@@ -339,22 +342,31 @@ def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
 
 
 def _restarted(bench: Workbench, settled: Scored) -> Scored:
-    """Fit from the places to which its effects say that a fit may have to be moved; keep what lowers the cost."""
-    if settled.excess <= _WORTH_RELEASING:
-        return settled
+    """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
-    starts = [start for effect in settled.effects for start in restart_values(structure, effect, settled.fit)]
-    looks = [_looked(bench, structure, free, [start]) for start in starts]
-    better = [
-        found
-        for look in looks
-        for found in _on_whole_records(bench, structure, free, look)
-        if found.cost < settled.fit.cost
-    ]
-    if not better:
-        return settled
-    again = _fitted(bench, settled.effects, structure, free, _distinct(better), True)
-    return again if again.fit.cost < settled.fit.cost else settled
+    near = bench.problem(structure, bench.look, _LOOK_ACCURACY)
+    for _ in range(_MOST_RESTARTS):
+        if settled.excess <= _WORTH_RELEASING:
+            break
+        starts = [s for effect in settled.effects for s in restart_values(structure, effect, settled.fit)]
+        if not starts:
+            break
+        looks = sorted(
+            (near.fit(s, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False) for s in starts),
+            key=lambda fit: fit.cost,
+        )
+        better = [
+            found
+            for found in _on_whole_records(bench, structure, free, looks[:_MOST_STARTS])
+            if found.cost < (1.0 - _WORTH_RESTARTING) * settled.fit.cost
+        ]
+        if not better:
+            break
+        again = _fitted(bench, settled.effects, structure, free, better, True)
+        if again.fit.cost >= settled.fit.cost:
+            break
+        settled = again
+    return settled
 
 
 def _released(bench: Workbench, settled: Scored, structure: Structure, released: Sequence[str]) -> Scored:

@@ -23,7 +23,7 @@ from rigsight.simulate import Structure
 
 MOST_EFFECTS = 2
 """Effects that a verdict can name together."""
-_BEAM = 1.15
+_BEAM = 1.3
 """Singles are grown if their held-out error is within this factor of the best: the simplest, and the best that is unlike it."""
 _TIE = 1.01
 _WORTH_FOLLOWING = 0.85
@@ -80,21 +80,39 @@ def grown(
     tied = [model for model in close if model.n_free == best.n_free and model.excess <= _TIE * best.excess]
     first = min(tied, key=lambda model: order[model.names[0]])
     beam = [first, *[model for model in close if model is not first and not _alike(first, model)][:1]]
+    allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
     pairs: list[Scored] = []
     for parent in beam:
-        partners = [
-            effect
-            for effect in bench.offered(effects)
-            if effect not in parent.effects and not _known_pair(pairs, parent, effect)
-        ]
-        pairs += _pairs(bench, parent, partners, usable, n_jobs, prepare)
-    allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
+        pairs += _grown_from(bench, parent, pairs, usable, effects, n_jobs, prepare)
+    best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
+    if best_pair is not None and best_pair.excess <= allowed:
+        # What came second may be right and the first only its relative: another one may do better in its place.
+        for parent in usable:
+            if parent not in beam and parent.effects[0] in best_pair.effects:
+                pairs += _grown_from(bench, parent, pairs, usable, effects, n_jobs, prepare)
     alone = {model.names[0]: model.excess for model in singles}
     return [
         replace(pair, effects=tuple(sorted(pair.effects, key=lambda effect: alone[effect.name])))
         for pair in refine(bench, pairs, n_jobs)
         if pair.excess <= allowed
     ]
+
+
+def _grown_from(
+    bench: Workbench,
+    parent: Scored,
+    known: Sequence[Scored],
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    n_jobs: int,
+    prepare: Prepare | None,
+) -> list[Scored]:
+    partners = [
+        effect
+        for effect in bench.offered(effects)
+        if effect not in parent.effects and not _known_pair(known, parent, effect)
+    ]
+    return _pairs(bench, parent, partners, singles, n_jobs, prepare)
 
 
 def _alike(one: Scored, other: Scored) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import sympy as sp
 
+from rigsight.diagnose.persistent_line import persistent_line
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
@@ -37,6 +38,26 @@ def start_values(
     parents
         Fits with a simpler effect in its place, by name of that effect.
     """
+    starts = list(_plain_starts(bench, structure, effect, base, parents))
+    yield from starts
+    line = _line(bench, base) if effect.pulsation is not None else None
+    if line is not None:
+        yield {**starts[0], structure.parameter_name(effect, str(effect.pulsation)): line}
+
+
+def _line(bench: Workbench, base: FitResult) -> float | None:
+    if len(base.residuals) != len(bench.estimation):
+        return None
+    return persistent_line([r[:, 0] for r in base.residuals], [record.dt for record in bench.estimation])
+
+
+def _plain_starts(
+    bench: Workbench,
+    structure: Structure,
+    effect: Effect,
+    base: FitResult,
+    parents: Mapping[str, FitResult],
+) -> Iterator[dict[str, float]]:
     fitted = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
     rest = {p.name: p.default for p in effect.parameters if p not in fitted and p.default is not None}
     if effect.starts:

@@ -156,6 +156,8 @@ class Effect:
     elastic_share
         Parameter that is the share of the spring's stiffness without memory; a fit moves that stiffness and the rest of it, with
         memory, because records determine those apart.
+    pulsation
+        Parameter that is the angular frequency of what pulsates by itself; a fit starts at the line that the records show.
     searched_as
         Parameters that a fit moves as sum and difference.
     starts
@@ -183,6 +185,7 @@ class Effect:
     measured_late: sp.Expr | None = None
     states: tuple[State, ...] = ()
     elastic_share: str | None = None
+    pulsation: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()
     starts: tuple[Start, ...] = ()
     special_cases: dict[str, float] = field(default_factory=dict)

@@ -61,8 +61,11 @@ _FROM_BOUC_WEN = Start(
 """The same loop with its rounding spread over many sliders: where both fit, the one state is preferred to the six."""
 
 _STEP = _reaches[1] / _reaches[0]
-_AGAIN = tuple(Start({"x_s": x_s * _STEP**steps}, parent="iwan_hysteresis") for steps in (-3, -2, -1, 1))
-"""A fit may take the sliders for their neighbors, and stop there."""
+_AGAIN = tuple(
+    Start({"x_s": x_s * _STEP**steps}, parent="iwan_hysteresis")
+    for steps in (-3.0, -2.0, -1.0, -0.5, -0.2, 0.2, 0.5, 1.0)
+)
+"""A fit may take the sliders for their neighbors, or stop where one slider lets go at the wrong turn of the motion."""
 
 
 IWAN_HYSTERESIS = Effect(

@@ -51,6 +51,7 @@ PERIODIC_DISTURBANCE = Effect(
         ),
     ),
     energy=Energy.ACTIVE,
+    pulsation="w_p",
     signature=Signature(gain_trend=GainTrend.STEADY),
     torque=-T_p * sp.sin(phi),
     states=(State(phi, w_p, ""),),

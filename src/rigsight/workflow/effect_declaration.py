@@ -126,9 +126,10 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
     for pair in effect.searched_as:
         for name in {pair.first, pair.second} - set(names):
             yield f"searched_as names {name}, which is no parameter.{nearest(name, names)}"
-    if effect.elastic_share is not None and effect.elastic_share not in names:
-        known = nearest(effect.elastic_share, names)
-        yield f"elastic_share names {effect.elastic_share}, which is no parameter.{known}"
+    for field in ("elastic_share", "pulsation"):
+        name = getattr(effect, field)
+        if name is not None and name not in names:
+            yield f"{field} names {name}, which is no parameter.{nearest(str(name), names)}"
     for start in effect.starts:
         for name in start.values.keys() - {*names, "k"}:
             yield f"a start gives a value to {name}, which is no parameter.{nearest(name, names)}"

@@ -1,0 +1,53 @@
+"""At which frequency does every record leave something, whatever drives it? A line in the spectra of what a model leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal import get_window
+
+_NEIGHBORS = 21
+"""Frequencies whose median is what a line stands out of."""
+_LEAST_CYCLES = 4
+"""Cycles in a record that tell a line from a drift."""
+
+
+def persistent_line(residuals: Sequence[NDArray[np.float64]], dt: Sequence[float]) -> float | None:
+    """Return the angular frequency of the line that stands out most in all records alike [rad/s].
+
+    What a wrong model leaves follows the input, sweeps through the band or is spread over it; what pulsates by itself stands at
+    one frequency in all records. The mean of the logarithms of the spectra is large only where all of them are.
+
+    Parameters
+    ----------
+    residuals
+        First output, measured minus simulated, of each record, shape (n_samples,) each.
+    dt
+        Sample time of each record [s].
+
+    Returns
+    -------
+    None if no record is long enough.
+    """
+    duration = min((r.size * step for r, step in zip(residuals, dt, strict=True)), default=0.0)
+    least = 2.0 * np.pi * _LEAST_CYCLES / duration if duration > 0.0 else np.inf
+    most = min((np.pi / step for step in dt), default=0.0)
+    omega = np.arange(least, most, np.pi / duration) if np.isfinite(least) else np.zeros(0)
+    if omega.size < _NEIGHBORS:
+        return None
+    levels = [_level(r, step, omega) for r, step in zip(residuals, dt, strict=True)]
+    level = np.mean(levels, axis=0)
+    prominence = level - median_filter(level, _NEIGHBORS, mode="nearest")
+    return float(omega[int(np.argmax(prominence))])
+
+
+def _level(residual: NDArray[np.float64], dt: float, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the logarithm of the spectrum at the frequencies, of the largest line near each where the record is longer."""
+    windowed = (residual - np.mean(residual)) * get_window("hann", residual.size)
+    n_fft = 4 * residual.size
+    spectrum = np.log(np.abs(np.fft.rfft(windowed, n_fft)) + 1e-300)
+    own = 2.0 * np.pi * np.fft.rfftfreq(n_fft, dt)
+    return np.interp(omega, own, spectrum)
