@@ -11,10 +11,11 @@ ABOVE, BELOW = 1.001, 0.999
 
 @pytest.fixture
 def verdict(scored):
-    def of(before: float, linear: float, best: float, lower_bound: bool = False) -> Judgement:
-        return judge(
-            before, scored((), excess=linear), scored(("cubic_stiffness",), excess=best), lower_bound
-        )
+    def of(
+        before: float, linear: float, best: float, lower_bound: bool = False, is_driven: bool = True
+    ) -> Judgement:
+        model = scored(("cubic_stiffness",), excess=best)
+        return judge(before, scored((), excess=linear), model, lower_bound, is_driven)
 
     return of
 
@@ -63,12 +64,19 @@ def test_of_a_larger_gap_a_cause_may_leave_more(verdict, gap: float, allowed: fl
     assert verdict(gap, gap, allowed * ABOVE).verdict == "unknown"
 
 
-def test_above_a_lower_bound_an_effect_must_close_half_of_the_gap(verdict) -> None:
+def test_above_a_lower_bound_the_effect_of_an_element_must_close_half_of_the_gap(verdict) -> None:
     """From 11 to the floor at 1 are ten: closing five leaves six."""
-    assert verdict(11.0, 11.0, 6.0 * BELOW, lower_bound=True).verdict == "effect"
-    found = verdict(11.0, 11.0, 6.0 * ABOVE, lower_bound=True)
+    assert verdict(11.0, 11.0, 6.0 * BELOW, lower_bound=True, is_driven=False).verdict == "effect"
+    found = verdict(11.0, 11.0, 6.0 * ABOVE, lower_bound=True, is_driven=False)
     assert found.verdict == "unknown"
     assert "cubic_stiffness" in found.reason
+
+
+def test_what_moves_a_mass_far_above_a_lower_bound_is_no_noise(verdict) -> None:
+    assert verdict(30.0, 30.0, 3.0 * BELOW, lower_bound=True).verdict == "effect"
+    found = verdict(30.0, 30.0, 3.0 * ABOVE, lower_bound=True)
+    assert found.verdict == "unknown"
+    assert "the lower bound of the noise floor" in found.reason
 
 
 def test_an_effect_that_reaches_the_floor_is_named_whatever_the_gap_was(verdict) -> None:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.advise import advise
-from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
-from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.grow import Prepare, grown
+from rigsight.diagnose.examination import Examination, examine
+from rigsight.diagnose.grow import Prepare
 from rigsight.diagnose.localize import localize
+from rigsight.diagnose.predictability import growth_of_disturbances
 from rigsight.diagnose.quantify import budget_intervals, effect_shares
-from rigsight.diagnose.rank import Ranking, noise_vector, rank
+from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.result import (
     Candidate,
     Diagnosis,
@@ -24,50 +24,25 @@ from rigsight.diagnose.result import (
     OutputGap,
     Trace,
 )
-from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge
-from rigsight.diagnose.windows import WINDOW, cut, window_length
-from rigsight.diagnose.workbench import Scored, Workbench, liveliest
+from rigsight.diagnose.task import Task
+from rigsight.diagnose.verdict import AT_FLOOR, Judgement
+from rigsight.diagnose.windows import WINDOW, window_length
+from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitMemory, characteristic_scales, linear_start
+from rigsight.errors import InputError
+from rigsight.identify import FitMemory
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
-_SIGNIFICANT = 3.0
-"""Standard errors from zero at which a constant force counts as needed."""
+_PREDICTABLE = 3.0
+"""Growth of a disturbance, beside what it does to the linear rig, up to which free run is a fair test; an assumption."""
+_ONE_FORCE = 0.5
+"""Most that is given to two effects that are one force together: another form of that force would look the same."""
 _WITHOUT_EFFECT = 0.95
 """Probability given to the equations without an effect where they reach the noise floor."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """What is to be diagnosed.
-
-    Attributes
-    ----------
-    title
-        For people.
-    rig
-        The rig.
-    constants
-        Every constant of the rig.
-    given
-        Parameters of the simulation whose gap is in question; what is missing of the rig's is identified.
-    records
-        Estimation and validation records.
-    modelled
-        Effects that this simulation has already; `given` holds all their values.
-    """
-
-    title: str
-    rig: Rig
-    constants: Mapping[str, float]
-    given: Mapping[str, float]
-    records: tuple[Record, ...]
-    modelled: tuple[Effect, ...] = ()
 
 
 def diagnose(
@@ -106,66 +81,33 @@ def diagnose(
         If the rig's own equations cannot be simulated near the records.
     """
     say = progress or (lambda _: None)
-    estimation = tuple(r for r in task.records if r.role == "estimation")
-    validation = tuple(r for r in task.records if r.role == "validation")
-    if not estimation:
+    if not task.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
     notes = [note for record in task.records for note in record.notes]
-    scored_on = "validation" if validation else "estimation"
-    if not validation:
+    scored_on = "validation" if task.validation else "estimation"
+    if not task.validation:
         notes.append(
             "There is no validation record: errors are those of the records that were fitted, and too good."
         )
     floors = noise_floors(task.rig, task.records)
-    noise = {floor.output: floor.std for floor in floors}
     say("noise floor")
 
-    no_spring = _no_spring(task)
-    length = window_length(task.rig, estimation) if no_spring else None
-    start = _start(task, estimation)
-    fitted = cut(estimation, length)
-    bench = Workbench(
-        rig=task.rig,
-        estimation=fitted,
-        look=liveliest(fitted, task.rig.outputs[0].name),
-        scoring=cut(validation or estimation, length),
-        scales=characteristic_scales(task.rig, estimation, start),
-        noise=noise,
-        held=_held(task, estimation, no_spring),
-        modelled=task.modelled,
-        memory=memory,
-    )
-    linear = fit_linear(bench, start)
-    if not linear.residuals:
-        raise SimulationError(
-            f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
-        )
-    say("re-identified")
-    before = _before(task, bench, estimation, linear)
-    if task.given:
-        say("given simulation")
-    quality = data_quality(bench, task.records, linear)
-    singles = fit_candidates(bench, linear, effects, n_jobs, progress)
-
-    lower_bound = any(floor.lower_bound for floor in floors)
-    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    pairs = grown(bench, singles, effects, at_floor, n_jobs, prepare)
-
     rng = np.random.default_rng(seed)
-    vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    ranking = rank([*singles, *pairs], vector, rng, linear.excess)
-    if ranking.order and ranking.order[0].residuals:
-        ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
-        judgement = judge(before.excess, linear, ranking.order[0], lower_bound)
-    else:
-        judgement = Judgement("unknown", linear, "No candidate could be fitted.")
-    quality = with_best_model(quality, bench, judgement.model)
-    notes += [*quality.notes, judgement.reason]
-    diagnosis = _assembled(
-        task, bench, floors, before, linear, ranking, judgement, notes, length, scored_on, rng
-    )
-    lacking = _missing_force(bench, linear, no_spring, rng) if judgement.verdict == "unknown" else None
-    return replace(diagnosis, data_quality=quality, missing_force=lacking)
+    length = None if task.has_spring else window_length(task.rig, task.estimation)
+    found = examine(task, floors, effects, length, rng, n_jobs, say, prepare, memory)
+    if found.judgement.verdict == "unknown":
+        growth = growth_of_disturbances(found.bench, found.linear, found.judgement.model, rng)
+        if growth > _PREDICTABLE:
+            notes.append(
+                f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
+                "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
+            )
+    notes += [*found.quality.notes, found.judgement.reason]
+    diagnosis = _assembled(task, found, floors, notes, scored_on, rng)
+    lacking = None
+    if found.judgement.verdict == "unknown":
+        lacking = _missing_force(found.bench, found.linear, not task.has_spring, rng)
+    return replace(diagnosis, data_quality=found.quality, missing_force=lacking)
 
 
 def _missing_force(
@@ -178,84 +120,16 @@ def _missing_force(
     return missing_force(bench.rig, bench.estimation, linear.fit.values, bench.scales, noise, rng, no_spring)
 
 
-def _no_spring(task: Task) -> bool:
-    return task.rig.name == "axis" and task.given.get("k") == 0.0
-
-
-def _start(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
-    held = {"k": 0.0} if _no_spring(task) else {}
-    start = {**task.constants, **linear_start(task.rig, estimation, task.constants, held)}
-    # Numbers fitted without the effects that the simulation has are farther off than those it came with.
-    return {**start, **task.given} if task.modelled else start
-
-
-def _held(task: Task, estimation: Sequence[Record], no_spring: bool) -> frozenset[str]:
-    """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
-    held = {"k"} if no_spring else set()
-    unmeasured = [
-        symbol for symbol in task.rig.downstream if not any(symbol.name in record for record in estimation)
-    ]
-    if unmeasured:
-        held |= task.rig.downstream_parameters
-    return frozenset(held)
-
-
-def _before(task: Task, bench: Workbench, estimation: Sequence[Record], linear: Scored) -> Scored:
-    """Score the given simulation; parameters that were not given are identified with the given ones held."""
-    if not task.given:
-        return linear
-    structure = bench.composed()
-    start = {**_start(task, estimation), **linear.fit.values, **task.given}
-    missing = [name for name in bench.free_parameters(structure) if name not in task.given]
-    fit = bench.problem(structure, bench.estimation).fit(start, missing)
-    if not fit.residuals:
-        raise InputError(f"The given simulation cannot be run: {fit.message}")
-    return bench.score((), fit)
-
-
-def _with_offset_rivals(
-    bench: Workbench,
-    ranking: Ranking,
-    effects: Sequence[Effect],
-    noise: NDArray[np.float64],
-    rng: np.random.Generator,
-    gap: float,
-) -> Ranking:
-    """Let an even effect without a constant force compete where the best model needs a constant force.
-
-    A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
-    """
-    best = ranking.order[0]
-    released = bench.releasable_parameters(best.fit.structure)
-    needed = [
-        name
-        for name in best.fit.free
-        if name in released and abs(best.fit.values[name]) > _SIGNIFICANT * best.fit.standard_errors[name]
-    ]
-    if not needed:
-        return ranking
-    rivals = []
-    for effect in effects:
-        if effect.signature.even_harmonics and bench.rig.offers(effect):
-            base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
-            rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng, gap)
-
-
 def _assembled(
     task: Task,
-    bench: Workbench,
+    found: Examination,
     floors: Sequence[NoiseFloor],
-    before: Scored,
-    linear: Scored,
-    ranking: Ranking,
-    judgement: Judgement,
     notes: Sequence[str],
-    length: float | None,
     scored_on: str,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    rig = task.rig
+    rig, bench, before, linear = task.rig, found.bench, found.before, found.linear
+    ranking, judgement = found.ranking, found.judgement
     is_effect = judgement.verdict == "effect"
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else linear)
     noise = {floor.output: floor for floor in floors}
@@ -299,7 +173,7 @@ def _assembled(
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
         model=Model.of(after.fit.structure, after.fit.values, task.records[0].hold).to_json(),
         notes=tuple(notes),
-        windows=length,
+        windows=found.length,
         scored_on=scored_on,
         advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
         if is_effect
@@ -323,7 +197,20 @@ def _explained(judgement: Judgement, ranking: Ranking) -> float:
     left = max(ranking.order[0].excess - AT_FLOOR, 0.0)
     if judgement.verdict == "unknown":
         return 0.3 / (1.0 + left)
-    return 0.5 + 0.49 / (1.0 + left)
+    share = 0.5 + 0.49 / (1.0 + left)
+    return min(share, _ONE_FORCE) if _one_force(judgement.model.effects) else share
+
+
+def _one_force(effects: Sequence[Effect]) -> bool:
+    """Return True for two effects that are both forces without memory of the same signals: their sum is one more such force."""
+    if len(effects) < 2 or any(effect.torque is None or effect.states for effect in effects):
+        return False
+    read = [
+        {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
+        for effect in effects
+        if effect.torque is not None
+    ]
+    return all(signals == read[0] for signals in read)
 
 
 def _column(rig: Rig, model: Scored, output: str) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ than the resting rig shows, up to 1.44 of a gap of 50) and what relatives of unk
 of larger ones). A relative of an unknown cause may close 99 % of a large gap and still leaves more.
 """
 _HALF = 0.5
-"""Share of the re-identified gap that an effect must close to be named its cause, where the floor is only a lower bound.
+"""Share of the re-identified gap that an effect of an element must close to be named its cause above a lower bound of the floor.
 
 An assumption, not a result: measured hysteresis never has exactly the form of its equation (the dampers it was first tried on
 leave three to four times their noise floor), but a relative of an unknown cause may close as much.
@@ -42,7 +42,9 @@ def most_left(gap: float) -> float:
     return min(max(LEAST_LEFT, 1.0 + _LEFT_OF_GAP * (gap - 1.0)), MOST_LEFT)
 
 
-def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool = False) -> Judgement:
+def judge(
+    before_excess: float, linear: Scored, best: Scored, lower_bound: bool = False, is_driven: bool = True
+) -> Judgement:
     """Return the verdict on the held-out errors, all in units of the noise floor.
 
     Parameters
@@ -56,6 +58,8 @@ def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool 
     lower_bound
         True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
         may stand well above it, so that a modest rest which no model lowers is taken for noise.
+    is_driven
+        False for an element on a bench: where no mass smooths the force, no form of it is exact.
     """
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
     helps = best.excess * _WORTHWHILE < linear.excess
@@ -73,12 +77,13 @@ def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool 
         return Judgement("unknown", linear, "No effect of the catalogue lowers the held-out error.")
     closed = (linear.excess - best.excess) / (linear.excess - 1.0)
     nearest = f"The best candidate ({', '.join(best.names)}) closes {closed:.0%} of the re-identified gap"
-    allowed = most_left(linear.excess)
-    if not lower_bound and best.excess > allowed:
+    floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
+    allowed = AT_LOWER_BOUND if lower_bound else most_left(linear.excess)
+    if (is_driven or not lower_bound) and best.excess > allowed:
         return Judgement(
             "unknown",
             best,
-            f"{nearest} but leaves {best.excess:.3g} times the noise floor; a cause that is named must leave less than "
+            f"{nearest} but leaves {best.excess:.3g} times {floor}; a cause that is named must leave less than "
             f"{allowed:.3g} times. A disturbance that shows only while the rig moves would look the same: repeat one record, and "
             "what differs is disturbance.",
         )
@@ -86,7 +91,6 @@ def judge(before_excess: float, linear: Scored, best: Scored, lower_bound: bool 
         return Judgement("unknown", best, f"{nearest}, which is less than half.")
     if best.excess <= AT_FLOOR:
         return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
-    floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
     return Judgement(
         "effect",
         best,

@@ -70,6 +70,8 @@ class EffectRegression:
         for record in records:
             x, v = smooth_motion(record[response], record.dt)
             spectra = spectra_of(record, source, response)
+            if spectra.omega.size == 0:
+                continue  # a stretch in which the input rests
             self._motions.append(_Motion(spectra, x - rest, v, record[source]))
         inertia, damping = self._number(rig.motion.inertia), self._number(rig.motion.damping)
         stiffness = self._number(rig.motion.stiffness)
@@ -83,7 +85,7 @@ class EffectRegression:
 
     def start(self, effect: Effect) -> dict[str, float] | None:
         """Return values of rig and effect parameters to start from, None where the effect has no signal of its own."""
-        if effect.states or effect.spring is not None:
+        if effect.states or effect.spring is not None or not self._motions:
             return None
         if effect.torque is None and effect.deflection is None and effect.drive is None:
             return None

@@ -1,0 +1,193 @@
+"""What does every model leave of the same records, and what is judged from that?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
+from rigsight.diagnose.data_quality import data_quality, with_best_model
+from rigsight.diagnose.finding import DataQuality
+from rigsight.diagnose.grow import Prepare, grown
+from rigsight.diagnose.rank import Ranking, noise_vector, rank
+from rigsight.diagnose.result import NoiseFloor
+from rigsight.diagnose.task import Task
+from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge
+from rigsight.diagnose.windows import cut
+from rigsight.diagnose.workbench import Scored, Workbench, liveliest
+from rigsight.effects import Effect
+from rigsight.errors import InputError, SimulationError
+from rigsight.identify import FitMemory, characteristic_scales, linear_start
+
+_SIGNIFICANT = 3.0
+"""Standard errors from zero at which a constant force counts as needed."""
+
+
+@dataclass(frozen=True)
+class Examination:
+    """All models, fitted and scored on the same records.
+
+    Attributes
+    ----------
+    bench
+        Records, scales and noise.
+    length
+        Length of the windows into which records were cut [s]; None for whole records.
+    before, linear
+        The simulation in question, and its equations with the numbers that fit best.
+    ranking
+        The candidates.
+    judgement
+        The verdict.
+    quality
+        What the data are good for.
+    """
+
+    bench: Workbench
+    length: float | None
+    before: Scored
+    linear: Scored
+    ranking: Ranking
+    judgement: Judgement
+    quality: DataQuality
+
+
+def examine(
+    task: Task,
+    floors: Sequence[NoiseFloor],
+    effects: Sequence[Effect],
+    length: float | None,
+    rng: np.random.Generator,
+    n_jobs: int,
+    say: Callable[[str], None],
+    prepare: Prepare | None,
+    memory: FitMemory | None,
+) -> Examination:
+    """Fit the simulation in question, its equations and every candidate; rank and judge them.
+
+    Parameters
+    ----------
+    task
+        Records and the simulation in question.
+    floors
+        Noise floor of each output.
+    effects
+        Candidates.
+    length
+        Length of windows to cut records into [s]; None for whole records.
+    rng
+        Source of the resampling behind probabilities.
+    n_jobs, say, prepare, memory
+        As of `diagnose`.
+
+    Raises
+    ------
+    InputError
+        If the simulation in question cannot be run.
+    SimulationError
+        If the rig's own equations cannot be simulated near the records.
+    """
+    noise = {floor.output: floor.std for floor in floors}
+    start = _start(task)
+    fitted = cut(task.estimation, length)
+    bench = Workbench(
+        rig=task.rig,
+        estimation=fitted,
+        look=liveliest(fitted, task.rig.outputs[0].name),
+        scoring=cut(task.validation or task.estimation, length),
+        scales=characteristic_scales(task.rig, task.estimation, start),
+        noise=noise,
+        held=_held(task),
+        modelled=task.modelled,
+        memory=memory,
+    )
+    linear = fit_linear(bench, start)
+    if not linear.residuals:
+        raise SimulationError(
+            f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
+        )
+    say("re-identified")
+    before = _before(task, bench, linear)
+    if task.given:
+        say("given simulation")
+    quality = data_quality(bench, task.records, linear)
+    singles = fit_candidates(bench, linear, effects, n_jobs, say)
+
+    lower_bound = any(floor.lower_bound for floor in floors)
+    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
+    pairs = grown(bench, singles, effects, at_floor, n_jobs, prepare)
+
+    vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
+    ranking = rank([*singles, *pairs], vector, rng, linear.excess)
+    if ranking.order and ranking.order[0].residuals:
+        ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
+        judgement = judge(before.excess, linear, ranking.order[0], lower_bound, task.rig.is_driven)
+    else:
+        judgement = Judgement("unknown", linear, "No candidate could be fitted.")
+    quality = with_best_model(quality, bench, judgement.model)
+    return Examination(bench, length, before, linear, ranking, judgement, quality)
+
+
+def _start(task: Task) -> dict[str, float]:
+    held = {} if task.has_spring else {"k": 0.0}
+    start = {**task.constants, **linear_start(task.rig, task.estimation, task.constants, held)}
+    # Numbers fitted without the effects that the simulation has are farther off than those it came with.
+    return {**start, **task.given} if task.modelled else start
+
+
+def _held(task: Task) -> frozenset[str]:
+    """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
+    held = set() if task.has_spring else {"k"}
+    unmeasured = [
+        symbol
+        for symbol in task.rig.downstream
+        if not any(symbol.name in record for record in task.estimation)
+    ]
+    if unmeasured:
+        held |= task.rig.downstream_parameters
+    return frozenset(held)
+
+
+def _before(task: Task, bench: Workbench, linear: Scored) -> Scored:
+    """Score the given simulation; parameters that were not given are identified with the given ones held."""
+    if not task.given:
+        return linear
+    structure = bench.composed()
+    start = {**_start(task), **linear.fit.values, **task.given}
+    missing = [name for name in bench.free_parameters(structure) if name not in task.given]
+    fit = bench.problem(structure, bench.estimation).fit(start, missing)
+    if not fit.residuals:
+        raise InputError(f"The given simulation cannot be run: {fit.message}")
+    return bench.score((), fit)
+
+
+def _with_offset_rivals(
+    bench: Workbench,
+    ranking: Ranking,
+    effects: Sequence[Effect],
+    noise: NDArray[np.float64],
+    rng: np.random.Generator,
+    gap: float,
+) -> Ranking:
+    """Let an even effect without a constant force compete where the best model needs a constant force.
+
+    A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
+    """
+    best = ranking.order[0]
+    released = bench.releasable_parameters(best.fit.structure)
+    needed = [
+        name
+        for name in best.fit.free
+        if name in released and abs(best.fit.values[name]) > _SIGNIFICANT * best.fit.standard_errors[name]
+    ]
+    if not needed:
+        return ranking
+    rivals = []
+    for effect in effects:
+        if effect.signature.even_harmonics and bench.rig.offers(effect):
+            base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
+            rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
+    return rank([*ranking.order, *rivals], noise, rng, gap)
