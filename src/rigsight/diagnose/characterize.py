@@ -287,7 +287,11 @@ def _looked(
 
 
 def widened(
-    bench: Workbench, looks: Sequence[Look], n_jobs: int = 1, substeps: Sequence[int] | None = None
+    bench: Workbench,
+    looks: Sequence[Look],
+    n_jobs: int = 1,
+    substeps: Sequence[int] | None = None,
+    lowest: float = float("inf"),
 ) -> list[Look]:
     """Fit those looks roughly to the whole records that came near the best one in the liveliest stretches; drop the others.
 
@@ -301,8 +305,10 @@ def widened(
         Looks fitted at the same time.
     substeps
         Integration steps per sample of each record; None chooses them.
+    lowest
+        Mean squared error in the liveliest stretches that a look beside these has reached.
     """
-    lowest = min((look.nearest for look in looks), default=float("inf"))
+    lowest = min([lowest, *(look.nearest for look in looks)])
 
     def one(look: Look) -> Look:
         return replace(look, fits=_on_whole_records(bench, look.structure, look.free, look.fits, substeps))
@@ -327,11 +333,14 @@ def _on_whole_records(
     )
 
 
-def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
-    """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking."""
+def followed(bench: Workbench, look: Look, promising: bool, restart: bool = True) -> Scored:
+    """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking.
+
+    `restart` is False where many are followed of which only the best is worth fits from elsewhere.
+    """
     scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising, look.nearest)
-    if promising:
-        scored = _restarted(bench, scored)
+    if promising and restart:
+        scored = restarted(bench, scored)
     special = look.effects[-1].special_cases
     if promising and special:
         structure = bench.composed(look.effects, {n: v for n, v in look.structure.fixed if n not in special})
@@ -341,7 +350,7 @@ def followed(bench: Workbench, look: Look, promising: bool) -> Scored:
     return scored
 
 
-def _restarted(bench: Workbench, settled: Scored) -> Scored:
+def restarted(bench: Workbench, settled: Scored) -> Scored:
     """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
     near = bench.problem(structure, bench.look, _LOOK_ACCURACY)

@@ -10,13 +10,14 @@ S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forwa
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from joblib import Parallel, delayed
 
-from rigsight.diagnose.characterize import Look, followed, look_at, refine, widened
+from rigsight.diagnose.characterize import Look, followed, look_at, refine, restarted, widened
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure
@@ -28,9 +29,13 @@ _BEAM = 1.3
 _TIE = 1.01
 _WORTH_FOLLOWING = 0.85
 """Factor by which a second effect must lower the cost at a first look to be fitted with care."""
-_MOST_FOLLOWED = 4
-_BOTH_WAYS = 5
+_MOST_FOLLOWED = 6
+_NEAR_THE_BEST = 2.0
+"""Pairs that cost at most this many times the best at a first look are fitted with care."""
+_BOTH_WAYS = 6
 """Most promising pairs that are looked at from the fit of the second effect as well: a strong memory hides behind a first one."""
+_IN_ITS_PLACE = 1.5
+"""Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5
 """Share of what the best single leaves above the floor that a second effect must close, as the first must of the whole gap.
 
@@ -81,16 +86,21 @@ def grown(
     first = min(tied, key=lambda model: order[model.names[0]])
     beam = [first, *[model for model in close if model is not first and not _alike(first, model)][:1]]
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
+    alone = {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []
     for parent in beam:
-        pairs += _grown_from(bench, parent, pairs, usable, effects, n_jobs, prepare)
+        pairs += _grown_from(bench, parent, effects, pairs, usable, n_jobs, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
-        # What came second may be right and the first only its relative: another one may do better in its place.
-        for parent in usable:
-            if parent not in beam and parent.effects[0] in best_pair.effects:
-                pairs += _grown_from(bench, parent, pairs, usable, effects, n_jobs, prepare)
-    alone = {model.names[0]: model.excess for model in singles}
+        # What came second may be right and the first only its relative: another as good alone may do better in its place.
+        for second in (model for model in usable if model not in beam):
+            if second.effects[0] in best_pair.effects:
+                (name,) = set(best_pair.names) - set(second.names)
+                instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
+                pairs += _grown_from(bench, second, instead, pairs, usable, n_jobs, prepare)
+    if pairs:
+        best_pair = min(pairs, key=lambda pair: pair.excess)
+        pairs = [restarted(bench, best_pair), *(pair for pair in pairs if pair is not best_pair)]
     return [
         replace(pair, effects=tuple(sorted(pair.effects, key=lambda effect: alone[effect.name])))
         for pair in refine(bench, pairs, n_jobs)
@@ -101,9 +111,9 @@ def grown(
 def _grown_from(
     bench: Workbench,
     parent: Scored,
+    effects: Sequence[Effect],
     known: Sequence[Scored],
     singles: Sequence[Scored],
-    effects: Sequence[Effect],
     n_jobs: int,
     prepare: Prepare | None,
 ) -> list[Scored]:
@@ -137,26 +147,41 @@ def _pairs(
     if prepare is not None:
         prepare([_structure(bench, (*parent.effects, effect)) for effect in partners])
 
+    alone = {model.names[0]: model.fit for model in singles}
+
+    def steps(effect: Effect) -> tuple[int, ...]:
+        """Return substeps that serve both: a lag needs finer ones than its parent."""
+        own = alone.get(effect.name)
+        return base.substeps if own is None else tuple(map(max, base.substeps, own.substeps))
+
     def one(effect: Effect) -> Look:
-        return look_at(bench, (*parent.effects, effect), base, {}, substeps=base.substeps)
+        return look_at(bench, (*parent.effects, effect), base, {}, substeps=steps(effect))
 
     looks = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(effect) for effect in partners))
-    looks = sorted(widened(bench, looks, n_jobs, base.substeps), key=_cost)[:_BOTH_WAYS]
-    alone = {model.names[0]: model.fit for model in singles}
+    near = min((look.nearest for look in looks), default=float("inf"))
+
+    def wide(look: Look) -> list[Look]:
+        return widened(bench, [look], substeps=steps(look.effects[-1]), lowest=near)
+
+    found = Parallel(n_jobs=n_jobs, prefer="threads")(delayed(wide)(look) for look in looks)
+    looks = sorted(itertools.chain.from_iterable(found), key=_cost)[:_BOTH_WAYS]
 
     def other_way(found: Look) -> Look:
         second = found.effects[-1]
         if second.name not in alone:
             return found
-        turned = look_at(bench, (second, *parent.effects), alone[second.name], {}, substeps=base.substeps)
-        (wide,) = widened(bench, [turned], substeps=base.substeps)
-        return min(found, replace(wide, effects=found.effects), key=_cost)
+        substeps = steps(second)
+        turned = look_at(bench, (second, *parent.effects), alone[second.name], {}, substeps=substeps)
+        (wider,) = widened(bench, [turned], substeps=substeps)
+        return min(found, replace(wider, effects=found.effects), key=_cost)
 
     looks = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(other_way)(found) for found in looks))
-    promising = sorted((found for found in looks if found.cost <= _WORTH_FOLLOWING * base.cost), key=_cost)
+    lowest = min((found.cost for found in looks), default=float("inf"))
+    worth = min(_WORTH_FOLLOWING * base.cost, _NEAR_THE_BEST * lowest)
+    promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
 
     def follow(found: Look) -> Scored:
-        return followed(bench, found, promising=True)
+        return followed(bench, found, promising=True, restart=False)
 
     return list(
         Parallel(n_jobs=n_jobs, prefer="threads")(
