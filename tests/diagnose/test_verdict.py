@@ -73,10 +73,16 @@ def test_above_a_lower_bound_the_effect_of_an_element_must_close_half_of_the_gap
 
 
 def test_what_moves_a_mass_far_above_a_lower_bound_is_no_noise(verdict) -> None:
-    assert verdict(30.0, 30.0, 3.0 * BELOW, lower_bound=True).verdict == "effect"
-    found = verdict(30.0, 30.0, 3.0 * ABOVE, lower_bound=True)
+    assert verdict(12.0, 12.0, 3.0 * BELOW, lower_bound=True).verdict == "effect"
+    found = verdict(12.0, 12.0, 3.0 * ABOVE, lower_bound=True)
     assert found.verdict == "unknown"
     assert "the lower bound of the noise floor" in found.reason
+
+
+def test_far_above_a_lower_bound_nearly_all_of_the_gap_must_be_closed(verdict) -> None:
+    """From 101 to the floor at 1 are a hundred: closing ninety leaves eleven."""
+    assert verdict(101.0, 101.0, 11.0 * BELOW, lower_bound=True).verdict == "effect"
+    assert verdict(101.0, 101.0, 11.0 * ABOVE, lower_bound=True).verdict == "unknown"
 
 
 def test_an_effect_that_reaches_the_floor_is_named_whatever_the_gap_was(verdict) -> None:
