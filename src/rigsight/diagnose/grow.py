@@ -34,6 +34,8 @@ _NEAR_THE_BEST = 2.0
 """Pairs that cost at most this many times the best at a first look are fitted with care."""
 _BOTH_WAYS = 6
 """Most promising pairs that are looked at from the fit of the second effect as well: a strong memory hides behind a first one."""
+_MOST_STEPS = 4
+"""Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
 _IN_ITS_PLACE = 1.5
 """Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5
@@ -152,7 +154,9 @@ def _pairs(
     def steps(effect: Effect) -> tuple[int, ...]:
         """Return substeps that serve both: a lag needs finer ones than its parent."""
         own = alone.get(effect.name)
-        return base.substeps if own is None else tuple(map(max, base.substeps, own.substeps))
+        if own is None:
+            return base.substeps
+        return tuple(max(n, min(m, _MOST_STEPS)) for n, m in zip(base.substeps, own.substeps, strict=True))
 
     def one(effect: Effect) -> Look:
         return look_at(bench, (*parent.effects, effect), base, {}, substeps=steps(effect))
