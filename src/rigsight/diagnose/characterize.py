@@ -333,21 +333,25 @@ def _on_whole_records(
     )
 
 
-def followed(bench: Workbench, look: Look, promising: bool, restart: bool = True) -> Scored:
+def followed(bench: Workbench, look: Look, promising: bool, finish: bool = True) -> Scored:
     """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking.
 
-    `restart` is False where many are followed of which only the best is worth fits from elsewhere.
+    `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
     """
     scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising, look.nearest)
-    if promising and restart:
-        scored = restarted(bench, scored)
-    special = look.effects[-1].special_cases
-    if promising and special:
-        structure = bench.composed(look.effects, {n: v for n, v in look.structure.fixed if n not in special})
+    return finished(bench, scored) if promising and finish else scored
+
+
+def finished(bench: Workbench, scored: Scored) -> Scored:
+    """Fit on from elsewhere, and with exponents and constant forces free that were fixed so far, where that helps."""
+    scored = restarted(bench, scored)
+    fixed = scored.fit.structure.fixed
+    special = scored.effects[-1].special_cases
+    if special:
+        structure = bench.composed(scored.effects, {n: v for n, v in fixed if n not in special})
         scored = _released(bench, scored, structure, list(special))
-    if promising:
-        scored = _released(bench, scored, scored.fit.structure, bench.releasable_parameters(look.structure))
-    return scored
+    structure = scored.fit.structure
+    return _released(bench, scored, structure, bench.releasable_parameters(structure))
 
 
 def restarted(bench: Workbench, settled: Scored) -> Scored:

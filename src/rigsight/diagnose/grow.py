@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from rigsight.diagnose.characterize import Look, followed, look_at, refine, restarted, widened
+from rigsight.diagnose.characterize import Look, finished, followed, look_at, refine, widened
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure
@@ -34,6 +34,7 @@ _NEAR_THE_BEST = 2.0
 """Pairs that cost at most this many times the best at a first look are fitted with care."""
 _BOTH_WAYS = 6
 """Most promising pairs that are looked at from the fit of the second effect as well: a strong memory hides behind a first one."""
+_MOST_FINISHED = 2
 _MOST_STEPS = 4
 """Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
 _IN_ITS_PLACE = 1.5
@@ -100,9 +101,8 @@ def grown(
                 (name,) = set(best_pair.names) - set(second.names)
                 instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
                 pairs += _grown_from(bench, second, instead, pairs, usable, n_jobs, prepare)
-    if pairs:
-        best_pair = min(pairs, key=lambda pair: pair.excess)
-        pairs = [restarted(bench, best_pair), *(pair for pair in pairs if pair is not best_pair)]
+    pairs.sort(key=lambda pair: pair.excess)
+    pairs = [*(finished(bench, pair) for pair in pairs[:_MOST_FINISHED]), *pairs[_MOST_FINISHED:]]
     return [
         replace(pair, effects=tuple(sorted(pair.effects, key=lambda effect: alone[effect.name])))
         for pair in refine(bench, pairs, n_jobs)
@@ -185,7 +185,7 @@ def _pairs(
     promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
 
     def follow(found: Look) -> Scored:
-        return followed(bench, found, promising=True, restart=False)
+        return followed(bench, found, promising=True, finish=False)
 
     return list(
         Parallel(n_jobs=n_jobs, prefer="threads")(
