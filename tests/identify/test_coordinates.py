@@ -7,7 +7,7 @@ import pytest
 
 from rigsight.effects import effect_named
 from rigsight.identify.coordinates import Coordinates
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.simulate import compose, parameter_vector
 
 STRUCTURE = compose(AXIS, [effect_named("bouc_wen_hysteresis")], {"n": 1.0})
@@ -85,6 +85,17 @@ def test_more_memory_leaves_the_stiffness_without_it(coordinates: Coordinates) -
     p = dict(zip(STRUCTURE.names, coordinates.to_parameters(theta), strict=True))
     assert p["a"] * p["k"] == pytest.approx(VALUES["a"] * VALUES["k"], rel=1e-12)
     assert p["k"] > 10.0 * VALUES["k"]
+
+
+def test_a_spring_whose_stiffness_is_searched_by_its_logarithm_may_be_far_stiffer_than_the_loop() -> None:
+    structure = compose(RUNNING_GEAR, [effect_named("iwan_hysteresis")])
+    values = {p.name: 1.0 if p.default is None else p.default for p in structure.parameters}
+    values |= {"k_c": 2e4, "a": 1e-3}
+    free = ("k_c", "a")
+    searched = Coordinates.of(structure, free, values, {**SCALES, "force": 1.0, "x": 0.01})
+    p = dict(zip(structure.names, searched.to_parameters(searched.from_values(values)), strict=True))
+    assert p["k_c"] == pytest.approx(2e4, rel=1e-9)
+    assert p["a"] == pytest.approx(1e-3, rel=1e-9)
 
 
 def test_a_share_whose_stiffness_is_held_is_searched_as_itself() -> None:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 
@@ -101,6 +102,19 @@ def test_two_that_write_at_once_wait_for_each_other(tmp_path: Path, outcome_like
         list(pool.map(write, (0, 20, 40, 60)))
     with TrialStore(tmp_path / "t.sqlite") as store:
         assert len(store.scored()) == 80
+
+
+def test_of_many_that_begin_a_store_at_once_none_takes_it_for_a_foreign_one(tmp_path: Path) -> None:
+    together = Barrier(4)
+
+    def begin(file: Path) -> None:
+        together.wait()
+        with TrialStore(file) as store:
+            assert store.scored() == {}
+
+    with ThreadPoolExecutor(4) as pool:
+        for number in range(30):
+            list(pool.map(begin, [tmp_path / f"{number}.sqlite"] * 4))
 
 
 def test_a_damaged_file_and_one_of_another_version_say_how_to_mend_it(tmp_path: Path) -> None:

@@ -249,6 +249,11 @@ def look_at(
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
     nearest = _looked(bench, structure, free, starts, substeps)
+    if not np.isfinite(nearest[0].cost) and bench.start:
+        unbent = replace(base, values={**base.values, **bench.start})
+        nearest = _looked(
+            bench, structure, free, list(start_values(bench, structure, effects[-1], unbent, {})), substeps
+        )
     return Look(effects, structure, free, nearest, _mean_square(nearest[0]))
 
 

@@ -101,6 +101,7 @@ def examine(
         scales=characteristic_scales(task.rig, task.estimation, start),
         noise=noise,
         held=_held(task),
+        start=start,
         modelled=task.modelled,
         memory=memory,
     )

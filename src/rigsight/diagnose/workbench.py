@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,8 @@ class Workbench:
         Noise floor of each output.
     held
         Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
+    start
+        Values before any fit, of the given simulation or a regression: fits without the effect may bend them beyond use.
     modelled
         Effects that the simulation in question has already; every candidate is added to them.
     memory
@@ -85,6 +87,7 @@ class Workbench:
     scales: Mapping[str, float]
     noise: Mapping[str, float]
     held: frozenset[str]
+    start: Mapping[str, float] = field(default_factory=dict)
     modelled: tuple[Effect, ...] = ()
     memory: FitMemory | None = None
 

@@ -95,7 +95,8 @@ class Coordinates:
                 pairs.append(_Pair(first, second, pair.exponent))
         split = _split(structure, free)
         if split is not None:
-            most = min(upper[split.stiffness], _MOST_STIFFNESS)
+            stiffness = chosen[split.stiffness]
+            most = min(stiffness.upper / scale[split.stiffness], _MOST_STIFFNESS)
             lower[split.stiffness], upper[split.stiffness] = np.log(_LEAST_STIFFNESS), np.log(most)
             lower[split.share], upper[split.share] = 0.0, most
         return cls(

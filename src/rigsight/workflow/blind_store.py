@@ -81,10 +81,12 @@ class TrialStore:
 
     def _prepare(self) -> None:
         """Make the table in a new file, or check that an old one is what this version writes."""
-        version = self._connection.execute("PRAGMA user_version").fetchone()[0]
-        empty = self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
+        # Two processes may begin at once: both answers are read in one transaction, and the second process finds the table.
+        with self._connection:
+            self._connection.execute("BEGIN")
+            version = self._connection.execute("PRAGMA user_version").fetchone()[0]
+            empty = self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
         if empty:
-            # Two processes may begin at once: the second finds the table.
             with self._connection:
                 self._connection.execute("BEGIN IMMEDIATE")
                 self._connection.execute(_TABLE.replace("CREATE TABLE", "CREATE TABLE IF NOT EXISTS"))

@@ -62,6 +62,12 @@ class SearchBox:
                 continue
             reach = np.log(spread) if coordinates.logarithmic[i] else spread * max(1.0, abs(center[i]))
             lower[i], upper[i] = max(lower[i], center[i] - reach), min(upper[i], center[i] + reach)
+        split = coordinates.split
+        if split is not None:
+            # Both are parts of one stiffness, which is what the start knows.
+            whole = np.exp(center[split.stiffness]) + center[split.share]
+            lower[split.stiffness], upper[split.stiffness] = np.log(whole / spread), np.log(whole * spread)
+            lower[split.share], upper[split.share] = 0.0, whole * spread
         return cls(lower, upper)
 
     def coordinates(self, places: NDArray[np.float64]) -> NDArray[np.float64]:

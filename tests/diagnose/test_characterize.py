@@ -1,0 +1,37 @@
+"""A candidate gets a fair first look, whatever the fit without it has made of the other numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.characterize import look_at
+from rigsight.diagnose.workbench import Workbench
+from rigsight.effects import effect_named
+from rigsight.excitation import linear_sweep
+from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.records.record import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+DT, NOISE = 0.01, 1e-5
+CUBIC, HYSTERESIS = effect_named("cubic_stiffness"), effect_named("bouc_wen_hysteresis")
+GIVEN = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0, "k_3": 1e4}
+LOOP = {"A": 1.0, "n": 1.0, "a": 0.5, "beta": 200.0, "gamma": 200.0, "k": 150.0}
+
+
+def test_where_a_refit_is_bent_beyond_use_the_values_before_it_are_the_start() -> None:
+    t = DT * np.arange(3000)
+    run = Record("sweep", DT, {"u": linear_sweep(t, 2.0, 1.0, 40.0)}, {}, role="estimation", hold="zoh")
+    record = simulate(compose(AXIS, [CUBIC, HYSTERESIS]), {**GIVEN, **LOOP}, run)
+    scales = characteristic_scales(AXIS, [record], GIVEN)
+    modelled = compose(AXIS, [CUBIC])
+    refit = GreyBoxFit(modelled, [record], scales, {"x": NOISE}).fit(GIVEN, [])
+    bent = replace(refit, values={**refit.values, "k": 1.0, "k_3": -1e9})
+    bench = Workbench(
+        AXIS, (record,), (record,), (record,), scales, {"x": NOISE}, frozenset(), modelled=(CUBIC,)
+    )
+    assert not np.isfinite(look_at(bench, (HYSTERESIS,), bent, {}).cost)
+    rescued = look_at(replace(bench, start=GIVEN), (HYSTERESIS,), bent, {})
+    assert rescued.cost < 0.01 * refit.cost
