@@ -52,6 +52,8 @@ _ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-4
 _HOPELESS_EVALUATIONS = 8
 _REFINE_EVALUATIONS = 150
+"""With one integration step per sample; a model that takes more gets fewer: far stiffer ones follow a valley without end."""
+_FEWEST_REFINE_EVALUATIONS = 15
 _HOPELESS_TOLERANCE = 1e-2
 _NEAR = 25.0
 """A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
@@ -204,7 +206,7 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
             model.fit.values,
             model.fit.free,
             initial_states=model.fit.initial_states,
-            max_evaluations=_REFINE_EVALUATIONS,
+            max_evaluations=max(_FEWEST_REFINE_EVALUATIONS, _REFINE_EVALUATIONS // max(model.fit.substeps)),
         )
         if not result.residuals or result.cost > model.fit.cost * (1.0 + 1e-3):
             return model

@@ -37,6 +37,9 @@ _BOTH_WAYS = 6
 _MOST_FINISHED = 2
 _MOST_STEPS = 4
 """Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
+_FINEST_STEPS = 8
+"""Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
+and each of its partners would take as fine steps."""
 _IN_ITS_PLACE = 1.5
 """Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5
@@ -87,7 +90,8 @@ def grown(
     best = min(close, key=lambda model: (model.n_free, model.excess))
     tied = [model for model in close if model.n_free == best.n_free and model.excess <= _TIE * best.excess]
     first = min(tied, key=lambda model: order[model.names[0]])
-    beam = [first, *[model for model in close if model is not first and not _alike(first, model)][:1]]
+    others = [model for model in close if model is not first and not _alike(first, model)]
+    beam = [first, *[model for model in others if max(model.fit.substeps) <= _FINEST_STEPS][:1]]
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
     alone = {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []

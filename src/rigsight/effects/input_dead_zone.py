@@ -34,7 +34,7 @@ INPUT_DEAD_ZONE = Effect(
             upper=1e300,
             null=0.0,
             starts=(0.05, 0.2),
-            search=(0.0, 1.0),
+            search=(0.0, 2.0),
         ),
     ),
     energy=Energy.ACTIVE,

@@ -34,7 +34,7 @@ INPUT_SATURATION = Effect(
             upper=1e300,
             null=1e300,
             starts=(0.8, 0.4),
-            search=(0.02, 1.0),
+            search=(0.02, 2.0),
         ),
     ),
     energy=Energy.ACTIVE,
