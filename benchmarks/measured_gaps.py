@@ -1,6 +1,6 @@
-"""What does a diagnosis with the whole catalogue say of measured gaps, and how long does it take? python measured_gaps.py CAMPAIGN...
+"""What does a diagnosis with all effects say of measured gaps, in what time? python benchmarks/measured_gaps.py CAMPAIGN...
 
-The tests let only a few effects compete on measured records; this is the whole thing.
+The tests let only a few effects compete on measured records; this is the whole catalogue.
 """
 
 from __future__ import annotations
