@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.windows import cut, window_length
+from rigsight.diagnose.windows import Windowing, cut, window_length
+from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 
@@ -69,3 +70,40 @@ def test_a_fast_motion_in_a_long_record_keeps_the_number_of_windows_small() -> N
 
 def test_a_window_keeps_enough_samples_for_its_initial_state() -> None:
     assert window_length(AXIS, [moving(80.0, 1000)]) >= 100 * DT
+
+
+def swept(n_samples: int = 8000, quiet: int = 500) -> Record:
+    t = DT * np.arange(n_samples)
+    x = linear_sweep(t, 1.0, 1.0, 40.0)
+    x[:quiet] = 0.0
+    return Record("sweep", DT, {"x": x}, {"x": "m"}, role="estimation")
+
+
+def test_windows_of_cycles_join_to_the_record_and_hold_as_many_cycles_each() -> None:
+    record = swept()
+    windows = Windowing.by_cycles("x", 1e-3).cut([record])
+    np.testing.assert_array_equal(np.concatenate([w["x"] for w in windows]), record["x"])
+    cycles = [np.count_nonzero((w["x"][:-1] < 0.0) & (w["x"][1:] >= 0.0)) for w in windows[1:-1]]
+    assert len(cycles) > 10
+    assert {3, 4, 5} >= set(cycles)
+    assert windows[1].n_samples > 3 * windows[-2].n_samples
+    assert all(w.role == "estimation" for w in windows)
+
+
+def test_windows_of_cycles_are_long_enough_to_fit_an_initial_state() -> None:
+    windows = Windowing.by_cycles("x", 1e-3).cut([swept(2000, quiet=0)])
+    assert min(w.n_samples for w in windows) >= 60
+
+
+def test_noise_makes_no_cycles() -> None:
+    rng = np.random.default_rng(0)
+    record = Record("rest", DT, {"x": 1e-3 * rng.standard_normal(4000)}, {"x": "m"})
+    assert len(Windowing.by_cycles("x", 1e-3).cut([record])) < 4
+
+
+def test_without_length_and_cycles_records_stay_whole() -> None:
+    record = swept()
+    assert Windowing().whole
+    assert Windowing().cut([record]) == (record,)
+    assert not Windowing(length=3.3).whole
+    assert len(Windowing(length=3.3).cut([record])) == len(cut([record], 3.3))

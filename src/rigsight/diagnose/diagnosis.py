@@ -13,7 +13,7 @@ from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.grow import Prepare
 from rigsight.diagnose.localize import localize
-from rigsight.diagnose.predictability import growth_of_disturbances
+from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
 from rigsight.diagnose.quantify import budget_intervals, effect_shares
 from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.result import (
@@ -26,7 +26,7 @@ from rigsight.diagnose.result import (
 )
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, Judgement
-from rigsight.diagnose.windows import WINDOW, window_length
+from rigsight.diagnose.windows import WINDOW, Windowing, window_length
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
@@ -37,8 +37,6 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
-_PREDICTABLE = 3.0
-"""Growth of a disturbance, beside what it does to the linear rig, up to which free run is a fair test; an assumption."""
 _ONE_FORCE = 0.5
 """Most that is given to two effects that are one force together: another form of that force would look the same."""
 _WITHOUT_EFFECT = 0.95
@@ -93,11 +91,16 @@ def diagnose(
     say("noise floor")
 
     rng = np.random.default_rng(seed)
-    length = None if task.has_spring else window_length(task.rig, task.estimation)
-    found = examine(task, floors, effects, length, rng, n_jobs, say, prepare, memory)
-    if found.judgement.verdict == "unknown":
+    windowing = Windowing(None if task.has_spring else window_length(task.rig, task.estimation))
+    found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
+    if found.windowing.cycles is not None:
+        notes.append(
+            "In free run a disturbance no larger than the noise would change the motion much more than the noise does: the "
+            f"records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own initial state."
+        )
+    elif found.judgement.verdict == "unknown":
         growth = growth_of_disturbances(found.bench, found.linear, found.judgement.model, rng)
-        if growth > _PREDICTABLE:
+        if growth > PREDICTABLE:
             notes.append(
                 f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
                 "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
@@ -173,7 +176,8 @@ def _assembled(
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
         model=Model.of(after.fit.structure, after.fit.values, task.records[0].hold).to_json(),
         notes=tuple(notes),
-        windows=found.length,
+        windows=found.windowing.length,
+        window_cycles=found.windowing.cycles,
         scored_on=scored_on,
         advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
         if is_effect

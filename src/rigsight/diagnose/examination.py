@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.chance import fitted_in_windows, is_predictable
 from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.finding import DataQuality
@@ -16,7 +17,7 @@ from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge
-from rigsight.diagnose.windows import cut
+from rigsight.diagnose.windows import Windowing
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
@@ -34,8 +35,8 @@ class Examination:
     ----------
     bench
         Records, scales and noise.
-    length
-        Length of the windows into which records were cut [s]; None for whole records.
+    windowing
+        How records were cut.
     before, linear
         The simulation in question, and its equations with the numbers that fit best.
     ranking
@@ -47,7 +48,7 @@ class Examination:
     """
 
     bench: Workbench
-    length: float | None
+    windowing: Windowing
     before: Scored
     linear: Scored
     ranking: Ranking
@@ -59,7 +60,7 @@ def examine(
     task: Task,
     floors: Sequence[NoiseFloor],
     effects: Sequence[Effect],
-    length: float | None,
+    windowing: Windowing,
     rng: np.random.Generator,
     n_jobs: int,
     say: Callable[[str], None],
@@ -76,8 +77,8 @@ def examine(
         Noise floor of each output.
     effects
         Candidates.
-    length
-        Length of windows to cut records into [s]; None for whole records.
+    windowing
+        How to cut records; whole ones are cut in the end where the motion cannot be predicted for as long as they last.
     rng
         Source of the resampling behind probabilities.
     n_jobs, say, prepare, memory
@@ -91,21 +92,54 @@ def examine(
         If the rig's own equations cannot be simulated near the records.
     """
     noise = {floor.output: floor.std for floor in floors}
-    start = _start(task)
-    fitted = cut(task.estimation, length)
-    bench = Workbench(
-        rig=task.rig,
-        estimation=fitted,
-        look=liveliest(fitted, task.rig.outputs[0].name),
-        scoring=cut(task.validation or task.estimation, length),
-        scales=characteristic_scales(task.rig, task.estimation, start),
-        noise=noise,
-        held=_held(task),
-        start=start,
-        modelled=task.modelled,
-        memory=memory,
-    )
-    linear = fit_linear(bench, start)
+    lower_bound = any(floor.lower_bound for floor in floors)
+    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
+    models = _singly(task, noise, effects, windowing, n_jobs, say, memory)
+    pairs: list[Scored] = []
+    in_windows = None
+    if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
+        in_windows = _in_windows(task, noise, models, at_floor, n_jobs, say)
+    if in_windows is None:
+        pairs = grown(models.bench, models.singles, effects, at_floor, n_jobs, prepare)
+    else:
+        models = in_windows
+    bench, before, linear = models.bench, models.before, models.linear
+
+    vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
+    ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)
+    if ranking.order and ranking.order[0].residuals:
+        if in_windows is None:
+            ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
+        judgement = judge(before.excess, linear, ranking.order[0], lower_bound, task.rig.is_driven)
+    else:
+        judgement = Judgement("unknown", linear, "No candidate could be fitted.")
+    quality = with_best_model(models.quality, bench, judgement.model)
+    return Examination(models.bench, models.windowing, before, linear, ranking, judgement, quality)
+
+
+@dataclass(frozen=True)
+class _Singly:
+    """What every effect explains by itself."""
+
+    windowing: Windowing
+    bench: Workbench
+    before: Scored
+    linear: Scored
+    quality: DataQuality
+    singles: list[Scored]
+
+
+def _singly(
+    task: Task,
+    noise: Mapping[str, float],
+    effects: Sequence[Effect],
+    windowing: Windowing,
+    n_jobs: int,
+    say: Callable[[str], None],
+    memory: FitMemory | None,
+) -> _Singly:
+    bench = _bench(task, noise, windowing, memory)
+    linear = fit_linear(bench, bench.start)
     if not linear.residuals:
         raise SimulationError(
             f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
@@ -116,20 +150,46 @@ def examine(
         say("given simulation")
     quality = data_quality(bench, task.records, linear)
     singles = fit_candidates(bench, linear, effects, n_jobs, say)
+    return _Singly(windowing, bench, before, linear, quality, singles)
 
-    lower_bound = any(floor.lower_bound for floor in floors)
-    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    pairs = grown(bench, singles, effects, at_floor, n_jobs, prepare)
 
-    vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    ranking = rank([*singles, *pairs], vector, rng, linear.excess)
-    if ranking.order and ranking.order[0].residuals:
-        ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
-        judgement = judge(before.excess, linear, ranking.order[0], lower_bound, task.rig.is_driven)
-    else:
-        judgement = Judgement("unknown", linear, "No candidate could be fitted.")
-    quality = with_best_model(quality, bench, judgement.model)
-    return Examination(bench, length, before, linear, ranking, judgement, quality)
+def _in_windows(
+    task: Task,
+    noise: Mapping[str, float],
+    models: _Singly,
+    at_floor: float,
+    n_jobs: int,
+    say: Callable[[str], None],
+) -> _Singly | None:
+    """Return the models in windows of a few cycles if one of them explains the records there, else None."""
+    output = task.rig.outputs[0].name
+    windowing = Windowing.by_cycles(output, noise[output])
+    bench = _bench(task, noise, windowing, models.bench.memory)
+    linear = fit_linear(bench, models.linear.fit.values)
+    singles = fitted_in_windows(bench, linear, models.singles, n_jobs)
+    say("in windows")
+    if not linear.residuals or not min(model.excess for model in singles) <= at_floor < linear.excess:
+        return None
+    return _Singly(windowing, bench, _before(task, bench, linear), linear, models.quality, singles)
+
+
+def _bench(
+    task: Task, noise: Mapping[str, float], windowing: Windowing, memory: FitMemory | None
+) -> Workbench:
+    start = _start(task)
+    fitted = windowing.cut(task.estimation)
+    return Workbench(
+        rig=task.rig,
+        estimation=fitted,
+        look=liveliest(fitted, task.rig.outputs[0].name),
+        scoring=windowing.cut(task.validation or task.estimation),
+        scales=characteristic_scales(task.rig, task.estimation, start),
+        noise=noise,
+        held=_held(task),
+        start=start,
+        modelled=task.modelled,
+        memory=memory,
+    )
 
 
 def _start(task: Task) -> dict[str, float]:

@@ -11,6 +11,8 @@ from rigsight.errors import SimulationError
 from rigsight.records.record import Record
 from rigsight.simulate import record_input, simulate_outputs
 
+PREDICTABLE = 3.0
+"""Growth of a disturbance, beside what it does to the linear rig, up to which free run is a fair test; an assumption."""
 _ACCURACY = 1e-5
 _DRAWS = 4
 

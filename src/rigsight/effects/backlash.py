@@ -38,7 +38,7 @@ BACKLASH = Effect(
             upper=1e9,
             null=0.0,
             starts=(0.05, 0.3),
-            search=(0.0, 2.0),
+            search=(0.0, 1.0),
         ),
     ),
     energy=Energy.ACTIVE,

@@ -39,7 +39,7 @@ END_STOP = Effect(
             starts=(1.0, 5.0),
             search=(0.0, 300.0),
         ),
-        Parameter("s", "clearance", "x", lower=0.0, upper=1e9, starts=(1.1, 0.7, 0.3), search=(0.0, 3.0)),
+        Parameter("s", "clearance", "x", lower=0.0, upper=1e9, starts=(0.7, 0.3, 1.1), search=(0.0, 3.0)),
     ),
     energy=Energy.CONSERVATIVE,
     signature=Signature(gain_trend=GainTrend.FALLS),

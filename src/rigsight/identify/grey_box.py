@@ -21,50 +21,48 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.errors import SimulationError
-from rigsight.identify.coordinates import STEP, Coordinates
+from rigsight.identify.coordinates import Coordinates
 from rigsight.identify.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
+from rigsight.identify.fit_problem import MOST_SUBSTEPS, FitData, Problem, RecordData
 from rigsight.identify.fit_result import FitResult
+from rigsight.identify.separate_states import SeparateStates
 from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
-    choose_substeps,
     record_input,
     simulate_outputs,
     simulate_sets,
-    state_limits,
 )
-from rigsight.simulate.input_hold import HeldInput
 from rigsight.units import characteristic_value
 
 DEFAULT_ACCURACY = 1e-4
 """Relative accuracy of simulations inside a fit: below the noise of any bench."""
-_MOST_SUBSTEPS = 16
-"""A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
 _MOST_ROUNDS = 4
 """Fits that follow each other with finer steps."""
-_WORTH_REFINING = 1e-3
-"""Share of the cost that finer steps must promise to remove."""
+_WORTH_A_ROUND = 1e-3
+"""Share of the cost that a round must have removed for another one."""
 _STATE_RANGE = 20.0
 """How far an initial state may move from its guess, in units of its size."""
-_LEAST_RANGE = 1e-9
-"""Least unit of a limited state, in units of its size: a play of zero has no range."""
-_WORSE = 1e3
 _FIRST_SUBSTEPS = 4
 _FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
 """Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
 
 
 @dataclass(frozen=True)
-class _Data:
-    """One record as the fit sees it."""
+class _Begin:
+    """Where a search starts: parameters and initial states together, and the states with their bounds per record."""
 
-    record: Record
-    held: HeldInput
-    measured: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    first_state: NDArray[np.float64]
+    coordinates: Coordinates
+    theta: NDArray[np.float64]
+    places: list[NDArray[np.float64]]
+    lower: list[NDArray[np.float64]]
+    upper: list[NDArray[np.float64]]
+
+    @property
+    def n_states(self) -> int:
+        return self.lower[0].size
 
 
 class GreyBoxFit:
@@ -100,10 +98,14 @@ class GreyBoxFit:
         self.scales = dict(scales)
         self.accuracy = accuracy
         sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
-        self._state_sizes = np.array(sizes).reshape(-1, 1)
-        self._limited = np.array([equation.limit is not None for equation in structure.equations], dtype=bool)
         names = [signal.name for signal in structure.rig.outputs]
-        self._data = [self._prepared(record, names, output_noise) for record in records]
+        self.data = FitData(
+            structure=structure,
+            records=tuple(self._prepared(record, names, output_noise) for record in records),
+            limited=np.array([equation.limit is not None for equation in structure.equations], dtype=bool),
+            unlimited_sizes=np.array(sizes).reshape(-1, 1),
+            accuracy=accuracy,
+        )
         self._problem: list[Any] = []
         if memory is not None:
             self._problem = [
@@ -111,17 +113,19 @@ class GreyBoxFit:
                 list(structure.names),
                 sorted(self.scales.items()),
                 [record_digest(record) for record in records],
-                [d.weights.tolist() for d in self._data],
+                [d.weights.tolist() for d in self.data.records],
                 accuracy,
             ]
-        self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self._data))
+        self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self.data.records))
 
-    def _prepared(self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]) -> _Data:
+    def _prepared(
+        self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
+    ) -> RecordData:
         missing = np.full(record.n_samples, np.nan)
         measured = np.column_stack([record.signals.get(n, missing) for n in names])
         weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
         guess = first_state(self.structure, record)
-        return _Data(record, record_input(self.structure, record), measured, weights, guess)
+        return RecordData(record, record_input(self.structure, record), measured, weights, guess)
 
     def fit(
         self,
@@ -157,20 +161,11 @@ class GreyBoxFit:
         The result; ``success`` is False, with the reason as ``message``, where the start cannot be simulated or the
         optimizer ran out of evaluations.
         """
-        coordinates = Coordinates.of(self.structure, free, start, self.scales)
-        n_states = len(self.structure.states)
-        states = list(initial_states) if initial_states is not None else self._first_states(start)
-        own = coordinates.from_values(start)
-        sizes = self.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
-        places = [np.where(self._limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
-        theta = np.concatenate([own, *places])
-        lower = np.concatenate(
-            [coordinates.lower, *(np.where(self._limited, -1.0, x - _STATE_RANGE) for x in places)]
-        )
-        upper = np.concatenate(
-            [coordinates.upper, *(np.where(self._limited, 1.0, x + _STATE_RANGE) for x in places)]
-        )
-        problem = _Problem(self, coordinates, n_states, upper)
+        begin = self._begin(start, free, initial_states)
+        coordinates, theta = begin.coordinates, begin.theta
+        lower = np.concatenate([coordinates.lower, *begin.lower])
+        upper = np.concatenate([coordinates.upper, *begin.upper])
+        problem = Problem(self.data, coordinates, begin.n_states, upper)
         if substeps is None:
             problem.choose_substeps(theta)
         else:
@@ -210,6 +205,97 @@ class GreyBoxFit:
             self.memory.remember(key, {**outcome, **steps})
         return result
 
+    def fit_windows(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        max_evaluations: int = 40,
+        tolerance: float = 1e-5,
+        most_rounds: int = 5,
+    ) -> FitResult:
+        """Fit the free parameters to many short records, each with the initial state that suits the parameters best.
+
+        For motion whose memory sticks and slips: `fit`, which moves everything together, stops far from the best place there.
+
+        Parameters
+        ----------
+        start, free
+            As of `fit`.
+        max_evaluations
+            Limit for the optimizer in each round.
+        tolerance
+            Relative change of the cost at which a round ends.
+        most_rounds
+            Rounds; between them limited states try other places.
+
+        Returns
+        -------
+        As of `fit`.
+        """
+        begin = self._begin(start, free, None)
+        coordinates = begin.coordinates
+        own = begin.theta[: len(free)]
+        problem = SeparateStates(self.data, coordinates, begin.places, begin.lower, begin.upper)
+        problem.choose_substeps(begin.theta)
+        key = self._key(
+            coordinates, start, begin.theta, (max_evaluations, tolerance, [*problem.substeps, most_rounds])
+        )
+        known = None if self.memory is None else self.memory.recall(key)
+        success, message = True, "Nothing to fit but initial states."
+        if known is None:
+            cost = problem.settle_anew(own)
+            if not np.isfinite(cost):
+                return self._failed(coordinates, begin.theta, "The start values cannot be simulated.")
+            for _ in range(most_rounds if free else 0):
+                solution = least_squares(
+                    problem.residual,
+                    own,
+                    jac=problem.jacobian,
+                    bounds=(coordinates.lower, coordinates.upper),
+                    method="trf",
+                    x_scale="jac",
+                    ftol=tolerance,
+                    xtol=0.1 * tolerance,
+                    gtol=1e-3 * tolerance,
+                    max_nfev=max_evaluations,
+                )
+                own, success, message = solution.x, bool(solution.status > 0), str(solution.message)
+                before, cost = cost, problem.settle_anew(own)
+                if cost > (1.0 - _WORTH_A_ROUND) * before:
+                    break
+            theta = np.concatenate([own, *problem.places])
+        else:
+            theta, success, message = np.array(known["theta"]), known["success"], known["message"]
+            problem.n_evaluations, problem.substeps = known["evaluations"] - 1, list(known["substeps"])
+        together = Problem(self.data, coordinates, begin.n_states, problem.upper)
+        together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
+        result = self._result(together, theta, success, message, finish=True)
+        if known is None and self.memory is not None:
+            outcome = {"theta": theta.tolist(), "success": success, "message": message}
+            steps = {"evaluations": result.n_evaluations, "substeps": problem.substeps}
+            self.memory.remember(key, {**outcome, **steps})
+        return result
+
+    def _begin(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        initial_states: Sequence[NDArray[np.float64]] | None,
+    ) -> _Begin:
+        coordinates = Coordinates.of(self.structure, free, start, self.scales)
+        states = list(initial_states) if initial_states is not None else self._first_states(start)
+        own = coordinates.from_values(start)
+        sizes = self.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
+        limited = self.data.limited
+        places = [np.where(limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
+        return _Begin(
+            coordinates=coordinates,
+            theta=np.concatenate([own, *places]),
+            places=places,
+            lower=[np.where(limited, -1.0, place - _STATE_RANGE) for place in places],
+            upper=[np.where(limited, 1.0, place + _STATE_RANGE) for place in places],
+        )
+
     def _key(
         self,
         coordinates: Coordinates,
@@ -224,13 +310,13 @@ class GreyBoxFit:
 
     def _first_states(self, start: Mapping[str, float]) -> list[NDArray[np.float64]]:
         """Return each record's guess; of several for states with a range, and of moving and resting, the best."""
-        guesses = [d.first_state for d in self._data]
-        if not np.any(self._limited):
+        guesses = [d.first_state for d in self.data.records]
+        if not np.any(self.data.limited):
             return guesses
         p = np.array([start[name] for name in self.structure.names])
-        ranges = np.where(self._limited, self.state_sizes(p[:, None])[:, 0], 0.0)
+        ranges = np.where(self.data.limited, self.data.state_sizes(p[:, None])[:, 0], 0.0)
         found = []
-        for data, guess in zip(self._data, guesses, strict=True):
+        for data, guess in zip(self.data.records, guesses, strict=True):
             at_rest = state_at_rest(self.structure, data.record, guess)
             lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
             n_samples = data.record.n_samples
@@ -252,18 +338,18 @@ class GreyBoxFit:
             message=message,
             values=dict(zip(self.structure.names, map(float, p), strict=True)),
             standard_errors=dict.fromkeys(coordinates.free, float("inf")),
-            initial_states=tuple(d.first_state for d in self._data),
+            initial_states=tuple(d.first_state for d in self.data.records),
             cost=float("inf"),
             n_samples=self.n_samples,
             n_evaluations=1,
             free=coordinates.free,
             covariance=np.full((n, n), np.inf),
             residuals=(),
-            substeps=(_MOST_SUBSTEPS,) * len(self._data),
+            substeps=(MOST_SUBSTEPS,) * len(self.data.records),
         )
 
     def _result(
-        self, problem: _Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
+        self, problem: Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
     ) -> FitResult:
         coordinates = problem.coordinates
         n_free = len(coordinates.free)
@@ -277,14 +363,16 @@ class GreyBoxFit:
                 residuals = tuple(
                     d.measured
                     - simulate_outputs(self.structure, d.held, p, s, d.record.n_samples, self.accuracy)
-                    for d, s in zip(self._data, states, strict=True)
+                    for d, s in zip(self.data.records, states, strict=True)
                 )
             except SimulationError as error:
                 return self._failed(coordinates, theta, str(error))
             cost = float(
-                sum(np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self._data, strict=True))
+                sum(
+                    np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self.data.records, strict=True)
+                )
             )
-            outputs = [int(np.count_nonzero(d.weights)) for d in self._data]
+            outputs = [int(np.count_nonzero(d.weights)) for d in self.data.records]
             covariance = colored_covariance(problem.sensitivities(theta), n_free, outputs)
             covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
@@ -303,184 +391,3 @@ class GreyBoxFit:
             residuals=residuals,
             substeps=tuple(problem.substeps),
         )
-
-    @property
-    def data(self) -> list[_Data]:
-        """The records as the fit sees them."""
-        return self._data
-
-    def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
-
-        A state that cannot leave a range is moved in units of that range, whatever the parameters make of it: beyond an end
-        nothing depends on it, and a fit that wandered there would not come back.
-        """
-        sizes = np.repeat(self._state_sizes, p.shape[1], axis=1)
-        if np.any(self._limited):
-            limits = state_limits(self.structure, p)
-            sizes[self._limited] = np.maximum(limits[self._limited], _LEAST_RANGE * sizes[self._limited])
-        return sizes
-
-
-@dataclass(frozen=True)
-class _Evaluation:
-    theta: NDArray[np.float64]
-    cost: float
-    normal: NDArray[np.float64]
-    gradient: NDArray[np.float64]
-
-
-class _Problem:
-    """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
-
-    def __init__(
-        self,
-        fit: GreyBoxFit,
-        coordinates: Coordinates,
-        n_states: int,
-        upper: NDArray[np.float64],
-    ) -> None:
-        self.fit = fit
-        self.coordinates = coordinates
-        self.n_states = n_states
-        self.upper = upper
-        self.n_free = len(coordinates.free)
-        self.n_evaluations = 0
-        self.substeps = [_MOST_SUBSTEPS] * len(fit.data)
-        self._last: _Evaluation | None = None
-        self._best = float("inf")
-
-    def states(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Return the initial states per record."""
-        places = theta[self.n_free :].reshape(len(self.fit.data), self.n_states)
-        sizes = self.fit.state_sizes(self.coordinates.to_parameters(theta[: self.n_free])[:, None])[:, 0]
-        return [row * sizes for row in places]
-
-    def choose_substeps(self, theta: NDArray[np.float64]) -> None:
-        """Choose the substeps of each record from the accuracy wish at these coordinates."""
-        p = self.coordinates.to_parameters(theta[: self.n_free])
-        for i, (data, state) in enumerate(zip(self.fit.data, self.states(theta), strict=True)):
-            try:
-                self.substeps[i] = choose_substeps(
-                    self.fit.structure,
-                    data.held,
-                    p,
-                    state,
-                    data.record.n_samples,
-                    self.fit.accuracy,
-                    _MOST_SUBSTEPS,
-                )
-            except SimulationError:
-                self.substeps[i] = _MOST_SUBSTEPS
-
-    def refined(self, theta: NDArray[np.float64]) -> bool:
-        """Double the substeps if the cost would then fall further from here; return True if so."""
-        before = self.substeps
-        within_reach = self._removable(theta)
-        self.substeps = [min(2 * n, _MOST_SUBSTEPS) for n in before]
-        self._last = None
-        if self.substeps != before and self._removable(theta) > within_reach + _WORTH_REFINING:
-            self._best = float("inf")
-            return True
-        self.substeps, self._last = before, None
-        return False
-
-    def _removable(self, theta: NDArray[np.float64]) -> float:
-        """Return the share of the cost that a full Gauss-Newton step promises to remove."""
-        evaluation = self.at(theta)
-        if not np.isfinite(evaluation.cost):
-            return 0.0
-        _, projection = _compressed(evaluation)
-        return float(projection @ projection) / max(evaluation.cost, 1e-300)
-
-    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a vector with the same cost and the same projection on the derivatives as the residuals."""
-        evaluation = self.at(theta)
-        if not np.isfinite(evaluation.cost):
-            stand_in = np.zeros(theta.size + 1)
-            stand_in[-1] = np.sqrt(_WORSE * self._best)
-            return stand_in
-        _, projection = _compressed(evaluation)
-        rest = max(evaluation.cost - float(projection @ projection), 0.0)
-        return np.append(projection, np.sqrt(rest))
-
-    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives that go with `residual`."""
-        root, _ = _compressed(self.at(theta))
-        return np.vstack([root, np.zeros(theta.size)])
-
-    def at(self, theta: NDArray[np.float64]) -> _Evaluation:
-        """Evaluate, or return the last evaluation if it was here."""
-        if self._last is not None and np.array_equal(self._last.theta, theta):
-            return self._last
-        n = theta.size
-        normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
-        for index, (residual, derivative) in enumerate(self.sensitivities(theta)):
-            columns = self._columns(index)
-            # A diverging simulation overflows here; that is what the check below is for.
-            with np.errstate(over="ignore", invalid="ignore"):
-                cost += float(residual @ residual)
-                normal[np.ix_(columns, columns)] += derivative.T @ derivative
-                gradient[columns] += derivative.T @ residual
-        if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
-            cost = float("inf")
-        self._best = min(self._best, cost)
-        self._last = _Evaluation(theta.copy(), cost, normal, gradient)
-        self.n_evaluations += 1
-        return self._last
-
-    def _columns(self, index: int) -> NDArray[np.intp]:
-        own = self.n_free + index * self.n_states + np.arange(self.n_states)
-        return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
-
-    def sensitivities(
-        self, theta: NDArray[np.float64]
-    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
-        shifts = np.where(theta + STEP > self.upper, -STEP, STEP)
-        base = self.coordinates.to_parameters(theta[: self.n_free])
-        shifted = []
-        for i in range(self.n_free):
-            moved = theta[: self.n_free].copy()
-            moved[i] += shifts[i]
-            shifted.append(self.coordinates.to_parameters(moved))
-        p = np.column_stack([base, *shifted, *[base] * self.n_states])
-        sizes = self.fit.state_sizes(p)
-        results = []
-        for index, data in enumerate(self.fit.data):
-            columns = self._columns(index)
-            step = shifts[columns]
-            places = np.repeat(theta[columns[self.n_free :], None], p.shape[1], axis=1)
-            for i in range(self.n_states):
-                places[i, 1 + self.n_free + i] += step[self.n_free + i]
-            x0 = places * sizes
-            with np.errstate(all="ignore"):
-                out = simulate_sets(
-                    self.fit.structure, data.held, p, x0, data.record.n_samples, self.substeps[index]
-                )
-                results.append(_weighted(data, out, step))
-        return results
-
-
-def _weighted(
-    data: _Data, out: NDArray[np.float64], step: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    residuals, derivatives = [], []
-    for i, weight in enumerate(data.weights):
-        if weight > 0.0:
-            residuals.append((data.measured[:, i] - out[:, i, 0]) * weight)
-            derivatives.append((out[:, i, :1] - out[:, i, 1:]) * (weight / step))
-    return np.concatenate(residuals), np.concatenate(derivatives)
-
-
-def _compressed(evaluation: _Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
-    size = np.sqrt(np.diag(evaluation.normal))
-    size[size == 0.0] = 1.0
-    eigenvalues, vectors = np.linalg.eigh(evaluation.normal / np.outer(size, size))
-    kept = np.maximum(eigenvalues, 0.0)
-    floor = 1e-13 * max(float(kept[-1]), 1e-300)
-    root = np.sqrt(kept)
-    inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
-    projection = inverse * (vectors.T @ (evaluation.gradient / size))
-    return (root[:, None] * vectors.T) * size, projection

@@ -248,11 +248,11 @@ def _deviations(separation: float) -> str:
 
 def basis_sentence(diagnosis: Diagnosis) -> str:
     """Return on which records the errors were measured."""
-    windows = (
-        f", scored in windows of {diagnosis.windows:.3g} s, each with its own initial state"
-        if diagnosis.windows is not None
-        else ""
-    )
+    windows = ""
+    if diagnosis.windows is not None:
+        windows = f", scored in windows of {diagnosis.windows:.3g} s, each with its own initial state"
+    elif diagnosis.window_cycles is not None:
+        windows = f", scored in windows of {diagnosis.window_cycles} cycles, each with its own initial state"
     if diagnosis.scored_on == "validation":
         return f"Errors are those of validation records, which were not fitted{windows}."
     return f"There is no validation record: errors are those of the fitted records{windows}, and too good."

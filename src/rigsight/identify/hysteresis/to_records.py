@@ -171,7 +171,7 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float6
     """Return the mean squared weighted residual of every set, shape (n_sets,)."""
     p = np.array([coordinates.to_parameters(theta) for theta in thetas]).T
     total = np.zeros(thetas.shape[0])
-    for data in look.data:
+    for data in look.data.records:
         states = np.repeat(data.first_state[:, None], thetas.shape[0], axis=1)
         outputs = simulate_sets(look.structure, data.held, p, states, data.record.n_samples, _SUBSTEPS)
         with np.errstate(invalid="ignore", over="ignore"):

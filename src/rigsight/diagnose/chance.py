@@ -1,0 +1,114 @@
+"""Which effect explains a motion in which chance has a part, looked at a few cycles at a time?
+
+Where a disturbance no larger than the noise makes another motion in the end, not even the true model follows a whole record.
+In windows of a few cycles, each with its own initial state, it does, and a wrong one does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.starts import start_values
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.simulate import Structure
+
+_AS_NEAR = 1.5
+_MOST_ASKED = 4
+"""Models that are asked how predictable the motion is: so many, with held-out errors within this factor of the best."""
+_MOST_FITTED = 4
+"""Models that are fitted in windows: those nearest to the whole records, which a true one still is."""
+_SMALLER = (1.0, 0.3)
+"""Factors on the declared starts of an effect: too large a play sticks where a small one would not."""
+_GLIMPSED = 3
+"""Every so many windows are read at a first glance."""
+_GLIMPSE_EVALUATIONS = 10
+_MOST_STARTS = 2
+
+
+def is_predictable(
+    bench: Workbench, linear: Scored, singles: Sequence[Scored], at_floor: float, rng: np.random.Generator
+) -> bool:
+    """Return False if no model explains the records and in a near one chance has a part in the motion."""
+    usable = _nearest(singles)
+    if not usable or usable[0].excess <= at_floor:
+        return True
+    near = [model for model in usable if model.excess <= _AS_NEAR * usable[0].excess][:_MOST_ASKED]
+    return all(growth_of_disturbances(bench, linear, model, rng) <= PREDICTABLE for model in near)
+
+
+def fitted_in_windows(
+    bench: Workbench, linear: Scored, singles: Sequence[Scored], n_jobs: int = 1
+) -> list[Scored]:
+    """Fit the nearest models in windows; the others are only scored there, with the numbers that they have.
+
+    Parameters
+    ----------
+    bench
+        Records cut into windows, scales and noise.
+    linear
+        The re-identified equations.
+    singles
+        Every effect alone, fitted to whole records.
+    n_jobs
+        Models fitted at the same time.
+    """
+    nearest = {model.names for model in _nearest(singles)[:_MOST_FITTED]}
+
+    def one(model: Scored) -> Scored:
+        if not model.residuals:
+            return model
+        return _fitted(bench, linear, model) if model.names in nearest else _scored(bench, model)
+
+    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(model) for model in singles))
+
+
+def _nearest(singles: Sequence[Scored]) -> list[Scored]:
+    usable = (model for model in singles if model.residuals and np.isfinite(model.excess))
+    return sorted(usable, key=lambda model: model.excess)
+
+
+def _fitted(bench: Workbench, linear: Scored, model: Scored) -> Scored:
+    structure, free = model.fit.structure, model.fit.free
+    (effect,) = model.effects
+    own = [structure.parameter_name(effect, p.name) for p in effect.parameters if p.null == 0.0]
+    declared = list(start_values(bench, structure, effect, linear.fit, {}))
+    starts = [
+        model.fit.values,
+        *({**s, **{n: f * s[n] for n in own if n in free}} for s in declared for f in _SMALLER),
+    ]
+    few = bench.problem(structure, bench.estimation[::_GLIMPSED])
+    glimpses = sorted(
+        (few.fit_windows(start, free, _GLIMPSE_EVALUATIONS, most_rounds=1) for start in starts),
+        key=lambda fit: fit.cost,
+    )
+    problem = bench.problem(structure, bench.estimation)
+    fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[:_MOST_STARTS]]
+    usable = [fit for fit in fits if fit.residuals]
+    if not usable:
+        return replace(model, residuals=(), excess=float("inf"))
+    best = min(usable, key=lambda fit: fit.cost)
+    return _on_scoring(bench, replace(model, fit=best), structure, best.values)
+
+
+def _scored(bench: Workbench, model: Scored) -> Scored:
+    structure = model.fit.structure
+    there = bench.problem(structure, bench.estimation).fit_windows(model.fit.values, ())
+    fit = replace(
+        model.fit,
+        residuals=there.residuals,
+        initial_states=there.initial_states,
+        cost=there.cost,
+        substeps=there.substeps,
+    )
+    return _on_scoring(bench, replace(model, fit=fit), structure, fit.values)
+
+
+def _on_scoring(bench: Workbench, model: Scored, structure: Structure, values: Mapping[str, float]) -> Scored:
+    result = bench.problem(structure, bench.scoring).fit_windows(values, ())
+    excess = result.weighted_rms if result.residuals else float("inf")
+    return replace(model, residuals=result.residuals, initial_states=result.initial_states, excess=excess)

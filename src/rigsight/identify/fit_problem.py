@@ -1,0 +1,253 @@
+"""Cost, derivatives and Gauss-Newton matrix of an output-error fit as functions of its coordinates and initial states.
+
+Residuals and derivatives come from one call of the side-by-side integrator per record: the current parameters and every shifted
+one are its lanes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import SimulationError
+from rigsight.identify.coordinates import STEP, Coordinates
+from rigsight.records.record import Record
+from rigsight.simulate import Structure, choose_substeps, simulate_sets, state_limits
+from rigsight.simulate.input_hold import HeldInput
+
+MOST_SUBSTEPS = 16
+"""A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
+_WORTH_REFINING = 1e-3
+"""Share of the cost that finer steps must promise to remove."""
+_LEAST_RANGE = 1e-9
+"""Least unit of a limited state, in units of its size: a play of zero has no range."""
+_WORSE = 1e3
+
+
+@dataclass(frozen=True)
+class RecordData:
+    """One record as a fit sees it.
+
+    Attributes
+    ----------
+    record, held
+        The record, and its input between samples.
+    measured
+        Shape (n_samples, n_outputs), NaN where an output was not measured.
+    weights
+        Reciprocal noise of each output, 0 where it was not measured.
+    first_state
+        Guess of the initial state, shape (n_states,).
+    """
+
+    record: Record
+    held: HeldInput
+    measured: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    first_state: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FitData:
+    """What is fitted to what.
+
+    Attributes
+    ----------
+    structure
+        Rig and effects.
+    records
+        The records.
+    limited
+        Which states cannot leave a range, shape (n_states,).
+    unlimited_sizes
+        Characteristic size of each state, shape (n_states, 1).
+    accuracy
+        Relative accuracy of the simulations.
+    """
+
+    structure: Structure
+    records: tuple[RecordData, ...]
+    limited: NDArray[np.bool_]
+    unlimited_sizes: NDArray[np.float64]
+    accuracy: float
+
+    def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
+
+        A state that cannot leave a range is moved in units of that range, whatever the parameters make of it: beyond an end
+        nothing depends on it, and a fit that wandered there would not come back.
+        """
+        sizes = np.repeat(self.unlimited_sizes, p.shape[1], axis=1)
+        if np.any(self.limited):
+            limits = state_limits(self.structure, p)
+            sizes[self.limited] = np.maximum(limits[self.limited], _LEAST_RANGE * sizes[self.limited])
+        return sizes
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Cost r^T r, J^T J and J^T r at coordinates."""
+
+    theta: NDArray[np.float64]
+    cost: float
+    normal: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+
+
+class Problem:
+    """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
+
+    def __init__(
+        self,
+        data: FitData,
+        coordinates: Coordinates,
+        n_states: int,
+        upper: NDArray[np.float64],
+    ) -> None:
+        self.data = data
+        self.coordinates = coordinates
+        self.n_states = n_states
+        self.upper = upper
+        self.n_free = len(coordinates.free)
+        self.n_evaluations = 0
+        self.substeps = [MOST_SUBSTEPS] * len(data.records)
+        self._last: Evaluation | None = None
+        self._best = float("inf")
+
+    def states(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Return the initial states per record."""
+        places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
+        sizes = self.data.state_sizes(self.coordinates.to_parameters(theta[: self.n_free])[:, None])[:, 0]
+        return [row * sizes for row in places]
+
+    def choose_substeps(self, theta: NDArray[np.float64]) -> None:
+        """Choose the substeps of each record from the accuracy wish at these coordinates."""
+        p = self.coordinates.to_parameters(theta[: self.n_free])
+        for i, (record, state) in enumerate(zip(self.data.records, self.states(theta), strict=True)):
+            try:
+                self.substeps[i] = choose_substeps(
+                    self.data.structure,
+                    record.held,
+                    p,
+                    state,
+                    record.record.n_samples,
+                    self.data.accuracy,
+                    MOST_SUBSTEPS,
+                )
+            except SimulationError:
+                self.substeps[i] = MOST_SUBSTEPS
+
+    def refined(self, theta: NDArray[np.float64]) -> bool:
+        """Double the substeps if the cost would then fall further from here; return True if so."""
+        before = self.substeps
+        within_reach = self._removable(theta)
+        self.substeps = [min(2 * n, MOST_SUBSTEPS) for n in before]
+        self._last = None
+        if self.substeps != before and self._removable(theta) > within_reach + _WORTH_REFINING:
+            self._best = float("inf")
+            return True
+        self.substeps, self._last = before, None
+        return False
+
+    def _removable(self, theta: NDArray[np.float64]) -> float:
+        """Return the share of the cost that a full Gauss-Newton step promises to remove."""
+        evaluation = self.at(theta)
+        if not np.isfinite(evaluation.cost):
+            return 0.0
+        _, projection = compressed(evaluation)
+        return float(projection @ projection) / max(evaluation.cost, 1e-300)
+
+    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a vector with the same cost and the same projection on the derivatives as the residuals."""
+        evaluation = self.at(theta)
+        if not np.isfinite(evaluation.cost):
+            stand_in = np.zeros(theta.size + 1)
+            stand_in[-1] = np.sqrt(_WORSE * self._best)
+            return stand_in
+        _, projection = compressed(evaluation)
+        rest = max(evaluation.cost - float(projection @ projection), 0.0)
+        return np.append(projection, np.sqrt(rest))
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives that go with `residual`."""
+        root, _ = compressed(self.at(theta))
+        return np.vstack([root, np.zeros(theta.size)])
+
+    def at(self, theta: NDArray[np.float64]) -> Evaluation:
+        """Evaluate, or return the last evaluation if it was here."""
+        if self._last is not None and np.array_equal(self._last.theta, theta):
+            return self._last
+        n = theta.size
+        normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
+        for index, (residual, derivative) in enumerate(self.sensitivities(theta)):
+            columns = self._columns(index)
+            # A diverging simulation overflows here; that is what the check below is for.
+            with np.errstate(over="ignore", invalid="ignore"):
+                cost += float(residual @ residual)
+                normal[np.ix_(columns, columns)] += derivative.T @ derivative
+                gradient[columns] += derivative.T @ residual
+        if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
+            cost = float("inf")
+        self._best = min(self._best, cost)
+        self._last = Evaluation(theta.copy(), cost, normal, gradient)
+        self.n_evaluations += 1
+        return self._last
+
+    def _columns(self, index: int) -> NDArray[np.intp]:
+        own = self.n_free + index * self.n_states + np.arange(self.n_states)
+        return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
+
+    def sensitivities(
+        self, theta: NDArray[np.float64]
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
+        shifts = np.where(theta + STEP > self.upper, -STEP, STEP)
+        base = self.coordinates.to_parameters(theta[: self.n_free])
+        shifted = []
+        for i in range(self.n_free):
+            moved = theta[: self.n_free].copy()
+            moved[i] += shifts[i]
+            shifted.append(self.coordinates.to_parameters(moved))
+        p = np.column_stack([base, *shifted, *[base] * self.n_states])
+        sizes = self.data.state_sizes(p)
+        results = []
+        for index, record in enumerate(self.data.records):
+            columns = self._columns(index)
+            step = shifts[columns]
+            places = np.repeat(theta[columns[self.n_free :], None], p.shape[1], axis=1)
+            for i in range(self.n_states):
+                places[i, 1 + self.n_free + i] += step[self.n_free + i]
+            x0 = places * sizes
+            with np.errstate(all="ignore"):
+                out = simulate_sets(
+                    self.data.structure, record.held, p, x0, record.record.n_samples, self.substeps[index]
+                )
+                results.append(weighted(record, out, step))
+        return results
+
+
+def weighted(
+    record: RecordData, out: NDArray[np.float64], step: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return weighted residuals (n,) of the first lane and, of the others, their derivatives (n, n_lanes - 1)."""
+    residuals, derivatives = [], []
+    for i, weight in enumerate(record.weights):
+        if weight > 0.0:
+            residuals.append((record.measured[:, i] - out[:, i, 0]) * weight)
+            derivatives.append((out[:, i, :1] - out[:, i, 1:]) * (weight / step))
+    return np.concatenate(residuals), np.concatenate(derivatives)
+
+
+def compressed(evaluation: Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
+    size = np.sqrt(np.diag(evaluation.normal))
+    size[size == 0.0] = 1.0
+    eigenvalues, vectors = np.linalg.eigh(evaluation.normal / np.outer(size, size))
+    kept = np.maximum(eigenvalues, 0.0)
+    floor = 1e-13 * max(float(kept[-1]), 1e-300)
+    root = np.sqrt(kept)
+    inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
+    projection = inverse * (vectors.T @ (evaluation.gradient / size))
+    return (root[:, None] * vectors.T) * size, projection
