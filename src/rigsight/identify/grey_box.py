@@ -12,13 +12,13 @@ residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999)
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import Coordinates
@@ -48,6 +48,10 @@ _STATE_RANGE = 20.0
 _FIRST_SUBSTEPS = 4
 _FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
 """Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
+
+
+_Outcome = tuple[NDArray[np.float64], bool, str]
+"""Coordinates and places where a search ended, whether it converged, and the optimizer's words."""
 
 
 @dataclass(frozen=True)
@@ -174,36 +178,19 @@ class GreyBoxFit:
             return self._failed(coordinates, theta, "The start values cannot be simulated.")
         if theta.size == 0:
             return self._result(problem, theta, True, "Nothing to fit.", finish)
-        key = self._key(coordinates, start, theta, (max_evaluations, tolerance, problem.substeps))
-        known = None if self.memory is None else self.memory.recall(key)
-        if known is not None:
-            problem.n_evaluations = known["evaluations"] - 1
-            problem.substeps = list(known["substeps"])
-            return self._result(problem, np.array(known["theta"]), known["success"], known["message"], finish)
-        for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
-            solution = least_squares(
-                problem.residual,
-                theta,
-                jac=problem.jacobian,
-                bounds=(lower, upper),
-                method="trf",
-                x_scale="jac",
-                ftol=tolerance,
-                xtol=0.1 * tolerance,
-                gtol=1e-3 * tolerance,
-                max_nfev=max_evaluations,
-            )
-            theta = solution.x
-            # A time constant on its way to zero is held back where steps chosen for a longer one become unstable.
-            if not (finish and substeps is None and problem.refined(theta)):
-                break
-        success = bool(solution.status > 0)
-        result = self._result(problem, theta, success, solution.message, finish)
-        if self.memory is not None:
-            outcome = {"theta": theta.tolist(), "success": success, "message": solution.message}
-            steps = {"evaluations": result.n_evaluations, "substeps": problem.substeps}
-            self.memory.remember(key, {**outcome, **steps})
-        return result
+
+        def search(theta: NDArray[np.float64] = theta) -> _Outcome:
+            for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
+                solution = _least_squares(problem, theta, (lower, upper), tolerance, max_evaluations)
+                theta = solution.x
+                # A time constant on its way to zero is held back where steps chosen for a longer one become unstable.
+                if not (finish and substeps is None and problem.refined(theta)):
+                    break
+            return theta, bool(solution.status > 0), str(solution.message)
+
+        settings = (max_evaluations, tolerance, problem.substeps)
+        outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
+        return self._result(problem, *outcome, finish)
 
     def fit_windows(
         self,
@@ -233,48 +220,41 @@ class GreyBoxFit:
         As of `fit`.
         """
         begin = self._begin(start, free, None)
-        coordinates = begin.coordinates
-        own = begin.theta[: len(free)]
+        coordinates, n_free = begin.coordinates, len(free)
         problem = SeparateStates(self.data, coordinates, begin.places, begin.lower, begin.upper)
         problem.choose_substeps(begin.theta)
-        key = self._key(
-            coordinates, start, begin.theta, (max_evaluations, tolerance, [*problem.substeps, most_rounds])
-        )
-        known = None if self.memory is None else self.memory.recall(key)
-        success, message = True, "Nothing to fit but initial states."
-        if known is None:
-            cost = problem.settle_anew(own)
-            if not np.isfinite(cost):
-                return self._failed(coordinates, begin.theta, "The start values cannot be simulated.")
+        if not np.isfinite(problem.settle_anew(begin.theta[:n_free])):
+            return self._failed(coordinates, begin.theta, "The start values cannot be simulated.")
+
+        def search() -> _Outcome:
+            own, success, message = begin.theta[:n_free], True, "Nothing to fit but initial states."
+            bounds, cost = (coordinates.lower, coordinates.upper), float("inf")
             for _ in range(most_rounds if free else 0):
-                solution = least_squares(
-                    problem.residual,
-                    own,
-                    jac=problem.jacobian,
-                    bounds=(coordinates.lower, coordinates.upper),
-                    method="trf",
-                    x_scale="jac",
-                    ftol=tolerance,
-                    xtol=0.1 * tolerance,
-                    gtol=1e-3 * tolerance,
-                    max_nfev=max_evaluations,
-                )
+                solution = _least_squares(problem, own, bounds, tolerance, max_evaluations)
                 own, success, message = solution.x, bool(solution.status > 0), str(solution.message)
                 before, cost = cost, problem.settle_anew(own)
                 if cost > (1.0 - _WORTH_A_ROUND) * before:
                     break
-            theta = np.concatenate([own, *problem.places])
-        else:
-            theta, success, message = np.array(known["theta"]), known["success"], known["message"]
-            problem.n_evaluations, problem.substeps = known["evaluations"] - 1, list(known["substeps"])
+            return np.concatenate([own, *problem.places]), success, message
+
+        settings = (max_evaluations, tolerance, [*problem.substeps, most_rounds])
+        outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
         together = Problem(self.data, coordinates, begin.n_states, problem.upper)
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
-        result = self._result(together, theta, success, message, finish=True)
-        if known is None and self.memory is not None:
+        return self._result(together, *outcome, finish=True)
+
+    def _recalled(self, key: str, problem: Problem, search: Callable[[], _Outcome]) -> _Outcome:
+        """Return the outcome of a search, from memory if it was done before."""
+        known = None if self.memory is None else self.memory.recall(key)
+        if known is not None:
+            problem.n_evaluations, problem.substeps = known["evaluations"], list(known["substeps"])
+            return np.array(known["theta"]), known["success"], known["message"]
+        theta, success, message = search()
+        if self.memory is not None:
             outcome = {"theta": theta.tolist(), "success": success, "message": message}
-            steps = {"evaluations": result.n_evaluations, "substeps": problem.substeps}
+            steps = {"evaluations": problem.n_evaluations, "substeps": problem.substeps}
             self.memory.remember(key, {**outcome, **steps})
-        return result
+        return theta, success, message
 
     def _begin(
         self,
@@ -351,7 +331,7 @@ class GreyBoxFit:
     def _result(
         self, problem: Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
     ) -> FitResult:
-        coordinates = problem.coordinates
+        coordinates, n_evaluations = problem.coordinates, problem.n_evaluations
         n_free = len(coordinates.free)
         p = coordinates.to_parameters(theta[:n_free])
         states = problem.states(theta)
@@ -385,9 +365,30 @@ class GreyBoxFit:
             initial_states=tuple(states),
             cost=cost,
             n_samples=self.n_samples,
-            n_evaluations=problem.n_evaluations,
+            n_evaluations=n_evaluations,
             free=coordinates.free,
             covariance=covariance,
             residuals=residuals,
             substeps=tuple(problem.substeps),
         )
+
+
+def _least_squares(
+    problem: Problem,
+    theta: NDArray[np.float64],
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
+    tolerance: float,
+    max_evaluations: int,
+) -> OptimizeResult:
+    return least_squares(
+        problem.residual,
+        theta,
+        jac=problem.jacobian,
+        bounds=bounds,
+        method="trf",
+        x_scale="jac",
+        ftol=tolerance,
+        xtol=0.1 * tolerance,
+        gtol=1e-3 * tolerance,
+        max_nfev=max_evaluations,
+    )

@@ -76,7 +76,7 @@ class SeparateStates(Problem):
         settled = [self._settled(i, p, place, _FEW_STEPS)[0] for i, place in enumerate(self.places)]
         n = theta.size
         normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging simulation overflows here
             for residual, derivative in self.sensitivities(np.concatenate([theta, *settled])):
                 cost += float(residual @ residual)
                 own, rest = _projected(derivative[:, :n], derivative[:, n:], residual)
@@ -114,12 +114,14 @@ class SeparateStates(Problem):
             lanes = place[:, None] + np.column_stack([np.zeros(n), np.diag(step)])
             residuals = self._residuals(index, p, lanes)
             residual = residuals[:, 0]
-            cost = float(residual @ residual)
+            with np.errstate(over="ignore", invalid="ignore"):
+                cost = float(residual @ residual)
             if not np.isfinite(cost):
                 return place, float("inf")
             derivative = np.nan_to_num((residuals[:, 1:] - residuals[:, :1]) / step, posinf=0.0, neginf=0.0)
             tried = np.clip(self._candidates(place, derivative, residual), low, high)
-            costs = np.sum(self._residuals(index, p, tried) ** 2, axis=0)
+            with np.errstate(over="ignore", invalid="ignore"):
+                costs = np.sum(self._residuals(index, p, tried) ** 2, axis=0)
             costs[~np.isfinite(costs)] = np.inf
             best = int(np.argmin(costs))
             if costs[best] >= cost:
