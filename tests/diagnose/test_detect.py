@@ -50,6 +50,18 @@ def test_repeated_periods() -> None:
     assert floor.std == pytest.approx(SIGMA, rel=3.0 / np.sqrt(2.0 * 3000))
 
 
+def test_where_a_free_mass_has_drifted_to_is_not_noise() -> None:
+    rng = np.random.default_rng(7)
+    u = np.tile(multisine(1000, rng), 6)
+    free = compose(AXIS)
+    run = Record(name="r", dt=DT, signals={"u": u + 0.05}, units={})
+    x = simulate(free, {**STAGE, "k": 0.0}, run)["x"] + SIGMA * rng.standard_normal(u.size)
+    assert np.ptp(x[::1000]) > 1000.0 * SIGMA
+    (floor,) = noise_floors(AXIS, [axis_record(u, x)], drifts=True)
+    assert "repeated" in floor.method
+    assert floor.std == pytest.approx(SIGMA, rel=0.1)
+
+
 def test_repeated_records() -> None:
     rng = np.random.default_rng(2)
     u = linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)

@@ -31,7 +31,7 @@ _AT_REST = "stretches in which the input rests"
 _WHITE_ONLY = "top of the spectrum (white noise only)"
 
 
-def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
+def noise_floors(rig: Rig, records: Sequence[Record], drifts: bool = False) -> tuple[NoiseFloor, ...]:
     """Return the noise floor of every output that the records hold.
 
     Parameters
@@ -40,12 +40,14 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
         The rig.
     records
         All records of a campaign: they share their sensors.
+    drifts
+        True for an axis without a spring: where it has drifted to from one period to the next is not noise.
     """
     floors = []
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
         if holding:
-            std, method, stretches = _noise_floor(rig, signal.name, holding)
+            std, method, stretches = _noise_floor(rig, signal.name, holding, drifts)
             spread = max(float(np.std(record[signal.name])) for record in holding)
             size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
             floors.append(
@@ -61,9 +63,13 @@ def noise_floors(rig: Rig, records: Sequence[Record]) -> tuple[NoiseFloor, ...]:
     return tuple(floors)
 
 
-def _noise_floor(rig: Rig, output: str, records: Sequence[Record]) -> tuple[float, str, Stretches]:
+def _noise_floor(
+    rig: Rig, output: str, records: Sequence[Record], drifts: bool
+) -> tuple[float, str, Stretches]:
     source = rig.inputs[0].name
     repeated = _repeated(source, output, records)
+    if drifts:
+        repeated = [(_without_drift(group), dt) for group, dt in repeated]
     if repeated:
         squares = [np.var(group, axis=0, ddof=1) for group, _ in repeated]
         left = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]
@@ -113,6 +119,14 @@ def _repeated(source: str, output: str, records: Sequence[Record]) -> list[tuple
             start = 0 if settled else first_input.size // 2
             groups.append((np.array(group)[:, start:], dt))
     return groups
+
+
+def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return answers to one input without the parabolas by which they differ: a constant force moves a free mass on one."""
+    t = np.linspace(-1.0, 1.0, group.shape[1])
+    mean = np.mean(group, axis=0)
+    drift = np.polynomial.polynomial.polyfit(t, (group - mean).T, 2)
+    return np.asarray(group - np.polynomial.polynomial.polyval(t, drift))
 
 
 def _quiet_stretches(record: Record, source: str, output: str) -> list[tuple[NDArray[np.float64], float]]:

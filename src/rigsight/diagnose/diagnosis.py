@@ -87,7 +87,7 @@ def diagnose(
         notes.append(
             "There is no validation record: errors are those of the records that were fitted, and too good."
         )
-    floors = noise_floors(task.rig, task.records)
+    floors = noise_floors(task.rig, task.records, drifts=not task.has_spring)
     say("noise floor")
 
     rng = np.random.default_rng(seed)

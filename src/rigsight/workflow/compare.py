@@ -111,13 +111,13 @@ def compare_campaign(
         As in `run_compare`.
     """
     rig = campaign.rig
-    floors = tuple(
-        Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound)
-        for floor in noise_floors(rig, campaign.records)
-    )
-    yardstick = Yardstick(rig, floors, method, step_seconds)
     # One model without a spring, and all are run in windows: the same yardstick for everyone.
     drifts = any(c.model.values.get("k", math.inf) == 0.0 for c in competitors) and rig.is_driven
+    floors = tuple(
+        Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound)
+        for floor in noise_floors(rig, campaign.records, drifts)
+    )
+    yardstick = Yardstick(rig, floors, method, step_seconds)
     length = window_length(rig, campaign.records) if drifts else None
     stage = Stage(COMPARING, len(campaign.records), listener)
     found = []

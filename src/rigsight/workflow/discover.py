@@ -99,7 +99,8 @@ def discovery_task(campaign: Campaign) -> Task:
     """
     no_spring = campaign.parameters.get("k") == 0.0
     length = window_length(campaign.rig, campaign.estimation) if no_spring else None
-    noise = {floor.output: floor.std for floor in noise_floors(campaign.rig, campaign.records)}
+    floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
+    noise = {floor.output: floor.std for floor in floors}
     return Task(
         title=campaign.title,
         rig=campaign.rig,
