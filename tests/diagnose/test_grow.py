@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.effects import effect_named
+from rigsight.diagnose.grow import pruned
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
+from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
@@ -59,3 +64,27 @@ def test_one_effect_stays_one():
     found = diagnose(task, [effect_named(name) for name in TRIED])
     assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
     assert all(len(candidate.effects) < 2 for candidate in found.candidates)
+
+
+def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:
+    play, spring = effect_named("backlash"), effect_named("cubic_stiffness")
+    records = measured({"backlash": {"g": 1e-3}}, seed=2).records
+    scales = characteristic_scales(AXIS, records, VALUES)
+    fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
+    bench = Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
+
+    def model(effects: tuple[Effect, ...], own: dict[str, float]) -> Scored:
+        structure = bench.composed(effects)
+        fit = bench.problem(structure, fitted).fit({**VALUES, **own}, [])
+        free = tuple(bench.free_parameters(structure))
+        return bench.score(effects, replace(fit, free=free))
+
+    stopped, other = model((play,), {"g": 4e-4}), model((spring,), {"k_3": 1e4})
+    pair = model((play, spring), {"g": 1.01e-3, "k_3": 1e3})
+    assert stopped.excess > 3.0 * pair.excess
+    again, same = pruned(bench, [stopped, other], [pair])
+    assert again.names == ("backlash",)
+    assert again.excess == pytest.approx(1.0, abs=0.1)
+    assert again.fit.values["g"] == pytest.approx(1e-3, rel=0.01)
+    assert same.excess <= other.excess
+    assert pruned(bench, [again, other], [])[0] is again

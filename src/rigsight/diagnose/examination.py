@@ -12,7 +12,7 @@ from rigsight.diagnose.chance import fitted_in_windows, is_predictable
 from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.finding import DataQuality
-from rigsight.diagnose.grow import Prepare, grown
+from rigsight.diagnose.grow import Prepare, grown, pruned
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
@@ -101,6 +101,7 @@ def examine(
         in_windows = _in_windows(task, noise, models, at_floor, n_jobs, say)
     if in_windows is None:
         pairs = grown(models.bench, models.singles, effects, at_floor, n_jobs, prepare)
+        models = replace(models, singles=pruned(models.bench, models.singles, pairs))
     else:
         models = in_windows
     bench, before, linear = models.bench, models.before, models.linear

@@ -1,7 +1,8 @@
 """Does a second effect explain what the best one leaves? Greedy growth from the best models, each pair on held-out records.
 
-Every effect gets a first look beside the best model; only those that lower the cost clearly are fitted with care. What
-the growth cannot do without is found by the ranking: the pair competes with its own parts.
+Every effect gets a first look beside the best model; only those that lower the cost clearly are fitted with care. Then each part
+of the best pairs is fitted alone from there. What the growth cannot do without is found by the ranking: the pair competes with
+its own parts.
 
 References
 ----------
@@ -20,7 +21,7 @@ from joblib import Parallel, delayed
 from rigsight.diagnose.characterize import Look, finished, followed, look_at, refine, widened
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.simulate import Structure
+from rigsight.simulate import Structure, carried_over
 
 MOST_EFFECTS = 2
 """Effects that a verdict can name together."""
@@ -35,6 +36,7 @@ _NEAR_THE_BEST = 2.0
 _BOTH_WAYS = 6
 """Most promising pairs that are looked at from the fit of the second effect as well: a strong memory hides behind a first one."""
 _MOST_FINISHED = 2
+_MOST_PRUNED = 2
 _MOST_STEPS = 4
 """Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
 _FINEST_STEPS = 8
@@ -112,6 +114,40 @@ def grown(
         for pair in refine(bench, pairs, n_jobs)
         if pair.excess <= allowed
     ]
+
+
+def pruned(bench: Workbench, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
+    """Return the singles, those refitted that do better from where they stand in a pair than from where they were found.
+
+    A second effect may do no more than lift a fit of the first over a ridge; without it the first then explains as much.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    singles
+        Every effect alone, fitted and scored.
+    pairs
+        From `grown`.
+    """
+    better = {model.names: model for model in singles}
+    for pair in sorted(pairs, key=lambda pair: pair.excess)[:_MOST_PRUNED]:
+        for effect in pair.effects:
+            known = better.get((effect.name,))
+            if known is None or known.excess <= _TIE * pair.excess:
+                continue
+            structure = known.fit.structure
+            values = {
+                **known.fit.values,
+                **dict(structure.fixed),
+                **carried_over(pair.fit.values, pair.fit.structure, structure),
+            }
+            start = replace(known.fit, values=values)
+            look = Look(known.effects, structure, known.fit.free, (start,), float("inf"))
+            alone = followed(bench, look, promising=True)
+            if alone.excess < known.excess / _TIE:
+                better[known.names] = alone
+    return list(better.values())
 
 
 def _grown_from(
