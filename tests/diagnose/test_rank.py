@@ -28,6 +28,20 @@ def test_of_two_that_tie_the_simpler_wins(scored, white) -> None:
     assert ranking.tied == (complex_model,)
 
 
+def test_of_two_with_as_many_numbers_a_small_difference_all_along_is_a_hint_and_no_proof(
+    scored, white
+) -> None:
+    plainer = scored(("cubic_stiffness",), 1.005 * white, n_free=5)
+    likened = scored(("gravity_pendulum",), white, n_free=5)
+    ranking = ranked(plainer, likened)
+    assert ranking.order[0] is likened
+    assert 0.5 < ranking.probabilities[0] < 0.75
+    assert ranking.tied == (plainer,)
+    alike = ranked(scored(("cubic_stiffness",), white, n_free=5), likened)
+    assert alike.order[0].names == ("cubic_stiffness",)
+    assert alike.probabilities[0] == pytest.approx(0.75, abs=0.01)
+
+
 def test_a_clearly_better_model_wins_however_complex(scored, white) -> None:
     complex_model = scored(("bouc_wen_hysteresis",), white, n_free=7)
     simple = scored(("coulomb_friction",), 1.5 * white, n_free=5)

@@ -14,6 +14,8 @@ from rigsight.effects.effect import Place
 
 _TIE = 0.01
 """Relative difference of held-out errors that no engineer would build a decision on."""
+_FINE = 1e-3
+"""The same between models with as many numbers, where parsimony is silent and a small difference is still a hint."""
 _INEXACT = 1e-3
 """Share of the gap by which models may differ without being told apart: no form is exact, and what disturbs the rig bends it.
 
@@ -82,11 +84,14 @@ def rank(
     prior = _PRIOR_PER_EFFECT ** np.array(
         [len(m.effects) + _likened(m, usable) + _late_drive_in_disguise(m) for m in usable]
     )
-    # In each resample the models with the fewest numbers within the tolerance of the best share the win.
+    # In each resample the models with the fewest numbers within the tolerance of the best share the win: half of it by their
+    # prior odds alone, half goes to those of them that are lowest.
     within = resampled <= floor * (1.0 + tolerance)
     fewest = np.min(np.where(within, n_free, np.iinfo(np.int64).max), axis=1, keepdims=True)
-    shares = np.where(within & (n_free == fewest), prior, 0.0)
-    wins = np.mean(shares / np.sum(shares, axis=1, keepdims=True), axis=0)
+    tie = within & (n_free == fewest)
+    lowest = np.min(np.where(tie, resampled, np.inf), axis=1, keepdims=True)
+    ahead = tie & (resampled <= lowest * (1.0 + _FINE))
+    wins = np.mean((_shared(tie, prior) + _shared(ahead, prior)) / 2.0, axis=0)
     likelihood = wins + 1e-3 * np.exp(-20.0 * (errors / best - 1.0))
     probabilities = likelihood / np.sum(likelihood)
     chosen = int(np.argmax(probabilities))
@@ -103,6 +108,12 @@ def rank(
         probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
         tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
     )
+
+
+def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share of each model in each resample's win, shape (n_resamples, n_models)."""
+    shares = np.where(winners, prior, 0.0)
+    return np.asarray(shares / np.sum(shares, axis=1, keepdims=True))
 
 
 def _likened(model: Scored, others: Sequence[Scored]) -> bool:
