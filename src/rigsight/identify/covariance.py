@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.identify.symmetric_eigen import symmetric_eigen
+
 _DEPENDENT = 1e-14
 """Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
 _TAKES_PART = 1e-9
@@ -77,7 +79,7 @@ def sandwich_covariance(bread: NDArray[np.float64], filling: NDArray[np.float64]
         return np.zeros((0, 0))
     size = np.sqrt(np.diag(bread))
     size[size == 0.0] = 1.0
-    eigenvalues, vectors = np.linalg.eigh(bread / np.outer(size, size))
+    eigenvalues, vectors = symmetric_eigen(bread / np.outer(size, size))
     seen = eigenvalues > _DEPENDENT * max(float(eigenvalues[-1]), 1e-300)
     known = vectors[:, seen]
     inverse = (known / eigenvalues[seen]) @ known.T

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP, Coordinates
+from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
 from rigsight.simulate import Structure, choose_substeps, simulate_sets, state_limits
 from rigsight.simulate.input_hold import HeldInput
@@ -244,7 +245,7 @@ def compressed(evaluation: Evaluation) -> tuple[NDArray[np.float64], NDArray[np.
     """Return R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
     size = np.sqrt(np.diag(evaluation.normal))
     size[size == 0.0] = 1.0
-    eigenvalues, vectors = np.linalg.eigh(evaluation.normal / np.outer(size, size))
+    eigenvalues, vectors = symmetric_eigen(evaluation.normal / np.outer(size, size))
     kept = np.maximum(eigenvalues, 0.0)
     floor = 1e-13 * max(float(kept[-1]), 1e-300)
     root = np.sqrt(kept)

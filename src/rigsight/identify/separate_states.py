@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify.coordinates import STEP, Coordinates
 from rigsight.identify.fit_problem import Evaluation, FitData, Problem, compressed, weighted
+from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.simulate import simulate_sets
 
 _DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
@@ -138,7 +139,7 @@ class SeparateStates(Problem):
         size = np.linalg.norm(derivative, axis=0)
         size[size == 0.0] = 1.0
         normal = (derivative / size).T @ (derivative / size)
-        values, vectors = np.linalg.eigh(normal)
+        values, vectors = symmetric_eigen(normal)
         slope = vectors.T @ ((derivative / size).T @ residual)
         steps = [
             (vectors @ (slope / (np.maximum(values, 0.0) + damping + 1e-12))) / size for damping in _DAMPINGS

@@ -15,6 +15,7 @@ from rigsight.effects.effect import Effect, SumAndDifference
 from rigsight.errors import InputError
 from rigsight.identify.coordinates import Coordinates
 from rigsight.identify.fit_result import FitResult
+from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
 from rigsight.rigs import ELEMENT
 from rigsight.simulate import Structure, compose, simulate_sets
@@ -163,7 +164,7 @@ def parameter_draws(
     covariance = back @ (known / np.outer(_sizes(known), _sizes(known))) @ back.T
     # Coordinates differ by orders of magnitude: the root is taken of the correlation.
     size = _sizes(covariance)
-    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    eigenvalues, vectors = symmetric_eigen(covariance / np.outer(size, size))
     root = size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
     inside: list[NDArray[np.float64]] = []
     for _ in range(_REDRAWS):
