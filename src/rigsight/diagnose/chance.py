@@ -19,7 +19,10 @@ from rigsight.simulate import Structure
 
 _AS_NEAR = 1.5
 _MOST_ASKED = 4
-"""Models that are asked how predictable the motion is: so many, with held-out errors within this factor of the best."""
+"""Models that are asked how predictable the motion is: so many, with held-out errors within this factor of the best.
+
+An assumption, like the numbers below: two drawn rigs with play are all that was looked at.
+"""
 _MOST_FITTED = 4
 """Models that are fitted in windows: those nearest to the whole records, which a true one still is."""
 _SMALLER = (1.0, 0.3)

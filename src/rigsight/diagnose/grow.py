@@ -41,7 +41,7 @@ _MOST_STEPS = 4
 """Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
 _FINEST_STEPS = 8
 """Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
-and each of its partners would take as fine steps."""
+and each of its partners would take as fine steps. An assumption, made for the time that it saves."""
 _IN_ITS_PLACE = 1.5
 """Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5

@@ -15,7 +15,10 @@ from rigsight.effects.effect import Place
 _TIE = 0.01
 """Relative difference of held-out errors that no engineer would build a decision on."""
 _FINE = 1e-3
-"""The same between models with as many numbers, where parsimony is silent and a small difference is still a hint."""
+"""The same between models with as many numbers, where parsimony is silent and a small difference is still a hint.
+
+An assumption, like the half of the win that it decides: pendulums beside cubic springs suggested it.
+"""
 _INEXACT = 1e-3
 """Share of the gap by which models may differ without being told apart: no form is exact, and what disturbs the rig bends it.
 

@@ -202,7 +202,7 @@ class GreyBoxFit:
     ) -> FitResult:
         """Fit the free parameters to many short records, each with the initial state that suits the parameters best.
 
-        For motion whose memory sticks and slips: `fit`, which moves everything together, stops far from the best place there.
+        For motion whose memory sticks and slips: `fit`, which moves everything together, can stop far from the best place there.
 
         Parameters
         ----------
