@@ -19,8 +19,8 @@ _MAX_WINDOWS = 40
 _CYCLES = 4
 """Cycles of motion in a window where a disturbance grows from cycle to cycle.
 
-An assumption, measured on two drawn rigs with play of a few widths: the true model reaches the noise in nearly every window of four cycles,
-in windows of eight not in the fastest ones.
+An assumption, measured on two drawn rigs with play of a few widths: the true model reaches the noise in nearly every window
+of four cycles, in windows of eight not in the fastest ones.
 """
 _FEWEST_SAMPLES = 60
 _ABOVE_NOISE = 3.0
