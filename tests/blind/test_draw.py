@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from rigsight.blind import Trial, draw_trial, n_trials, subject_of
-from rigsight.blind.campaign import draw_rig
+from rigsight.blind.campaign import LinearRig, draw_rig
 from rigsight.blind.subjects import TIERS, Subject
+from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 
 SEED = 11
@@ -85,3 +86,18 @@ def test_the_weights_sine_gets_an_axis_that_swings_wide() -> None:
     """On a running gear that turns by milliradians it is a cube, and leaves no gap at all."""
     rigs = [draw_rig(np.random.default_rng(seed), None, swings_wide=True) for seed in range(20)]
     assert {linear.rig.name for linear in rigs} == {"axis"}
+
+
+def test_half_of_the_axes_swing_wide_whatever_is_hidden() -> None:
+    axes = [draw_rig(np.random.default_rng(seed), AXIS, swings_wide=False) for seed in range(200)]
+    wide = [axis for axis in axes if _swing(axis) >= 0.7]
+    assert 75 < len(wide) < 125
+    pendulums = [draw_rig(np.random.default_rng(seed), AXIS, swings_wide=True) for seed in range(200)]
+    assert all(_swing(axis) >= 0.7 for axis in pendulums)
+    for one, other in zip(wide, (p for p, a in zip(pendulums, axes, strict=True) if a in wide), strict=True):
+        assert one.values == other.values
+
+
+def _swing(axis: LinearRig) -> float:
+    """Return the displacement at resonance that an input of one drives."""
+    return axis.drive_gain / (axis.omega * axis.values["d"])

@@ -21,6 +21,8 @@ _STEP_TIME, _STEP_START = 15.0, 5.0
 _N_LINES = 50
 _MULTISINE_BAND = (0.1, 4.0)
 _RISE = 1.0
+_WIDE = (0.7, 1.5)
+"""Displacement of an axis that swings by about a radian."""
 _GEAR = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
 
 
@@ -103,9 +105,9 @@ def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> Li
         return LinearRig(rig, values, omega, _GEAR["b"] * _GEAR["k_tau"] / _GEAR["r_0"])
     mass = math.exp(rng.uniform(-2.0, 2.0))
     omega = rng.uniform(7.0, 20.0)
-    size = math.exp(rng.uniform(math.log(0.003), math.log(1.5)))
-    if swings_wide:
-        size = rng.uniform(0.7, 1.5)
+    small, wide = math.exp(rng.uniform(math.log(0.003), math.log(0.7))), rng.uniform(*_WIDE)
+    # Half of all axes swing wide whatever is hidden, so that a wide swing does not tell of a pendulum.
+    size = wide if rng.random() < 0.5 or swings_wide else small
     damping = rng.uniform(0.05, 0.35)
     # At resonance the displacement is that of a slow input over twice the damping ratio.
     gain = mass * omega**2 * size * 2.0 * damping

@@ -12,10 +12,10 @@ from rigsight.diagnose.advise import advise
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.grow import Prepare
+from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.localize import localize
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
 from rigsight.diagnose.quantify import budget_intervals, effect_shares
-from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.result import (
     Candidate,
     Diagnosis,
@@ -25,7 +25,6 @@ from rigsight.diagnose.result import (
     Trace,
 )
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.verdict import AT_FLOOR, Judgement
 from rigsight.diagnose.windows import WINDOW, Windowing, window_length
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.discover import MissingForce, missing_force
@@ -37,8 +36,6 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
-_ONE_FORCE = 0.5
-"""Most that is given to two effects that are one force together: another form of that force would look the same."""
 _WITHOUT_EFFECT = 0.95
 """Probability given to the equations without an effect where they reach the noise floor."""
 
@@ -150,7 +147,7 @@ def _assembled(
         )
         for name in measured
     }
-    share = _explained(judgement, ranking)
+    share = probability_in_catalogue(judgement, ranking, linear.excess)
     explained = judgement.verdict in ("none", "parameters")
     without_effect = _candidate(bench, linear, _WITHOUT_EFFECT if explained else 0.0)
     with_effect = [
@@ -187,34 +184,6 @@ def _assembled(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
     )
-
-
-def _explained(judgement: Judgement, ranking: Ranking) -> float:
-    """Return the probability that the cause is among the candidates at all, from what the best leaves above the floor.
-
-    Near 1 at the floor and one half far above it: an assumed shape, not calibrated on known causes.
-    """
-    if judgement.verdict in ("none", "parameters"):
-        return 0.0  # the equations without an effect explain the records
-    if not ranking.order or not np.isfinite(ranking.order[0].excess):
-        return 0.0
-    left = max(ranking.order[0].excess - AT_FLOOR, 0.0)
-    if judgement.verdict == "unknown":
-        return 0.3 / (1.0 + left)
-    share = 0.5 + 0.49 / (1.0 + left)
-    return min(share, _ONE_FORCE) if _one_force(judgement.model.effects) else share
-
-
-def _one_force(effects: Sequence[Effect]) -> bool:
-    """Return True for two effects that are both forces without memory of the same signals: their sum is one more such force."""
-    if len(effects) < 2 or any(effect.torque is None or effect.states for effect in effects):
-        return False
-    read = [
-        {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
-        for effect in effects
-        if effect.torque is not None
-    ]
-    return all(signals == read[0] for signals in read)
 
 
 def _column(rig: Rig, model: Scored, output: str) -> NDArray[np.float64]:
