@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.effects import effect_named
@@ -16,6 +17,10 @@ from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
+
+# Timings decide no test: on a busy machine an example may take any time.
+settings.register_profile("rigsight", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("rigsight")
 
 SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
 

@@ -67,7 +67,7 @@ def test_an_interrupted_diagnosis_leaves_nothing(stage: str, axis_campaign: Path
     time.sleep(2.0)
     # As a terminal does it: to the whole group, worker processes included.
     os.killpg(process.pid, signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=60)
+    stdout, stderr = process.communicate(timeout=180)
     assert process.returncode == 130, seen + stderr
     assert stdout == ""
     assert "Traceback" not in stderr

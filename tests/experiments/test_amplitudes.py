@@ -98,12 +98,12 @@ sys.path.insert(0, {str(STUDY)!r})
 from store import Stage
 def work(folder):
     (folder / "half").write_text("half")
-    time.sleep(60)
+    time.sleep(300)
 Stage(Path({str(tmp_path)!r}) / "stage", {{}}, work).ensure()
 """
     process = subprocess.Popen([sys.executable, "-c", program])
     try:
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 120.0
         while not list(tmp_path.glob(".stage.*.part/half")):
             assert time.monotonic() < deadline
             time.sleep(0.02)

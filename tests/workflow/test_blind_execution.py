@@ -23,7 +23,7 @@ from rigsight.errors import InputError, RigsightError
 from rigsight.workflow import blind_execution
 from rigsight.workflow.blind_execution import finished
 
-PATIENCE = 20.0
+PATIENCE = 120.0
 
 
 def no_dask() -> bool:

@@ -1,8 +1,8 @@
 """How probable is it that the cause is among the candidates at all?
 
-The held-out errors of candidates tell which of them is best, not whether a cause that nobody thought of would do better. What is
-known of that is how near a mere relative of the cause comes by chance: it closes some share of the gap, and of a faint gap what it
-leaves hides below the uncertainty of the noise floor.
+The held-out errors of candidates tell which of them is best, not whether a cause that nobody thought of would do better. How near
+a mere relative of the cause comes by chance can be said: it closes some share of the gap, and of a faint gap what it leaves hides
+below the uncertainty of the noise floor.
 """
 
 from __future__ import annotations
