@@ -37,7 +37,6 @@ app = typer.Typer(
     help="Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks.",
     epilog="'rigsight COMMAND --help' tells more. Start with 'rigsight demo'.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
