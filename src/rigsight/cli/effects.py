@@ -42,7 +42,7 @@ def list_effects(
 
 
 def _as_json(effects: Iterable[Effect]) -> str:
-    from rigsight.workflow.own_effects import equations
+    from rigsight.workflow.effect_declaration import equations
     from rigsight.workflow.results import json_text
 
     listed = [
