@@ -15,6 +15,7 @@ from rigsight.cli.diagnose import diagnose
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
 from rigsight.cli.exit_codes import INTERRUPTED, leave
+from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
@@ -26,6 +27,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "discover": discover,
     "compare": compare,
     "simulate": simulate,
+    "export": export,
     "vary": vary,
     "blind": blind,
     "effects": list_effects,
