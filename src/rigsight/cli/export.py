@@ -20,9 +20,7 @@ def export(
     ],
     to: Annotated[
         str,
-        typer.Option(
-            "--to", metavar="TARGET", help="python, control, c, fmu, matlab, latex or modelica."
-        ),
+        typer.Option("--to", metavar="TARGET", help="python, control, c, fmu, matlab, latex or modelica."),
     ],
     out: Annotated[
         Path | None,
@@ -30,7 +28,7 @@ def export(
             "--out",
             "-o",
             metavar="FILE",
-            show_default="model with the target's suffix in this folder",
+            show_default="the rig's name with the target's suffix",
             help="File to write; function, C prefix and model are named after it.",
         ),
     ] = None,

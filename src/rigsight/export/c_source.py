@@ -16,7 +16,9 @@ from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 HISTORY = 4096
 """Samples that a delay may last; more cost memory in every instance."""
 
-_SIGN_OF = "static double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }\n\n"
+_SIGN_OF = (
+    "static double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }\n\n"
+)
 _SWITCHES = """static void switches(const parameters *p, instant at, const double *x, const double *s, double *g) {{
 {body}
 }}
@@ -206,7 +208,11 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         + (_REMEMBER.format(**upper_name) if late else "")
         + ("    memcpy(m->origin, m->readings[0], sizeof m->origin);\n" if late else ""),
         "PIECE": (_CONSTANT_STEP.format(**upper_name) if delayed or late else "")
-        + (_LATE_HISTORY % {"late": C.expression(structure.measured_late, names), **upper_name} if late else "")
+        + (
+            _LATE_HISTORY % {"late": C.expression(structure.measured_late, names), **upper_name}
+            if late
+            else ""
+        )
         + (_MOTION_PIECE if rest is None else _PIECES[exported.hold]),
         "STEP_BODY": _step_body(exported, upper, names),
         "REMEMBER": _REMEMBER.format(**upper_name) if late else "",

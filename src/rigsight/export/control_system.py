@@ -18,9 +18,7 @@ from rigsight.export.python_function import (
     unpacked_states,
 )
 
-_KINKS = (
-    "Its equations have kinks, which a solver of variable step crosses unseen: keep max_step short of the events."
-)
+_KINKS = "Its equations have kinks, which a solver of variable step crosses unseen: keep max_step short of the events."
 _SMOOTH = "Its equations are smooth."
 
 
@@ -50,7 +48,9 @@ def control_system(exported: Exported, source: str, name: str) -> str:
             "PARAMETERS": indented(parameter_entries(exported)),
             "REST": sequence([repr(value) for value in state_at_rest(exported)]),
             "UNPACK_PARAMETERS": unpack,
-            "UNPACK_INPUT": "input_value, input_rate = given" if len(inputs) > 1 else "(input_value,) = given",
+            "UNPACK_INPUT": "input_value, input_rate = given"
+            if len(inputs) > 1
+            else "(input_value,) = given",
             "RATES": _array(exported, [equation.limited_rate for equation in structure.equations]),
             "OUTPUTS": _array(exported, list(structure.outputs)),
             "INPUTS": ", ".join(map(repr, inputs)),

@@ -42,7 +42,7 @@ def equation_lines(exported: Exported) -> list[str]:
 
     def text(expression: sp.Expr) -> str:
         renamed = expression.xreplace({s: sp.Symbol(name, real=True) for s, name in names.items()})
-        return str(_TextPrinter().doprint(renamed))
+        return str(_TextPrinter().doprint(renamed)).replace("**", "^")
 
     structure = exported.structure
     lines = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from rigsight.effects import Place
+from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.simulate import parameter_vector
 from rigsight.simulate.input_hold import Hold
@@ -17,19 +17,6 @@ from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure, without_vanished_effects
 from rigsight.units import unit_text
-
-_TAKEN = frozenset(
-    # Words of the languages in which a parameter may become a variable, and names that the templates use themselves.
-    """
-    and as assert async await break case catch char class connect const continue def default del discrete do double each
-    else elseif elsewhen encapsulated end enumeration enum equation except expandable extends extern external false final
-    finally flow float for from function global goto if import in initial inline inner input int is lambda long loop model
-    modes nonlocal not operator or otherwise outer output package parameter partial pass persistent protected public raise
-    record redeclare register replaceable restrict return short signed sizeof state static stream struct switch then time
-    true try type typedef union unsigned void volatile when while with within yield
-    input_value input_rate friction_sign sign_of rates switches outputs limits math np control max min abs sign pi eps
-    """.split()
-)
 
 
 @dataclass(frozen=True)
@@ -204,7 +191,7 @@ class _Names:
         name = re.sub(r"[^0-9A-Za-z_]+", "_", wished).strip("_") or "value"
         if name[0].isdigit():
             name = f"n_{name}"
-        while name in self._used or name in _TAKEN or keyword.iskeyword(name) or re.match(r"part\d", name):
+        while name in self._used or name in RESERVED or re.match(r"part\d", name):
             name += "_"
         self._used.add(name)
         return Quantity(name, source, unit, description)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from rigsight.export.description import equation_lines, hold_text, made_by
 from rigsight.export.equations import Exported, Quantity
@@ -34,7 +34,7 @@ def model_description(exported: Exported, source: str, name: str, guid: str) -> 
     guid
         What ties description and binary together.
     """
-    root = ElementTree.Element(
+    root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
         modelName=name,
@@ -45,7 +45,7 @@ def model_description(exported: Exported, source: str, name: str, guid: str) -> 
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
     )
-    simulation = ElementTree.SubElement(
+    simulation = ET.SubElement(
         root,
         "CoSimulation",
         modelIdentifier=name,
@@ -55,13 +55,13 @@ def model_description(exported: Exported, source: str, name: str, guid: str) -> 
         canGetAndSetFMUstate="true",
         canNotUseMemoryManagementFunctions="true",
     )
-    files = ElementTree.SubElement(simulation, "SourceFiles")
-    ElementTree.SubElement(files, "File", name=f"fmi2_{name}.c")
+    files = ET.SubElement(simulation, "SourceFiles")
+    ET.SubElement(files, "File", name=f"fmi2_{name}.c")
     quantities = (*exported.inputs, *exported.outputs, *exported.parameters)
-    units = ElementTree.SubElement(root, "UnitDefinitions")
+    units = ET.SubElement(root, "UnitDefinitions")
     for unit in sorted({q.unit for q in quantities}):
-        ElementTree.SubElement(units, "Unit", name=unit or _NO_UNIT)
-    variables = ElementTree.SubElement(root, "ModelVariables")
+        ET.SubElement(units, "Unit", name=unit or _NO_UNIT)
+    variables = ET.SubElement(root, "ModelVariables")
     reference = 0
     taken: set[str] = set()
     groups: list[tuple[str, str, tuple[Quantity, ...], tuple[float, ...] | None]] = [
@@ -74,7 +74,7 @@ def model_description(exported: Exported, source: str, name: str, guid: str) -> 
         for i, quantity in enumerate(members):
             own = quantity.name if quantity.name not in taken else f"{causality}_{quantity.name}"
             taken.add(own)
-            variable = ElementTree.SubElement(
+            variable = ET.SubElement(
                 variables,
                 "ScalarVariable",
                 name=own,
@@ -88,17 +88,17 @@ def model_description(exported: Exported, source: str, name: str, guid: str) -> 
                 outputs.append(reference + 1)
             elif causality == "parameter":
                 variable.set("initial", "exact")
-            real = ElementTree.SubElement(variable, "Real", unit=quantity.unit or _NO_UNIT)
+            real = ET.SubElement(variable, "Real", unit=quantity.unit or _NO_UNIT)
             if starts is not None:
                 real.set("start", repr(starts[i]))
             reference += 1
-    structure = ElementTree.SubElement(root, "ModelStructure")
+    structure = ET.SubElement(root, "ModelStructure")
     for group in ("Outputs", "InitialUnknowns"):
-        unknowns = ElementTree.SubElement(structure, group)
+        unknowns = ET.SubElement(structure, group)
         for index in outputs:
-            ElementTree.SubElement(unknowns, "Unknown", index=str(index))
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
+            ET.SubElement(unknowns, "Unknown", index=str(index))
+    ET.indent(root)
+    text = ET.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 

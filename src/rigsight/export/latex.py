@@ -11,7 +11,9 @@ from rigsight.export.equations import Exported, Quantity
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
 _THIN = r"\,"
-_GREEK = re.compile(r"^(alpha|beta|gamma|delta|zeta|psi|phi|omega|tau|sigma|rho|mu|nu|kappa|lambda|theta|eta)$")
+_GREEK = re.compile(
+    r"^(alpha|beta|gamma|delta|zeta|psi|phi|omega|tau|sigma|rho|mu|nu|kappa|lambda|theta|eta)$"
+)
 
 
 def latex(exported: Exported, source: str) -> str:
@@ -54,11 +56,12 @@ class _Writer:
         letters = [source.rpartition(".")[2] for source in sources]
         self.symbols: dict[sp.Symbol, str] = {
             symbol: _symbol(source, alone=letters.count(source.rpartition(".")[2]) == 1)
-            for symbol, source in zip(
-                (*structure.parameter_symbols, *structure.states), sources, strict=True
-            )
+            for symbol, source in zip((*structure.parameter_symbols, *structure.states), sources, strict=True)
         }
-        if structure.rig.is_driven and not (shown := _symbol(exported.outputs[0].name)) in self.symbols.values():
+        if (
+            structure.rig.is_driven
+            and (shown := _symbol(exported.outputs[0].name)) not in self.symbols.values()
+        ):
             # The axis calls its displacement x; only its state has a longer name.
             self.symbols[structure.states[0]] = shown
         source = _symbol(exported.inputs[0].name)
@@ -88,9 +91,7 @@ class _Writer:
         if self._exported.frozen.friction_mode is not None:
             velocity = self.symbols[structure.states[structure.velocity_index or 0]]
             lines.append(rf"{velocity} &= 0 \text{{ while dry friction holds}}")
-        for i, (output, expression) in enumerate(
-            zip(self._exported.outputs, structure.outputs, strict=True)
-        ):
+        for i, (output, expression) in enumerate(zip(self._exported.outputs, structure.outputs, strict=True)):
             late = structure.measured_late if i == 0 else None
             if late is None and self.symbols.get(expression) == _symbol(output.name):
                 continue
@@ -109,13 +110,21 @@ def _symbol(source: str, *, alone: bool = True) -> str:
     """Return a declared name as LaTeX: ``k_c``; with its effect below where another has the same."""
     effect, _, own = source.rpartition(".")
     letter, _, below = own.partition("_")
-    base = f"\\{letter}" if _GREEK.match(letter) else (letter if len(letter) == 1 else rf"\mathrm{{{letter}}}")
+    base = (
+        f"\\{letter}" if _GREEK.match(letter) else (letter if len(letter) == 1 else rf"\mathrm{{{letter}}}")
+    )
     if match := re.fullmatch(r"([A-Za-z])(\d+)", letter):
         base, below = match[1], ", ".join(filter(None, [match[2], below]))
-    words = [] if not below else [below if len(below) <= 2 else rf"\text{{{_text(below.replace('_', ' '))}}}"]
+    words = [] if not below else [_below(below)]
     if effect and not alone:
         words.append(rf"\text{{{_text(effect.replace('_', ' '))}}}")
     return f"{base}_{{{', '.join(words)}}}" if words else base
+
+
+def _below(text: str) -> str:
+    if _GREEK.match(text):
+        return f"\\{text}"
+    return text if len(text) <= 2 else rf"\text{{{_text(text.replace('_', ' '))}}}"
 
 
 def _number(value: float) -> str:

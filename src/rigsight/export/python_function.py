@@ -126,7 +126,9 @@ def python_function(exported: Exported, source: str) -> str:
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
         "SENSOR_DELAY": _number(exported, structure.measured_late, "None"),
-        "READ_SIGNS": "        motion.read_signs(piece, start + split, 0.0)" if exported.hold == "zoh" else "",
+        "READ_SIGNS": "        motion.read_signs(piece, start + split, 0.0)"
+        if exported.hold == "zoh"
+        else "",
         "PIECES": _pieces(exported, inputs),
         "REST": _rest(exported),
         "OUTPUT_NAMES": sequence([repr(output.name) for output in exported.outputs]),

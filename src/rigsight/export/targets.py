@@ -18,6 +18,7 @@ from rigsight.export.latex import latex
 from rigsight.export.matlab_function import matlab_function
 from rigsight.export.modelica import modelica
 from rigsight.export.python_function import python_function
+from rigsight.export.reserved_words import MATLAB, MODELICA
 from rigsight.simulate import Structure
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
@@ -26,6 +27,7 @@ STICKING = "the sticking of dry friction"
 DELAY = "a delay"
 SENSOR_DELAY = "a late sensor"
 _SHORTEST = 1e-9
+_RESERVED = {"matlab": MATLAB, "modelica": MODELICA}
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Target:
     write
         Text or bytes for the model, the name of its source and its own name.
     lacks
-        What it has no words for.
+        What it is written without.
     steps
         True if it goes from sample to sample itself, so that the hold of the input is its business.
     named
@@ -143,7 +145,7 @@ def _check_expressible(target: Target, content: Exported) -> None:
         if what in target.lacks:
             able = ", ".join(t.name for t in TARGETS.values() if what not in t.lacks)
             raise InputError(
-                f"'{effect}' cannot be exported to {target.name}: it has no words for {what}. Targets that have: {able}."
+                f"'{effect}' cannot be exported to {target.name}, which is written without {what}. Targets with it: {able}."
             )
 
 
@@ -166,5 +168,9 @@ def _check_name(target: Target, name: str) -> None:
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,59}", name):
         raise InputError(
             f"'{name}' cannot be the name of a {target.name} model, which is that of its file: letters, digits and underscores, "
-            f"a letter first, at most 60. Name another file with --out."
+            "a letter first, at most 60. Name another file with --out."
+        )
+    if name in _RESERVED.get(target.name, ()):
+        raise InputError(
+            f"'{name}' is a word of the language and no name for a {target.name} model. Name another file with --out."
         )

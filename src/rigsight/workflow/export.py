@@ -32,8 +32,8 @@ def run_export(
     target
         A key of `rigsight.export.TARGETS`.
     out
-        File to write; default is ``model`` with the target's suffix in this folder. Its name is that of the function, C prefix
-        or model.
+        File to write; default is the rig's name with the target's suffix in this folder. Its name is that of the function, C
+        prefix or model.
     hold
         How the input behaves between its samples; default is the model's.
     step
@@ -53,13 +53,19 @@ def run_export(
         If the model cannot be read, the target cannot say it, or the file cannot be written.
     """
     chosen = TARGETS[check_option("Target", target, TARGETS)]
-    file = Path(f"model{chosen.suffix}" if out is None else out)
+    read = read_model(model, own_effects)
+    file = Path(f"{read.structure.rig.name}{chosen.suffix}" if out is None else out)
     check_target(file)
     if file.suffix != chosen.suffix:
         raise InputError(f"{file} cannot hold {chosen.name}: name a file that ends in {chosen.suffix}.")
-    read = read_model(model, own_effects)
     content = export_model(
-        read, target, source=_source(Path(model)), name=file.stem, hold=hold, step=step, source_only=source_only
+        read,
+        target,
+        source=_source(Path(model)),
+        name=file.stem,
+        hold=hold,
+        step=step,
+        source_only=source_only,
     )
     write_together(file.parent, {file.name: content})
     return file
