@@ -38,10 +38,10 @@ def results(tmp_path_factory, case_named, case_names) -> Path:
             f"a = load('in{i}.txt'); y = rig{i}(a(:, 1), {signals});",
             f"dlmwrite('out{i}.txt', y, 'delimiter', ' ', 'precision', '%.17g');",
         ]
-    (folder / "all.m").write_text("\n".join(script) + "\n", encoding="utf-8")
+    (folder / "run_models.m").write_text("\n".join(script) + "\n", encoding="utf-8")
     surroundings = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     run = subprocess.run(
-        ["octave-cli", "-q", "all.m"],
+        ["octave-cli", "-q", "run_models.m"],
         cwd=folder,
         capture_output=True,
         text=True,

@@ -15,6 +15,8 @@ from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
 MIN_STEPS = 4
 """Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
+MIN_STEPS_PRESCRIBED = 32
+"""The same where the motion is prescribed: the model has no time scale of its own that says more."""
 
 _PIECES = {
     "zoh": "return [(value, 0.0, 0.0, 0.0) for value in samples]",
@@ -82,7 +84,9 @@ _NO_REST = '''def _rest(numbers, first):
 
 def min_steps(exported: Exported) -> int:
     """Return how many internal steps a sample has at least: 1 where the equations are linear."""
-    return 1 if is_linear(exported.frozen, exported.structure.states) else MIN_STEPS
+    if not exported.states or is_linear(exported.frozen, exported.structure.states):
+        return 1
+    return MIN_STEPS_PRESCRIBED if exported.rest is None else MIN_STEPS
 
 
 def python_function(exported: Exported, source: str) -> str:
