@@ -30,9 +30,10 @@ check: $(INSTALLED)  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(INSTALLED)  ## measure the simulator against C and scipy, and the time of a diagnosis
+bench: $(INSTALLED)  ## measure the simulator against C and scipy, the time of a diagnosis, and exports against the simulator
 	@$(BIN)/python benchmarks/simulation.py
 	@$(BIN)/python benchmarks/diagnosis.py
+	@$(BIN)/python benchmarks/exports.py
 
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small

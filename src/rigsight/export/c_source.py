@@ -10,6 +10,7 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.languages import C
+from rigsight.export.precomputed import Equations, equations_of
 from rigsight.export.python_function import min_steps
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
@@ -19,7 +20,8 @@ HISTORY = 4096
 _SIGN_OF = (
     "static double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }\n\n"
 )
-_SWITCHES = """static void switches(const parameters *p, instant at, const double *x, const double *s, double *g) {{
+_SWITCHES = """static void switches(const parameters *p, const double *q, instant at, const double *x, const double *s,
+                     double *g) {{
 {body}
 }}
 
@@ -65,7 +67,8 @@ static void rest(model *m, const parameters *given, const double *u, double *x) 
 {values}
     if (stiffness > 0.0) {{
         m->p.{damping} = fmax(m->p.{damping}, 2.0 * sqrt(stiffness * inertia));
-{silenced}        length = 40.0 * acos(-1.0) * sqrt(inertia / stiffness);
+{silenced}        prepare(m);
+        length = 40.0 * acos(-1.0) * sqrt(inertia / stiffness);
         if (settled(m, 0.0, length) == {upper}_OK && u[0] != 0.0) settled(m, u[0], length);
     }}
     memcpy(x, m->x, sizeof m->x);
@@ -116,7 +119,7 @@ _REMEMBER = """    {{
         instant at = {{0.0, 0.0, 0.0}};
         at.value = m->u[0];
         at.time = m->t;
-        computed(&m->p, at, m->x, all);
+        computed(&m->p, m->q, at, m->x, all);
         m->readings[m->sample % {upper}_HISTORY][0] = all[0];
         m->readings[m->sample % {upper}_HISTORY][1] = all[N_COMPUTED - 1];
     }}
@@ -155,12 +158,18 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     name
         What every name that others see begins with.
     """
-    structure, frozen, rest = exported.structure, exported.frozen, exported.rest
+    structure, frozen, rest, equations = (
+        exported.structure,
+        exported.frozen,
+        exported.rest,
+        equations_of(exported),
+    )
     upper, names = name.upper(), _names(exported)
+    names |= {symbol: f"q[{i}]" for i, symbol in enumerate(equations.constants)}
     modes = {mode: f"s[{i}]" for i, mode in enumerate(frozen.modes)}
-    rates = _body("r", frozen.rates, {**names, **modes})
-    switches = _body("g", frozen.switches, {**names, **modes})
-    outputs = _body("y", structure.computed_outputs, names)
+    rates = _body("r", equations.rates, {**names, **modes})
+    switches = _body("g", equations.switches, {**names, **modes})
+    outputs = _body("y", equations.outputs, names)
     inputs = ["t", *(quantity.name for quantity in exported.inputs)]
     outs = [quantity.name for quantity in exported.outputs]
     delayed, late = structure.delay is not None, structure.measured_late is not None
@@ -200,6 +209,8 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         "LIMITS": _limits(exported),
         "REST": "" if rest is None else _rest(exported, upper),
         "REST_CALL": "" if rest is None else _REST_CALL.format(name=name),
+        "N_CONSTANTS": max(1, len(equations.constants)),
+        "PREPARE": _prepare(exported, equations),
         "DEFAULTS": "\n".join(
             f"    p->{q.name} = {value!r};"
             for q, value in zip(exported.parameters, exported.values, strict=True)
@@ -242,12 +253,19 @@ def _body(target: str, expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol,
     lines = C.statements([f"{target}[{i}]" for i in range(len(expressions))], expressions, names)
     text = "\n".join(lines)
     # Compilers warn of arguments that an equation happens not to read.
-    known = ("p", "at", "x", "s") if target != "y" else ("p", "at", "x")
-    marks = {"p": "p->", "at": "at.", "x": "x[", "s": "s["}
+    known = ("p", "q", "at", "x", "s") if target != "y" else ("p", "q", "at", "x")
+    marks = {"p": "p->", "q": "q[", "at": "at.", "x": "x[", "s": "s["}
     unread = [f"(void){argument};" for argument in known if marks[argument] not in text]
     if not lines:
         unread.append(f"(void){target};")
     return "\n".join(f"    {line}" for line in ([" ".join(unread)] if unread else []) + lines)
+
+
+def _prepare(exported: Exported, equations: Equations) -> str:
+    targets = [f"m->q[{i}]" for i in range(len(equations.constants))]
+    lines = C.statements(targets, list(equations.constants.values()), _names(exported))
+    head = "const parameters *p = &m->p;" if lines else "m->q[0] = 0.0;"
+    return "\n".join(f"    {line}" for line in [head, *lines])
 
 
 def _limits(exported: Exported) -> str:
@@ -266,7 +284,7 @@ def _limits(exported: Exported) -> str:
             "    double values[SIZE_MODES];",
             "    int pass, k;",
             f"    for (pass = 0; pass < {len(dependent)}; pass++) {{",
-            "        switches(p, at_time(c, tau), m->x, m->s, values);",
+            "        switches(p, m->q, at_time(c, tau), m->x, m->s, values);",
             f"        for (k = 0; k < {len(dependent)}; k++)",
             "            if (values[dependent[k]] != 0.0) m->s[dependent[k]] = values[dependent[k]] < 0.0 ? -1.0 : 1.0;",
             "    }",

@@ -10,6 +10,7 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.languages import MATLAB
+from rigsight.export.precomputed import equations_of
 from rigsight.export.python_function import min_steps
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
@@ -148,8 +149,8 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
     name
         Name of the function; its file must have the same.
     """
-    structure, frozen = exported.structure, exported.frozen
-    names = _names(exported)
+    structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
+    names = _names(exported) | {symbol: f"p.{symbol.name}" for symbol in equations.constants}
     modes = {mode: f"s({i + 1})" for i, mode in enumerate(frozen.modes)}
     inputs = [quantity.name for quantity in exported.inputs]
     velocity = 1 + (structure.velocity_index or 0)
@@ -172,11 +173,18 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
             f"p.{q.name} = {value!r};   % [{q.unit}] {q.description}"
             for q, value in zip(exported.parameters, exported.values, strict=True)
         ),
+        "PREPARE": "\n".join(
+            MATLAB.statements(
+                [f"p.{symbol.name}" for symbol in equations.constants],
+                list(equations.constants.values()),
+                names,
+            )
+        ),
         "STEP": repr(exported.step),
         "MIN_STEPS": min_steps(exported),
-        "RATES": _body("r", frozen.rates, {**names, **modes}),
-        "SWITCHES": _body("g", frozen.switches, {**names, **modes}),
-        "OUTPUTS": _body("y", structure.computed_outputs, names),
+        "RATES": _body("r", equations.rates, {**names, **modes}),
+        "SWITCHES": _body("g", equations.switches, {**names, **modes}),
+        "OUTPUTS": _body("y", equations.outputs, names),
         "PIECES": _pieces(exported, inputs),
         "HOLD_AT_REST": f"if m.x({velocity}) == 0\n  m = hold_or_leave(m, piece, begin, tau);\nend\n"
         if sticks

@@ -11,6 +11,7 @@ from rigsight.export.description import filled, header_lines, hold_text, indente
 from rigsight.export.equations import Exported
 from rigsight.export.internal_step import is_linear
 from rigsight.export.languages import PYTHON
+from rigsight.export.precomputed import equations_of
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
 MIN_STEPS = 4
@@ -99,7 +100,7 @@ def python_function(exported: Exported, source: str) -> str:
     source
         The file it comes from.
     """
-    structure, frozen = exported.structure, exported.frozen
+    structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
     names = code_names(exported)
     modes = {mode: f"modes[{i}]" for i, mode in enumerate(frozen.modes)}
     every = {**names, **modes}
@@ -123,10 +124,17 @@ def python_function(exported: Exported, source: str) -> str:
         "INPUTS": ", ".join(inputs),
         "HOLD_TEXT": hold_text(exported),
         "N_OUTPUTS": len(structure.computed_outputs),
-        "UNPACK_PARAMETERS": indented(unpacked_parameters(exported)),
-        "RATES": _returned(unpack, list(frozen.rates), every),
-        "SWITCHES": _returned(unpack, list(frozen.switches), every),
-        "OUTPUTS": _returned(unpack, list(structure.computed_outputs), names),
+        "UNPACK_PARAMETERS": indented(
+            [
+                *unpacked_parameters(exported),
+                *PYTHON.statements(
+                    [symbol.name for symbol in equations.constants], list(equations.constants.values()), names
+                ),
+            ]
+        ),
+        "RATES": _returned(unpack, list(equations.rates), every),
+        "SWITCHES": _returned(unpack, list(equations.switches), every),
+        "OUTPUTS": _returned(unpack, list(equations.outputs), names),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
         "SENSOR_DELAY": _number(exported, structure.measured_late, "None"),
