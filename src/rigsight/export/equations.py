@@ -92,7 +92,7 @@ class Exported:
     def title(self) -> str:
         """Rig and effects in words."""
         effects = ", ".join(self.structure.effect_names)
-        return f"{self.structure.rig.name} with {effects}" if effects else f"{self.structure.rig.name}"
+        return harmless(f"{self.structure.rig.name} with {effects}" if effects else self.structure.rig.name)
 
     def names(self) -> dict[sp.Symbol, str]:
         """Return the name of every symbol in the equations but the modes."""
@@ -191,7 +191,13 @@ class _Names:
         name = re.sub(r"[^0-9A-Za-z_]+", "_", wished).strip("_") or "value"
         if name[0].isdigit():
             name = f"n_{name}"
-        while name in self._used or name in RESERVED or re.match(r"part\d", name):
+        while name in self._used or name in RESERVED or re.fullmatch(r"(part|constant_)\d+", name):
             name += "_"
         self._used.add(name)
-        return Quantity(name, source, unit, description)
+        return Quantity(name, source, harmless(unit), harmless(description))
+
+
+def harmless(text: str) -> str:
+    """Return text that ends no comment and no string of any target, on one line."""
+    plain = "".join(c if c.isprintable() else " " for c in text).replace('"', "'").replace("\\", "/")
+    return " ".join(plain.replace("*/", "* /").split())

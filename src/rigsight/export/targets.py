@@ -11,7 +11,7 @@ import sympy as sp
 from rigsight.errors import InputError, check_in_range, check_option
 from rigsight.export.c_source import c_source
 from rigsight.export.control_system import control_system
-from rigsight.export.equations import Exported, exported
+from rigsight.export.equations import Exported, exported, harmless
 from rigsight.export.fmu import fmu
 from rigsight.export.internal_step import LONGEST, internal_step
 from rigsight.export.latex import latex
@@ -121,8 +121,8 @@ def export_model(
     )
     _check_expressible(chosen, content)
     if target == "fmu":
-        return fmu(content, source, name, source_only=source_only)
-    return chosen.write(content, source, name)
+        return fmu(content, harmless(source), name, source_only=source_only)
+    return chosen.write(content, harmless(source), name)
 
 
 def unsaid(content: Exported) -> dict[str, str]:
