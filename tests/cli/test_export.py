@@ -119,3 +119,16 @@ def test_without_a_compiler_an_fmu_of_sources_is_offered(
     assert not out.exists()
     assert run("export", model, "--to", "fmu", "--out", out, "--source-only")[0] == 0
     assert out.read_bytes().startswith(b"PK")
+
+
+def test_an_effect_of_one_s_own_is_exported(
+    write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    example = Path(__file__).parents[2] / "docs" / "examples" / "my_effects.py"
+    model = write_model(
+        lambda m: m.update(effects=["quintic_stiffness"], effect_parameters={"k_5": 6e10}, units={})
+    )
+    out = tmp_path / "stage.c"
+    code, _, stderr = run("export", model, "--to", "c", "--out", out, "--effects", example)
+    assert code == 0, stderr
+    assert "k_5" in out.read_text(encoding="utf-8")

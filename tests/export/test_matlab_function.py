@@ -20,6 +20,8 @@ pytestmark = [
 ]
 
 N_SAMPLES = 41
+LONG_STARTS = {"offsets", "start under load"}
+"""Starts that are sought over tens of thousands of steps: a minute each in Octave, and left to the other languages."""
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +30,8 @@ def results(tmp_path_factory, case_named, case_names) -> Path:
     folder = tmp_path_factory.mktemp("octave")
     script = ["warning('off', 'all');"]
     for i, name in enumerate(case_names):
+        if name in LONG_STARTS:
+            continue
         case = case_named(name)
         text = export_model(case.model, "matlab", source="model.json", name=f"rig{i}")
         assert isinstance(text, str)
@@ -53,6 +57,8 @@ def results(tmp_path_factory, case_named, case_names) -> Path:
 
 
 def test_it_gives_the_outputs_of_the_engine(case, case_names, results: Path):
+    if case.name in LONG_STARTS:
+        pytest.skip("seeking this start takes Octave a minute")
     table = np.loadtxt(results / f"out{case_names.index(case.name)}.txt", ndmin=2)
     assert table.shape == (N_SAMPLES, len(case.outputs))
     simulated = {name: table[:, i] for i, name in enumerate(case.outputs)}

@@ -48,7 +48,7 @@ def equation_lines(exported: Exported) -> list[str]:
     lines = []
     if structure.delay is not None:
         name = exported.inputs[0].name
-        lines.append(f"{name} arrives late: {name}(t - ({text(structure.delay)}))")
+        lines.append(f"{name} arrives {text(structure.delay)} late")
     for state, equation in zip(exported.states, structure.equations, strict=True):
         line = f"{state.name}' = {text(equation.rate)}"
         if equation.limit is not None:

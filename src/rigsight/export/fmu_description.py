@@ -39,7 +39,7 @@ def model_description(exported: Exported, source: str, name: str, guid: str) -> 
         fmiVersion="2.0",
         modelName=name,
         guid=guid,
-        description=f"{exported.title}; within a communication step {hold_text(exported)}. "
+        description=f"{exported.title}. A communication step is a sample: {hold_text(exported)}. "
         + "; ".join(equation_lines(exported)),
         generationTool=made_by(source).removeprefix("Made by "),
         variableNamingConvention="flat",
