@@ -12,10 +12,11 @@ from rigsight.effects import Place
 from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.simulate import parameter_vector
+from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure, without_vanished_effects
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
 from rigsight.units import unit_text
 
 

@@ -10,9 +10,10 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.simulate import parameter_vector
+from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, without_vanished_effects
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
 OSCILLATION = 0.03
 """Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""
