@@ -43,7 +43,9 @@ def main(folder: Path) -> None:
         u = np.concatenate([rest, drive])
         x = measured(u, rng)
         rows = np.column_stack([1e3 * DT * np.arange(u.size), u, 1e3 * x])
-        np.savetxt(folder / f"{name}.csv", rows, "%.7g", ",", header="time_ms,force_N,position_mm", comments="")
+        np.savetxt(
+            folder / f"{name}.csv", rows, "%.7g", ",", header="time_ms,force_N,position_mm", comments=""
+        )
 
 
 if __name__ == "__main__":

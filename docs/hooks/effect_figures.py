@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from sine_tests import Panel, panels
 
 from rigsight.effects import Effect
@@ -29,29 +30,28 @@ SCHEMES = (
     Scheme("light", "#1d2126", "#e3e7ea", "#6c757d", ("#e69f00", "#d55e00", "#0072b2")),
     Scheme("dark", "#dfe3e8", "#3a4048", "#9aa4ae", ("#f0c15a", "#ff8c42", "#56b4e9")),
 )
-WIDTH, HEIGHT = 7.4, 3.2
+WIDTH, HEIGHT = 3.9, 3.3
+"""Inch; each panel is a picture of its own, so that a phone shows one below the other at full width."""
 STYLES = ((0, (1, 1)), (0, (4, 1.2)), "-")
 
 
 def figures(effect: Effect) -> dict[str, str]:
-    """Return the figure of an effect as SVG by the name of the scheme."""
-    shown = panels(effect)
-    return {scheme.name: _svg(shown, scheme) for scheme in SCHEMES}
+    """Return the pictures of an effect as SVG, by the end of their file's name: ``"1-light"`` to ``"2-dark"``."""
+    return {
+        f"{number}-{scheme.name}": _svg(panel, scheme)
+        for number, panel in enumerate(panels(effect), start=1)
+        for scheme in SCHEMES
+    }
 
 
-def _svg(shown: tuple[Panel, Panel], scheme: Scheme) -> str:
+def _svg(panel: Panel, scheme: Scheme) -> str:
     with style():
         figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
-        figure.patch.set_alpha(0.0)
-        axes = figure.subplots(1, 2)
-        handles = {}
-        for ax, panel in zip(axes, shown, strict=True):
-            _draw(ax, panel, scheme)
-            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-                handles.setdefault(label, handle)
-        figure.legend(
-            handles.values(), handles.keys(), loc="outside lower center", ncols=2, labelcolor=scheme.ink
-        )
+        ax = figure.subplots()
+        _draw(ax, panel, scheme)
+        handles, labels = ax.get_legend_handles_labels()
+        once = dict(zip(labels, handles, strict=True))
+        figure.legend(once.values(), once.keys(), loc="outside lower left", ncols=1, labelcolor=scheme.ink)
         buffer = io.StringIO()
         # No date and no random ids, so that drawing it again changes nothing.
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
@@ -65,12 +65,19 @@ def _draw(ax: Axes, panel: Panel, scheme: Scheme) -> None:
         else:
             look = {"color": scheme.levels[line.level], "linestyle": STYLES[line.level], "linewidth": 1.5}
         ax.plot(line.x, line.y, label=line.label, **look)
-    ax.set_xscale("log" if panel.logarithmic[0] else "linear")
-    ax.set_yscale("log" if panel.logarithmic[1] else "linear")
+    scales = ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale))
+    for (axis, set_scale), logarithmic in zip(scales, panel.logarithmic, strict=True):
+        if not logarithmic:
+            axis.set_major_locator(MaxNLocator(5))
+            continue
+        set_scale("log")
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        # Plain numbers: powers of ten would need formulas, which the style does not read.
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
     ax.set_title(panel.title, color=scheme.ink)
     ax.set_xlabel(panel.across, color=scheme.ink)
     ax.set_ylabel(panel.up, color=scheme.ink)
-    ax.patch.set_alpha(0.0)
     ax.tick_params(which="both", colors=scheme.ink)
     ax.grid(visible=True, color=scheme.grid)
     ax.set_axisbelow(True)

@@ -32,7 +32,8 @@ _UNBOUNDED = 1e6
 def index_page() -> str:
     """Return the page that lists all effects."""
     rows = [
-        f"| [{_title(effect)}]({effect.name}.md) | {_PLACES[effect.place]} | {effect.summary} |" for effect in CATALOGUE
+        f"| [{_title(effect)}]({effect.name}.md) | {_PLACES[effect.place]} | {effect.summary} |"
+        for effect in CATALOGUE
     ]
     return "\n".join(
         [
@@ -53,9 +54,8 @@ def index_page() -> str:
 
 
 def effect_page(effect: Effect) -> str:
-    """Return the page of an effect; its pictures are `NAME-light.svg` and `NAME-dark.svg` beside it."""
+    """Return the page of an effect; its pictures, `NAME-1-light.svg` to `NAME-2-dark.svg`, are beside it."""
     text = effect_text(effect)
-    picture = f"Responses of a rig with and without {effect_label(effect.name)}"
     parts = [
         f"# {_title(effect)}",
         f"{text.title}. {effect.summary}",
@@ -68,7 +68,7 @@ def effect_page(effect: Effect) -> str:
         _parameters(effect),
         "## Signature",
         text.signature,
-        f"![{picture}]({effect.name}-light.svg#only-light)\n![{picture}]({effect.name}-dark.svg#only-dark)",
+        _pictures(effect),
         _caption(effect),
         "## When it applies",
         text.applies,
@@ -102,7 +102,10 @@ def _facts(effect: Effect) -> str:
 def _equations(effect: Effect) -> str:
     rig = AXIS if AXIS.offers(effect) else RUNNING_GEAR
     motion, own = equations_of(rig, [effect])
-    groups = (("The effect:", own.equations), (f"In the equation of the {motion.title.lower()}:", motion.equations))
+    groups = (
+        ("The effect:", own.equations),
+        (f"In the equation of the {motion.title.lower()}:", motion.equations),
+    )
     return "\n\n".join(
         f'{heading}\n\n<div class="equation" data-search-exclude>{"".join(equations)}</div>'
         for heading, equations in groups
@@ -112,10 +115,17 @@ def _equations(effect: Effect) -> str:
 def _parameters(effect: Effect) -> str:
     rigs = [rig for rig in RIGS.values() if rig.offers(effect)]
     names = [rig.name.replace("_", " ") for rig in rigs]
-    head = ["symbol", "meaning", *(f"unit, {name}" for name in names), "bounds", "without effect at", "search range"]
+    head = [
+        "symbol",
+        "meaning",
+        *(f"unit, {name}" for name in names),
+        "bounds",
+        "without effect at",
+        "search range",
+    ]
     rows = [head, ["---"] * len(head)]
     for p in effect.parameters:
-        units = [_unit(rig.with_unit(p).unit) for rig in rigs]
+        units = [rig.with_unit(p).unit for rig in rigs]
         null = "" if p.null is None else _number(p.null)
         rows.append([f"`{p.name}`", p.description, *units, _bounds(p), null, _search(p)])
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
@@ -125,13 +135,9 @@ def _parameters(effect: Effect) -> str:
     )
 
 
-def _unit(unit: str) -> str:
-    return "1" if unit == "1" else f"{unit}"
-
-
 def _bounds(p: Parameter) -> str:
     low, high = abs(p.lower) < _UNBOUNDED, abs(p.upper) < _UNBOUNDED
-    if p.lower > 0.0 and p.lower < 1.0 / _UNBOUNDED and not high:
+    if 0.0 < p.lower < 1e-5 and not high:
         return "above 0"
     if low and high:
         return f"{_number(p.lower)} to {_number(p.upper)}"
@@ -152,6 +158,16 @@ def _number(value: float) -> str:
     return f"{value:g}".replace("-", "\u2212") if abs(value) < 1e5 else f"{value:.0e}"
 
 
+def _pictures(effect: Effect) -> str:
+    seen = f"Responses of a rig with and without {effect_label(effect.name)}"
+    links = [
+        f"![{seen}, {number}]({effect.name}-{number}-{scheme}.svg#only-{scheme})"
+        for number in (1, 2)
+        for scheme in ("light", "dark")
+    ]
+    return "\n".join(['<div class="panels" markdown="span">', *links, "</div>"])
+
+
 def _caption(effect: Effect) -> str:
     if effect.place is Place.SENSOR:
         how = "Running gear with the numbers of the thesis; the frequency is that of the drive."
@@ -160,9 +176,9 @@ def _caption(effect: Effect) -> str:
     else:
         how = "Axis with m = 1 kg, d = 2 N s/m, k = 100 N/m: it resonates at 10 rad/s."
     return (
-        f"*Simulated when this site was built, in steady state, each frequency alone. {how} The effect has the first of its start "
-        "values; where it changes with amplitude, amplitude 1 is the one that they are scaled for. A line that breaks off is a rig "
-        "that sticks, or one that leaves the range in which the equation holds.*"
+        f"*Simulated when this site was built, in steady state, each frequency alone. {how} Of the effect's start values those "
+        "are shown that move it most; where it changes with amplitude, amplitude 1 is the one that they are scaled for. A line "
+        "that breaks off is a rig that sticks, or one that leaves the range in which the equation holds.*"
     )
 
 
@@ -171,7 +187,9 @@ def _neighbors(effect: Effect) -> str:
     for other in CATALOGUE:
         relation = _relation(effect, other)
         if other is not effect and relation:
-            rows.append(f"| [{_title(other)}]({other.name}.md) | {relation} | {effect_text(other).signature} |")
+            rows.append(
+                f"| [{_title(other)}]({other.name}.md) | {relation} | {_one_line(effect_text(other).signature)} |"
+            )
     alike = [
         f"[{effect_label(other.name)}]({other.name}.md)"
         for other in CATALOGUE
@@ -183,9 +201,9 @@ def _neighbors(effect: Effect) -> str:
         parts.append("\n".join(table))
     if alike:
         parts.append(
-            f"At the same place, with the same trend of the gain and the same kind of harmonics: {listed(alike)}. What tells these "
-            "apart is not the trend but its form: the fit to records of several amplitudes and the error on records that were not "
-            "fitted."
+            "At the same place, with the same trend of the gain and the same kind of harmonics: "
+            f"{listed(alike)}. What tells these apart is not the trend but its form: the fit to records of several amplitudes, "
+            "and the error on records that were not fitted."
         )
     if not parts:
         parts.append("No other effect of the catalogue acts at this place with the same trend and harmonics.")
@@ -194,6 +212,10 @@ def _neighbors(effect: Effect) -> str:
         "[how the verdict is reached](../verdict.md)."
     )
     return "\n\n".join(parts)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _relation(effect: Effect, other: Effect) -> str:
@@ -210,6 +232,6 @@ def _names(text: EffectText, other: Effect) -> bool:
     """Return True if a text names an effect, in any order of the words of its name: "delay of the input"."""
     sentences = re.split(r"[.;:]", " ".join(f"{text.applies} {text.equation}".lower().split()))
     words = effect_label(other.name).lower().split()
-    return any(all(re.search(rf"\b{re.escape(word)}\b", sentence) for word in words) for sentence in sentences)
-
-
+    return any(
+        all(re.search(rf"\b{re.escape(word)}\b", sentence) for word in words) for sentence in sentences
+    )

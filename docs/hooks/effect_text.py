@@ -51,13 +51,21 @@ def effect_text(effect: Effect) -> EffectText:
     parts: dict[str, list[str]] = {"equation": [], "applies": [], "signature": [], "references": []}
     current = "equation"
     for block in blocks:
-        for part, opening in (("applies", "Applies to"), ("signature", "Signature:"), ("references", "References:")):
+        for part, opening in (
+            ("applies", "Applies to"),
+            ("signature", "Signature:"),
+            ("references", "References:"),
+        ):
             if block.startswith(opening):
                 current = part
         parts[current].append(block)
     missing = [part for part, found in parts.items() if not found]
     if missing or _HEADING not in text:
-        raise ValueError(f"The docstring of {effect.name} says nothing under: {', '.join(missing) or 'Equation'}.")
+        raise ValueError(
+            f"The docstring of {effect.name} says nothing under: {', '.join(missing) or 'Equation'}."
+        )
+    for p in effect.parameters:
+        parts["equation"] = [re.sub(rf"^{p.name}(?=: )", f"`{p.name}`", block) for block in parts["equation"]]
     joined = {part: "\n\n".join(found) for part, found in parts.items()}
     for part in ("signature", "references"):
         opened = joined[part].partition(":")[2].strip()

@@ -27,7 +27,17 @@ PACKAGES = (
     "report",
 )
 """From what is measured to what is shown, as the rooms of the house lie above each other."""
-COMMANDS = ("campaign", "diagnose", "identify", "discover", "compare", "simulate", "vary", "blind", "model_file")
+COMMANDS = (
+    "campaign",
+    "diagnose",
+    "identify",
+    "discover",
+    "compare",
+    "simulate",
+    "vary",
+    "blind",
+    "model_file",
+)
 """Modules of `rigsight.workflow` that are public one by one: each command is a function of its own module."""
 
 
@@ -45,8 +55,8 @@ def reference_index() -> str:
         [
             "# Python reference",
             "",
-            "SI units everywhere; axis 0 of an array is time or frequency; angular frequency `omega` is in rad/s, sample time `dt` "
-            "in s. Public names are those shown here; anything else may change without notice.",
+            "SI units everywhere; axis 0 of an array is time or frequency; angular frequency `omega` is in rad/s, sample time "
+            "`dt` in s. Public names are those shown here; anything else may change without notice.",
             "",
             "| package | what it answers |",
             "|---|---|",

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rigsight.effects import Effect, GainTrend, Place
 from rigsight.errors import SimulationError
 from rigsight.records import Record
-from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR
+from rigsight.rigs import ELEMENT, RUNNING_GEAR
 from rigsight.simulate import Structure, compose, simulate
-from rigsight.workflow.effect_promises import AXIS_BENCH, FULL, GEAR_BENCH, Bench, start_values
+from rigsight.workflow.effect_promises import FULL, GEAR_BENCH, Bench, bench_of, start_values
 
 LEVELS = (0.3, 1.0, 3.0)
 """Amplitudes of the drive, in units of the one for which an effect's start values are scaled."""
@@ -60,11 +60,12 @@ def panels(effect: Effect) -> tuple[Panel, Panel]:
     """Return the two pictures that show an effect."""
     if effect.place is Place.SENSOR:
         return _paths(effect)
-    values, bench = _values(effect), AXIS_BENCH if AXIS.offers(effect) else GEAR_BENCH
+    values, bench = _values(effect), bench_of(effect)
     levels = _levels(effect)
     steady = effect.signature.gain_trend is GainTrend.STEADY and not effect.signature.even_harmonics
     gain = _gain(effect, bench, values, levels[1:2] if steady else levels)
-    if effect.place is Place.DISTURBANCE or effect.lateral is not None or effect.drive is not None and not steady:
+    limited = effect.drive is not None and not steady
+    if effect.place is Place.DISTURBANCE or effect.lateral is not None or limited:
         return gain, _over_time(effect, bench, values, levels[1])
     if ELEMENT.offers(effect):
         return gain, _loop(effect, values, levels)
@@ -77,11 +78,24 @@ def _levels(effect: Effect) -> tuple[float, ...]:
 
 
 def _values(effect: Effect) -> Values:
-    values = start_values(effect)[0]
-    if effect.name == "gravity_pendulum":
-        # All of the stiffness is weight, as of anything that hangs freely.
-        values["k_g"] = values["k"]
-    return {name: 0.0 if name.endswith("_off") else value for name, value in values.items()}
+    """Return the start values that move the rig farthest from the linear one, with the trend that the effect declares."""
+    bench, levels = bench_of(effect), _levels(effect)
+    linear = _first_harmonic(compose(bench.rig), bench, bench.values, levels[1], SLOW)
+    structure = compose(bench.rig, [effect])
+    best, farthest = None, -1.0
+    for start in start_values(effect):
+        values = {name: 0.0 if name.endswith("_off") else value for name, value in start.items()}
+        if effect.name == "gravity_pendulum":
+            # All of the stiffness is weight, as of anything that hangs freely.
+            values["k_g"] = values["k"]
+        small, full = (_first_harmonic(structure, bench, values, level, SLOW) for level in levels[:2])
+        change = abs(full) / max(abs(small), 1e-30) - 1.0
+        falls, rises = change < -1e-4, change > 1e-4
+        trend = GainTrend.FALLS if falls else GainTrend.RISES if rises else GainTrend.STEADY
+        distance = abs(full / linear - 1.0)
+        if trend is effect.signature.gain_trend and distance > farthest:
+            best, farthest = values, distance
+    return best or values
 
 
 def _sine(bench: Bench, amplitude: float, omega: float, least: float = DECAY) -> Record:
@@ -96,19 +110,21 @@ def _response(
     structure: Structure, bench: Bench, values: Values, amplitude: float, over: str = ""
 ) -> NDArray[np.complex128]:
     """Return the first harmonic of an output over that of the input (or another output), shape (n_frequencies,)."""
-    found = []
-    for omega in FREQUENCIES:
-        record = _sine(bench, amplitude, omega)
-        try:
-            moved = simulate(structure, values, record)
-        except SimulationError:
-            # Beyond the range in which the effect's equation makes sense.
-            found.append(complex(np.nan))
-            continue
-        below = moved[over] if over else record[bench.rig.inputs[0].name]
-        first = [np.fft.rfft(signal[-2 * PER_PERIOD :])[2] for signal in (moved[bench.output], below)]
-        found.append(first[0] / first[1])
-    return np.array(found)
+    return np.array([_first_harmonic(structure, bench, values, amplitude, w, over) for w in FREQUENCIES])
+
+
+def _first_harmonic(
+    structure: Structure, bench: Bench, values: Values, amplitude: float, omega: float, over: str = ""
+) -> complex:
+    record = _sine(bench, amplitude, omega)
+    try:
+        moved = simulate(structure, values, record)
+    except SimulationError:
+        # Beyond the range in which the effect's equation makes sense.
+        return complex(np.nan)
+    below = moved[over] if over else record[bench.rig.inputs[0].name]
+    response, source = (np.fft.rfft(signal[-2 * PER_PERIOD :])[2] for signal in (moved[bench.output], below))
+    return complex(response / source)
 
 
 def _gain(effect: Effect, bench: Bench, values: Values, levels: tuple[float, ...]) -> Panel:
