@@ -48,7 +48,7 @@ blind: $(INSTALLED)  ## the standard blind bench, 300 rigs; writes docs/blind.md
 
 clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)
 	rm -rf demo out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Stamps are written last: an interrupted installation is taken up again by the next call.
 $(DEPENDENCIES): requirements.lock

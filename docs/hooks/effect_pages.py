@@ -177,7 +177,7 @@ def _caption(effect: Effect) -> str:
         how = "Axis with m = 1 kg, d = 2 N s/m, k = 100 N/m: it resonates at 10 rad/s."
     return (
         f"*Simulated when this site was built, in steady state, each frequency alone. {how} Of the effect's start values those "
-        "are shown that move it most; where it changes with amplitude, amplitude 1 is the one that they are scaled for. A line "
+        "are used that show most; where it changes with amplitude, amplitude 1 is the one that they are scaled for. A line "
         "that breaks off is a rig that sticks, or one that leaves the range in which the equation holds.*"
     )
 

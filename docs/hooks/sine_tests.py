@@ -21,8 +21,10 @@ from rigsight.workflow.effect_promises import FULL, GEAR_BENCH, Bench, bench_of,
 
 LEVELS = (0.3, 1.0, 3.0)
 """Amplitudes of the drive, in units of the one for which an effect's start values are scaled."""
-LARGE_ANGLE = 100.0
+LARGE_ANGLE = 20.0
 """Factor on the amplitudes of a pendulum: the axis of the tests turns through a hundredth of a radian only."""
+HARDLY_DRIVEN = 0.1
+"""Amplitude of the drive beside which a disturbance is seen."""
 PER_PERIOD = 80
 DECAY = 8.0
 """Time after which the rig of the tests has forgotten its start [s]."""
@@ -64,8 +66,9 @@ def panels(effect: Effect) -> tuple[Panel, Panel]:
     levels = _levels(effect)
     steady = effect.signature.gain_trend is GainTrend.STEADY and not effect.signature.even_harmonics
     gain = _gain(effect, bench, values, levels[1:2] if steady else levels)
-    limited = effect.drive is not None and not steady
-    if effect.place is Place.DISTURBANCE or effect.lateral is not None or limited:
+    if effect.place is Place.DISTURBANCE:
+        return gain, _over_time(effect, bench, values, HARDLY_DRIVEN)
+    if effect.lateral is not None or (effect.drive is not None and not steady):
         return gain, _over_time(effect, bench, values, levels[1])
     if ELEMENT.offers(effect):
         return gain, _loop(effect, values, levels)
@@ -78,7 +81,7 @@ def _levels(effect: Effect) -> tuple[float, ...]:
 
 
 def _values(effect: Effect) -> Values:
-    """Return the start values that move the rig farthest from the linear one, with the trend that the effect declares."""
+    """Return the start values that show most, with the trend of the gain that the effect declares."""
     bench, levels = bench_of(effect), _levels(effect)
     linear = _first_harmonic(compose(bench.rig), bench, bench.values, levels[1], SLOW)
     structure = compose(bench.rig, [effect])
@@ -92,7 +95,7 @@ def _values(effect: Effect) -> Values:
         change = abs(full) / max(abs(small), 1e-30) - 1.0
         falls, rises = change < -1e-4, change > 1e-4
         trend = GainTrend.FALLS if falls else GainTrend.RISES if rises else GainTrend.STEADY
-        distance = abs(full / linear - 1.0)
+        distance = abs(full / linear - 1.0) if trend is GainTrend.STEADY else min(abs(change), 1.0)
         if trend is effect.signature.gain_trend and distance > farthest:
             best, farthest = values, distance
     return best or values
@@ -191,7 +194,8 @@ def _over_time(effect: Effect, bench: Bench, values: Values, level: float) -> Pa
         Line(t, simulate(structure, values, record)[bench.output][shown], label, number)
         for structure, label, number in _both(effect, bench)
     ]
-    return Panel("Answer to a sine of amplitude 1", "time [s]", f"{bench.output} [m]", tuple(lines))
+    title = f"Answer to a sine of amplitude {level / _levels(effect)[1]:g}"
+    return Panel(title, "time [s]", f"{bench.output} [m]", tuple(lines))
 
 
 def _loop(effect: Effect, values: Values, levels: tuple[float, ...]) -> Panel:
