@@ -37,7 +37,8 @@ bench: $(INSTALLED)  ## measure the simulator against C and scipy, the time of a
 	@$(BIN)/python benchmarks/exports.py
 
 docs: $(INSTALLED) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@# Not --quiet: what is not told does not count as a warning, and would not end a strict build.
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "The site is in build/site; open build/site/index.html."
 
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped

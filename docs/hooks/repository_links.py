@@ -9,7 +9,9 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Collection
+from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
 _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]+)\]\((?P<target>[^)\s]+)\)")
 _FENCE = re.compile(r"(^```.*?^```)", re.DOTALL | re.MULTILINE)
 
@@ -72,6 +74,9 @@ def with_site_links(markdown: str, page: str, known: Collection[str]) -> str:
         path = posixpath.normpath(posixpath.join(folder, target))
         place = place_on_site(path)
         if place is None or place not in known:
+            if not (ROOT / path).exists():
+                # Left as it is, for mkdocs to complain of.
+                return link[0]
             text = link["text"]
             return text if path in text else f"{text} (`{path}`)"
         relative = posixpath.relpath(place, posixpath.dirname(page) or ".")

@@ -67,6 +67,7 @@ def test_links_on_the_site_lead_to_its_pages(hook: Callable[[str], ModuleType]) 
         ("[a](../../docs/thesis.md)", "experiments/thesis.md", "[a](../thesis.md)"),
         ("[a](../../src/rigsight/effects)", "experiments/thesis.md", "[a](../effects/index.md)"),
         ("[a](../LICENSE)", "verdict.md", "a (`LICENSE`)"),
+        ("[a](not_there.md)", "verdict.md", "[a](not_there.md)"),
         ("[a](https://example.org/b)", "verdict.md", "[a](https://example.org/b)"),
         ("[a](#b)", "verdict.md", "[a](#b)"),
         ("```\n[a](../LICENSE)\n```", "verdict.md", "```\n[a](../LICENSE)\n```"),
