@@ -25,6 +25,7 @@ PACKAGES = (
     "workflow",
     "plot",
     "report",
+    "export",
 )
 """From what is measured to what is shown, as the rooms of the house lie above each other."""
 COMMANDS = (
