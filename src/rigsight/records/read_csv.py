@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,66 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
+from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.dialect import Dialect, is_comment, looks_like_names, sniff
 
 # The text and its lines are held in memory together, about five times the file.
 LARGEST_FILE = 2_000_000_000
-
-
-@dataclass(frozen=True)
-class ColumnMapping:
-    """Where a signal stands in a file: ``value in SI = scale * column + offset``.
-
-    Attributes
-    ----------
-    name
-        Column name of the header, or the column's number, counted from 1.
-    scale, offset
-        Conversion to SI.
-
-    Raises
-    ------
-    InputError
-        If the scale is zero, or scale or offset is not finite.
-    """
-
-    name: str | int
-    scale: float = 1.0
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.scale) or self.scale == 0.0:
-            raise InputError(
-                f"Column '{self.name}': scale must be a finite number other than 0, got {self.scale}."
-            )
-        if not math.isfinite(self.offset):
-            raise InputError(f"Column '{self.name}': offset must be a finite number, got {self.offset}.")
-
-    def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the column, shape (n_samples,), in SI units."""
-        return self.scale * column + self.offset
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Numbers of a file as they stand there, before scale and offset.
-
-    Attributes
-    ----------
-    values
-        Signal name -> column, shape (n_samples,); all finite.
-    labels
-        Signal name -> how the file calls the column.
-    lines
-        Line number of every row, shape (n_samples,).
-    notes
-        What was assumed while reading.
-    """
-
-    values: Mapping[str, NDArray[np.float64]]
-    labels: Mapping[str, str]
-    lines: NDArray[np.int64]
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
