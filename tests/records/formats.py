@@ -16,7 +16,10 @@ Write = Callable[[Path, Rows, Units], None]
 
 
 def write_text(path: Path, rows: Rows, units: Units) -> None:
-    lines = [",".join(rows), *(",".join(repr(float(v)) for v in row) for row in zip(*rows.values(), strict=True))]
+    lines = [
+        ",".join(rows),
+        *(",".join(repr(float(v)) for v in row) for row in zip(*rows.values(), strict=True)),
+    ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -102,7 +105,9 @@ def write_uff(path: Path, rows: Rows, units: Units, binary: int = 1) -> None:
         for i, (name, samples) in enumerate(rows.items())
         if name != "t"
     ]  # fmt: skip
-    pyuff.UFF(str(path)).write_sets(sets, mode="overwrite", force_double=True)
+    # Overwriting loses the first binary dataset (pyuff 2.5); appending to nothing does not.
+    path.unlink(missing_ok=True)
+    pyuff.UFF(str(path)).write_sets(sets, mode="add", force_double=True)
 
 
 FORMATS: dict[str, tuple[str, Write]] = {

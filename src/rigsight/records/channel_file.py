@@ -43,8 +43,6 @@ _NAMES = {
 }
 SUFFIXES = tuple(_SUFFIXES)
 """Of the formats other than delimited text."""
-# They tell their troubles to the log and then raise; one message is enough.
-_LOGGERS = ("asammdf", "nptdms")
 
 
 def file_format(path: Path) -> str | None:
@@ -188,14 +186,12 @@ def _told(path: Path, name: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    loggers = [logging.getLogger(name) for name in _LOGGERS]
-    before = [logger.disabled for logger in loggers]
-    for logger in loggers:
-        logger.disabled = True
+    """Keep libraries from telling their troubles to the log as well: one message is enough."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     finally:
-        for logger, disabled in zip(loggers, before, strict=True):
-            logger.disabled = disabled
+        logging.disable(before)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rigsight.errors import InputError
 from rigsight.records.column_mapping import ColumnMapping
-
-if TYPE_CHECKING:
-    from pint import UnitRegistry
 
 _SI = ("A", "rad", "m", "N", "N m", "s", "V", "kg", "Hz")
 """Units that need no library to be known."""
@@ -71,6 +68,7 @@ def _ratio(unit: str, si: str) -> float:
         raise UnknownUnitError("is no unit")
     registry = _registry()
     try:
+        # Root units, not dimensions: pint counts angles, shares and plain numbers as one dimension.
         size, base = registry.get_root_units(registry.parse_units(text))
         target_size, target = registry.get_root_units(registry.parse_units(si))
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError):
@@ -84,7 +82,7 @@ def _ratio(unit: str, si: str) -> float:
 
 
 @cache
-def _registry() -> UnitRegistry[float]:
+def _registry() -> Any:
     from pint import UnitRegistry
 
     return UnitRegistry(cache_folder=None)

@@ -31,7 +31,9 @@ def open_hdf5(path: Path) -> Iterator[ChannelFile]:
         channels: list[Channel] = []
         refused: list[Refused] = []
 
-        def visit(name: str, item: Any) -> None:
+        def visit(stored: str | bytes, item: Any) -> None:
+            # A name that is no UTF-8 comes as bytes.
+            name = stored.decode("utf-8", errors="replace") if isinstance(stored, bytes) else stored
             check_count(path.name, len(channels) + len(refused))
             if not isinstance(item, h5py.Dataset):
                 return

@@ -66,4 +66,6 @@ def _channels(name: str, declared: Variable, load: Load) -> list[Channel] | Refu
 def _read(data: bytes, variable: str) -> Any:
     from scipy.io import loadmat
 
-    return loadmat(io.BytesIO(data), variable_names=[variable])[variable]
+    # The stream and not the path: what was checked is what is read.
+    stream: Any = io.BytesIO(data)
+    return loadmat(stream, variable_names=[variable])[variable]

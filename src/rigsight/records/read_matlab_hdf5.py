@@ -35,14 +35,14 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
             else:
                 channels.extend(found)
 
-        for name in file:
+        for name in map(str, file):
             if name in _INTERNAL or file.get(name, getlink=True).__class__ is not h5py.HardLink:
                 continue
             item = file[name]
             if not isinstance(item, h5py.Group):
                 take(name, item)
                 continue
-            for field in item:
+            for field in map(str, item):
                 if item.get(field, getlink=True).__class__ is h5py.HardLink:
                     inside = item[field]
                     if isinstance(inside, h5py.Group):

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib.util
+import json
+import subprocess
+import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
@@ -19,10 +26,10 @@ from rigsight.records.channel import (
     stated_unit,
     with_distinct_names,
 )
+from rigsight.records.mdf_process import TIME
 
-# Types of asammdf.blocks.v4_constants: numbers, and conversions that are formulas with numbers, not text.
-_NUMBERS = range(6)
-_NO_CONVERSION, _ALGEBRAIC, _LAST_NUMERIC = (None, 0), 3, 6
+LONGEST_WAIT = 300.0
+"""For one answer [s]; a damaged file can lead asammdf in a circle."""
 
 
 def open_mdf(path: Path) -> Iterator[ChannelFile]:
@@ -30,65 +37,87 @@ def open_mdf(path: Path) -> Iterator[ChannelFile]:
 
     Channels whose conversion is a formula in text are refused: evaluating it would execute what the file says.
     """
-    from asammdf import MDF
-
+    if importlib.util.find_spec("asammdf") is None:
+        raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
     with path.open("rb") as stream:
         if stream.read(12)[8:9] < b"4":
             raise InputError(
                 f"{path.name} is an MDF file of version 2 or 3; save it as version 4.10 or newer."
             )
-        stream.seek(0)
-        with MDF(stream, process_bus_logging=False, remove_source_from_channel_names=False) as file:
-            channels: list[Channel] = []
-            refused: list[Refused] = []
-            several = len(file.groups) > 1
-            for number, group in enumerate(file.groups):
-                master = file.masters_db.get(number)
-                n_samples = int(group.channel_group.cycles_nr)
-                axis = _axis(file, group, number, master, n_samples)
-                label = group.channel_group.acq_name or f"group {number + 1}"
-                for index, channel in enumerate(group.channels):
-                    check_count(path.name, len(channels) + len(refused))
-                    if index == master:
-                        continue
-                    name = f"{label}/{channel.name}" if several else channel.name
-                    reason = _refusal(channel, n_samples, axis)
-                    if reason is not None:
-                        refused.append(Refused(name, reason))
-                        continue
-                    unit = stated_unit(channel.unit) or stated_unit(getattr(channel.conversion, "unit", None))
-                    channels.append(Channel(name, n_samples, _load(file, number, index), unit, axis))
-            yield ChannelFile("MDF4", with_distinct_names(channels), tuple(refused))
+    with _Reader(path) as reader:
+        channels: list[Channel] = []
+        refused: list[Refused] = []
+        check_count(path.name, reader.contents["n_channels"])
+        groups = reader.contents["groups"]
+        for number, group in enumerate(groups):
+            n_samples = group["n_samples"]
+            unit = stated_unit(group["time_unit"]) or "s"
+            axis = TimeAxis(n_samples, load=reader.load(number, TIME), unit=unit)
+            prefix = f"{group['name'] or f'group {number + 1}'}/" if len(groups) > 1 else ""
+            for name, index, unit, reason in group["channels"]:
+                if reason is not None:
+                    refused.append(Refused(prefix + name, reason))
+                else:
+                    load = reader.load(number, index)
+                    channels.append(Channel(prefix + name, n_samples, load, stated_unit(unit), axis))
+        yield ChannelFile("MDF4", with_distinct_names(channels), tuple(refused))
 
 
-def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int) -> TimeAxis | None:
-    if master is None:
-        return None
-    channel = group.channels[master]
-    if _conversion(channel) == _ALGEBRAIC:
-        return None
-    return TimeAxis(n_samples, load=lambda: file.get_master(number), unit=stated_unit(channel.unit) or "s")
+class _Reader:
+    """The process that reads, as long as the file is open."""
 
+    def __init__(self, path: Path) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "rigsight.records.mdf_process", str(path.resolve())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        self.contents: dict[str, Any] = {}
 
-def _load(file: Any, number: int, index: int) -> Load:
-    def samples() -> NDArray[Any]:
-        read: NDArray[Any] = file.get(group=number, index=index, samples_only=True)[0]
-        return read
+    def __enter__(self) -> _Reader:
+        try:
+            self.contents = self._answer()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
 
-    return samples
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                # Closing flushes what the process no longer takes.
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        self._process.wait()
 
+    def load(self, group: int, index: int) -> Load:
+        def samples() -> NDArray[Any]:
+            assert self._process.stdin is not None
+            self._process.stdin.write(f"{group} {index}\n".encode())
+            self._process.stdin.flush()
+            self._answer(has_array=True)
+            return self._array
 
-def _refusal(channel: Any, n_samples: int, axis: TimeAxis | None) -> str | None:
-    """Return why a channel is no signal, None if it may be one."""
-    conversion = _conversion(channel)
-    if conversion == _ALGEBRAIC:
-        return "is converted by a formula in text, which is not executed; export it with physical values"
-    if channel.data_type not in _NUMBERS or (conversion not in _NO_CONVERSION and conversion > _LAST_NUMERIC):
-        return "holds text, a list or other bytes, no numbers"
-    if n_samples < 2:
-        return "holds a single number" if n_samples else "is empty"
-    return None if axis is not None else "has no time"
+        return samples
 
-
-def _conversion(channel: Any) -> int | None:
-    return None if channel.conversion is None else int(channel.conversion.conversion_type)
+    def _answer(self, has_array: bool = False) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        watch = threading.Timer(LONGEST_WAIT, self._process.kill)
+        watch.daemon = True
+        watch.start()
+        try:
+            line = self._process.stdout.readline()
+            if not line:
+                raise ValueError("reading it made the library crash or took too long")
+            answer: dict[str, Any] = json.loads(line)
+            if "error" in answer:
+                if answer["error"] == "MemoryError":
+                    raise MemoryError
+                raise ValueError(f"{answer['error']}: {answer['reason']}")
+            if has_array:
+                self._array: NDArray[Any] = np.lib.format.read_array(self._process.stdout, allow_pickle=False)
+        finally:
+            watch.cancel()
+        return answer

@@ -63,13 +63,13 @@ def _load(file: Any, name: str) -> Load:
 def _is_numeric(kind: Any) -> bool:
     from pyarrow import types
 
-    return types.is_integer(kind) or types.is_floating(kind) or _is_time(kind)
+    return bool(types.is_integer(kind) or types.is_floating(kind)) or _is_time(kind)
 
 
 def _is_time(kind: Any) -> bool:
     from pyarrow import types
 
-    return types.is_timestamp(kind) or types.is_duration(kind)
+    return bool(types.is_timestamp(kind) or types.is_duration(kind))
 
 
 def _unit(metadata: Any) -> str | None:

@@ -32,6 +32,8 @@ def open_tdms(path: Path) -> Iterator[ChannelFile]:
     from nptdms import TdmsFile
 
     with TdmsFile.open(path) as file:
+        if file.file_status.incomplete_final_segment:
+            raise ValueError("the last segment is incomplete")
         channels: list[Channel] = []
         refused: list[Refused] = []
         for group in file.groups():

@@ -54,6 +54,10 @@ def open_uff(path: Path) -> Iterator[ChannelFile]:
             f"{path.name} has {size / 1e6:.0f} MB, more than the {LARGEST_FILE / 1e6:g} MB that are read of a universal file. "
             "Export the record as MATLAB 7.3, TDMS or MDF4."
         )
+    with path.open("rb") as stream:
+        stream.seek(-min(size, 200), 2)
+        if not stream.read().rstrip().endswith(b"-1"):
+            raise ValueError("the last dataset has no end")
     file = pyuff.UFF(str(path))
     types = [int(kind) for kind in file.get_set_types()]
     check_count(path.name, len(types))
