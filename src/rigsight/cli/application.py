@@ -17,11 +17,15 @@ from rigsight.cli.effects import list_effects
 from rigsight.cli.exit_codes import INTERRUPTED, leave
 from rigsight.cli.export import export
 from rigsight.cli.identify import identify
+from rigsight.cli.init import init
+from rigsight.cli.inspect import inspect
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": demo,
+    "inspect": inspect,
+    "init": init,
     "diagnose": diagnose,
     "identify": identify,
     "discover": discover,

@@ -2,8 +2,8 @@
 
 asammdf reads in C, and a damaged file can make it crash, run in circles or ask for all memory; the process that asked then gets
 a message instead. Run as ``python -P -m rigsight.records.mdf_process FILE``: one line of JSON tells what the file holds; then
-every line ``GROUP INDEX`` on stdin (index -1: the time of the group) is answered by a line of JSON, and an array in numpy's
-format.
+every line ``GROUP INDEX`` on stdin (index -1: the time of the group) is answered by a line of JSON with type and number of the
+samples, and their bytes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ def main(path: Path) -> None:
             _answer(answers, _contents(file))
             for line in sys.stdin:
                 group, index = map(int, line.split())
-                _answer(answers, {}, _samples(file, group, index))
+                samples = _samples(file, group, index)
+                answer = {"type": samples.dtype.str, "n_bytes": samples.nbytes}
+                _answer(answers, answer, samples.tobytes())
     except Exception as error:
         _answer(answers, {"error": type(error).__name__, "reason": str(error)[:200]})
     # asammdf's own clearing up may fail after a failure.
@@ -55,10 +57,8 @@ def main(path: Path) -> None:
     os._exit(0)
 
 
-def _answer(answers: IO[bytes], content: dict[str, Any], array: NDArray[Any] | None = None) -> None:
-    answers.write(json.dumps(content).encode() + b"\n")
-    if array is not None:
-        np.lib.format.write_array(answers, array, allow_pickle=False)
+def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> None:
+    answers.write(json.dumps(content).encode() + b"\n" + data)
     answers.flush()
 
 

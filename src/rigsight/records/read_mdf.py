@@ -77,7 +77,7 @@ class _Reader:
 
     def __enter__(self) -> _Reader:
         try:
-            self.contents = self._answer()
+            self.contents = self._answer()[0]
         except BaseException:
             self.__exit__()
             raise
@@ -97,12 +97,12 @@ class _Reader:
             assert self._process.stdin is not None
             self._process.stdin.write(f"{group} {index}\n".encode())
             self._process.stdin.flush()
-            self._answer(has_array=True)
-            return self._array
+            return self._answer()[1]
 
         return samples
 
-    def _answer(self, has_array: bool = False) -> dict[str, Any]:
+    def _answer(self) -> tuple[dict[str, Any], NDArray[Any]]:
+        """Return what the process says, and the samples that come with it."""
         assert self._process.stdout is not None
         watch = threading.Timer(LONGEST_WAIT, self._process.kill)
         watch.daemon = True
@@ -110,14 +110,15 @@ class _Reader:
         try:
             line = self._process.stdout.readline()
             if not line:
-                raise ValueError("reading it made the library crash or took too long")
+                raise ValueError("it makes the library that reads it crash, or run in circles")
             answer: dict[str, Any] = json.loads(line)
+            if answer.get("error") == "MemoryError":
+                raise MemoryError
             if "error" in answer:
-                if answer["error"] == "MemoryError":
-                    raise MemoryError
                 raise ValueError(f"{answer['error']}: {answer['reason']}")
-            if has_array:
-                self._array: NDArray[Any] = np.lib.format.read_array(self._process.stdout, allow_pickle=False)
+            kind = np.dtype(answer.get("type", "<f8"))
+            if kind.kind not in "iufb":
+                raise ValueError(f"its data is of type {kind}")
+            return answer, np.frombuffer(self._process.stdout.read(answer.get("n_bytes", 0)), dtype=kind)
         finally:
             watch.cancel()
-        return answer
