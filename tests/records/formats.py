@@ -64,7 +64,8 @@ def write_mdf(path: Path, rows: Rows, units: Units) -> None:
     ]
     with asammdf.MDF(version="4.10") as file:
         file.append(signals, comment="bench")
-        file.save(path, overwrite=True)
+        # The library insists on its suffix.
+        file.save(path.with_suffix(".mf4"), overwrite=True).rename(path)
 
 
 def write_tdms(path: Path, rows: Rows, units: Units) -> None:

@@ -38,8 +38,8 @@ def init(
     if quiet:
         return
     typer.echo(f"Written: {draft.path} ({draft.model}, {len(draft.records)} records)")
-    for _, reason in draft.left_out:
-        typer.echo(f"Not used: {reason}")
+    for name, reason in draft.left_out:
+        typer.echo(f"Not used: {name}: {reason}")
     if draft.n_blanks:
         typer.echo(
             f'Left to fill in: {draft.n_blanks} values that read "FILL IN". Then: rigsight diagnose {folder}'

@@ -17,10 +17,10 @@ NAMES_OF: dict[str, tuple[str, ...]] = {
     "force": ("force", "kraft", "f", "load", "last", "damper force", "dämpferkraft"),
 }  # fmt: skip
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
-_UNITS_BEHIND = frozenset(
-    ("s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm")
-    + ("m", "mm", "cm", "um", "µm", "rad", "mrad", "deg", "°")
-)
+_UNITS_BEHIND = frozenset({
+    "s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm",
+    "m", "mm", "cm", "um", "µm", "rad", "mrad", "deg", "°",
+})  # fmt: skip
 _IN_BRACKETS = re.compile(r"^(?P<bare>.*?)\s*[\[(<]\s*(?P<unit>[^\[\]()<>]*?)\s*[\])>]\s*$")
 _BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za-zµμ°]+)$")
 

@@ -1,7 +1,7 @@
 """What does a MATLAB file of version 5 to 7 declare, and is it safe to read?
 
-scipy allocates what a file declares before it looks whether the data is there. The declarations are therefore walked through
-first, without reading any numbers (MAT-File Format, MathWorks, R2023a, chapter 1).
+scipy allocates what a file declares before it looks whether the data is there, and crashes over types that do not exist. The
+declarations are therefore walked through first, without reading any numbers (MAT-File Format, MathWorks, R2023a, chapter 1).
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ from rigsight.errors import InputError
 from rigsight.records.channel import MOST_SAMPLES, check_count
 from rigsight.records.matlab_names import NUMERIC
 
-_MATRIX, _COMPRESSED = 14, 15
+_INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
+_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
+"""Type of element -> bytes of a number."""
+_TEXT = (1, 2, 4, 16, 17, 18)
 _CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse", *NUMERIC, "function", "opaque"), 1))
 _COMPLEX, _LOGICAL = 0x0800, 0x0200
 _HEADER = 128
@@ -101,13 +104,21 @@ def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, in
     return first, start, start + size, min(following, stop)
 
 
+def _part(data: bytes, position: int, stop: int, order: str, allowed: int) -> tuple[int, int, int]:
+    """Return start and end of an element of a known type, and where the next begins."""
+    kind, start, end, following = _element(data, position, stop, order)
+    if kind != allowed:
+        raise DamagedError(f"an element is of type {kind} instead of {allowed}")
+    return start, end, following
+
+
 def _matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> Variable:
     if depth > _DEEPEST:
         raise DamagedError(f"variables are nested more than {_DEEPEST} deep")
     if position == stop:
         return Variable("", "double", (0, 0))
-    _, start, end, position = _element(data, position, stop, order)
-    if end - start < 4:
+    start, end, position = _part(data, position, stop, order, _UINT32)
+    if end - start != 8:
         raise DamagedError("a variable has no class")
     flags = struct.unpack_from(order + "I", data, start)[0]
     kind = _CLASSES.get(flags & 0xFF)
@@ -115,11 +126,11 @@ def _matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> Va
         raise DamagedError(f"a variable is of class {flags & 0xFF}, which is unknown")
     shape: tuple[int, ...] = (1, 1)
     if kind != "opaque":
-        _, start, end, position = _element(data, position, stop, order)
+        start, end, position = _part(data, position, stop, order, _INT32)
         shape = struct.unpack_from(f"{order}{(end - start) // 4}i", data, start)
         if len(shape) < 2 or len(shape) > 32 or min(shape) < 0:
             raise DamagedError(f"a variable has the dimensions {shape}")
-    _, start, end, position = _element(data, position, stop, order)
+    start, end, position = _part(data, position, stop, order, _INT8)
     name = data[start:end].decode("latin-1")
     size = math.prod(shape)
     if kind in ("struct", "object", "cell"):
@@ -129,9 +140,32 @@ def _matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> Va
             f"variable '{name}' holds {size} numbers, more than the {MOST_SAMPLES} that are read. "
             "Split the record, or reduce the sample rate."
         )
-    if kind not in ("opaque", "function", "char"):
+    if kind in ("opaque", "function"):
+        _check_object(data, position, stop, order, depth)
+        return Variable(name, kind, shape)
+    _check_data(data, position, stop, order, kind, None if kind in ("char", "sparse") else size)
+    if kind != "char":
         kind = "complex" if flags & _COMPLEX else "logical" if flags & _LOGICAL else kind
     return Variable(name, kind, shape)
+
+
+def _check_data(data: bytes, position: int, stop: int, order: str, kind: str, size: int | None) -> None:
+    """Check the elements that hold the numbers of a variable: real, perhaps imaginary, of a sparse one the indices."""
+    while position < stop:
+        stored, start, end, position = _element(data, position, stop, order)
+        if stored not in (_TEXT if kind == "char" else _BYTES):
+            raise DamagedError(f"data is of type {stored}, which does not exist")
+        if size is not None and end - start != size * _BYTES[stored]:
+            raise DamagedError(f"{size} numbers are declared, and {end - start} bytes are there")
+
+
+def _check_object(data: bytes, position: int, stop: int, order: str, depth: int) -> None:
+    while position < stop:
+        stored, start, end, position = _element(data, position, stop, order)
+        if stored == _MATRIX:
+            _matrix(data, start, end, order, depth + 1)
+        elif stored != _INT8:
+            raise DamagedError(f"an object holds an element of type {stored}")
 
 
 def _container(
@@ -141,23 +175,20 @@ def _container(
     names = [""]
     if declared.kind != "cell":
         if declared.kind == "object":
-            *_, position = _element(data, position, stop, order)
-        _, start, end, position = _element(data, position, stop, order)
-        length = struct.unpack_from(order + "i", data, start)[0] if end - start >= 4 else 0
-        _, start, end, position = _element(data, position, stop, order)
+            *_, position = _part(data, position, stop, order, _INT8)
+        start, end, position = _part(data, position, stop, order, _INT32)
+        length = struct.unpack_from(order + "i", data, start)[0] if end - start == 4 else 0
+        start, end, position = _part(data, position, stop, order, _INT8)
         if length <= 0 or (end - start) % length:
             raise DamagedError("a struct has no field names")
         packed = [data[i : i + length] for i in range(start, end, length)]
         names = [text.split(b"\0")[0].decode("latin-1") for text in packed]
-    if size * len(names) * 8 > stop - position:
+    if size * max(len(names), 1) * 8 > max(stop - position, 8):
         raise DamagedError(f"'{declared.name}' has {size} elements, more than there is data")
     fields = []
     for i in range(size * len(names)):
-        kind, start, end, position = _element(data, position, stop, order)
-        if kind != _MATRIX:
-            raise DamagedError("a field is no variable")
+        start, end, position = _part(data, position, stop, order, _MATRIX)
         inside = _matrix(data, start, end, order, depth + 1)
         fields.append(Variable(names[i % len(names)], inside.kind, inside.shape, inside.fields))
-    return Variable(
-        declared.name, declared.kind, declared.shape, tuple(fields) if declared.kind == "struct" else ()
-    )
+    contents = tuple(fields) if declared.kind == "struct" else ()
+    return Variable(declared.name, declared.kind, declared.shape, contents)

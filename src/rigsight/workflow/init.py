@@ -83,7 +83,7 @@ def run_init(folder: str | Path, *, model: str | None = None) -> Draft:
         )
     proposals, left_out = _proposals(files, model)
     if not proposals:
-        reasons = "".join(f"\n{reason}" for _, reason in left_out[:5])
+        reasons = "".join(f"\n{name}: {reason}" for name, reason in left_out[:5])
         raise InputError(
             f"{folder} holds no measured file that can be used ({', '.join((*TEXT_SUFFIXES, *SUFFIXES))}).{reasons}"
         )
@@ -104,7 +104,7 @@ def _proposals(files: Sequence[Path], model: str | None) -> tuple[list[Proposal]
                     raise InputError(f"{file.name} holds no signal over time.")
                 found[file] = propose(file, opened, model)
         except InputError as error:
-            left_out.append((file.name, str(error)))
+            left_out.append((file.name, str(error).removeprefix(file.name).lstrip(":, ")))
     if model is None and found:
         fitting = Counter(
             one.guess.rig.name for one in found.values() if one.guess.open_questions == 0
@@ -156,7 +156,7 @@ def _text(
         "# Written by rigsight init from the files of this folder. What stands behind a # was guessed: check it.",
     ]
     if n_blanks:
-        lines.append(f"# {n_blanks} values could not be guessed and read {BLANK}: fill them in.")
+        lines.append(f"# What could not be guessed reads {BLANK} ({n_blanks} times): fill it in.")
     others = " or ".join(f'"{name}"' for name in RIGS if name != rig.name)
     remark = (
         f"  # guessed from the channels: {rig.summary} Otherwise {others}"
@@ -181,7 +181,7 @@ def _text(
     if left_out:
         lines += ["", "# Not used:"]
         lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]
-    return "\n".join(map(_printable, lines)) + "\n", n_blanks
+    return "\n".join(_printable(line) for text in lines for line in text.split("\n")) + "\n", n_blanks
 
 
 def _printable(text: str) -> str:
