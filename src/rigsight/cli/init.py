@@ -41,8 +41,6 @@ def init(
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")
     if draft.n_blanks:
-        typer.echo(
-            f'Left to fill in: {draft.n_blanks} values that read "FILL IN". Then: rigsight diagnose {folder}'
-        )
+        typer.echo(f'Fill in what reads "FILL IN" ({draft.n_blanks} times). Then: rigsight diagnose {folder}')
     else:
         typer.echo(f"Check the comments in it. Then: rigsight diagnose {folder}")

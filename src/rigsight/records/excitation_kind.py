@@ -11,9 +11,10 @@ from rigsight.records.record import Kind
 # Share of samples that equal the one before: above it the input stands still but for a few jumps.
 _STANDING = 0.9
 _MOST_JUMPS = 50
-_FEWEST_CROSSINGS = 8
-# Rank correlation of the distance between zero crossings with time: a sweep's frequency goes one way.
-_ONE_WAY = 0.9
+# A sweep's frequency goes one way: from stretch to stretch, and by at least this ratio in all.
+_FEWEST_CROSSINGS = 12
+_STRETCHES = 5
+_RATIO = 1.5
 
 
 def guess_kind(samples: NDArray[np.float64]) -> Kind:
@@ -39,15 +40,13 @@ def guess_amplitude(samples: NDArray[np.float64], kind: Kind) -> float | None:
 
 def _is_sweep(samples: NDArray[np.float64]) -> bool:
     """Return True if zero crossings become ever denser, or ever rarer."""
-    from scipy.stats import spearmanr
-
     centered = samples - 0.5 * (samples.min() + samples.max())
-    signs = np.sign(centered[np.abs(centered) > 0.05 * np.max(np.abs(centered))])
     where = np.flatnonzero(np.abs(centered) > 0.05 * np.max(np.abs(centered)))
+    signs = np.sign(centered[where])
     crossings = where[1:][signs[1:] != signs[:-1]]
     if crossings.size < _FEWEST_CROSSINGS:
         return False
-    distances = np.diff(crossings)
-    if np.ptp(distances) <= 2:
-        return False
-    return bool(abs(spearmanr(np.arange(distances.size), distances).statistic) > _ONE_WAY)
+    distances = [float(part.mean()) for part in np.array_split(np.diff(crossings), _STRETCHES)]
+    rising = np.diff(distances) > 0.0
+    ratio = max(distances[0], distances[-1]) / min(distances[0], distances[-1])
+    return bool((rising.all() or not rising.any()) and ratio > _RATIO)

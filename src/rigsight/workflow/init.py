@@ -121,7 +121,7 @@ def _proposals(files: Sequence[Path], model: str | None) -> tuple[list[Proposal]
             left_out.append((file.name, "no channel looks like a signal of the rig"))
         else:
             proposals.append(one)
-    return proposals or list(found.values()), left_out if proposals else []
+    return proposals or list(found.values()), left_out if proposals or not found else []
 
 
 def _roles(proposals: Sequence[Proposal]) -> list[tuple[Role, str]]:
