@@ -15,7 +15,7 @@ from rigsight.records.channel_file import file_format
 from rigsight.records.channel_table import read_channels
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns
-from rigsight.records.conditioning import time_base
+from rigsight.records.conditioning import TimeBase, time_base
 from rigsight.records.plausibility import clipping, is_constant
 from rigsight.records.read_csv import read_csv
 from rigsight.records.record import Hold, Kind, Record, Role
@@ -120,12 +120,16 @@ def read_record(
             path.name, signal, units[signal], mapping, label, table.units.get(signal)
         )
         unit_notes += notes
+    bases = _bases(path, table)
     raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
     found: list[str] = []
     if require_outputs:
         raw, found = _moving(path, raw, table, inputs, outputs, role)
     found += _clipping_notes(path, raw, table)
-    on_axis = _on_one_axis(path, table, raw, to_si[TIME], resample, {signal.name: hold for signal in inputs})
+    holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
+    on_axis = _on_one_axis(
+        path, table, raw, {signal: bases[signal] for signal in raw}, to_si[TIME], resample, holds
+    )
     return Record(
         name=name or path.stem,
         dt=on_axis.dt,
@@ -149,10 +153,22 @@ def _refuse_dialect(path: Path, **dialect: object) -> None:
             )
 
 
+def _bases(path: Path, table: Columns) -> dict[str, TimeBase]:
+    """Return the even grid of every signal, in the unit of the stamps: one for all, or each its own."""
+    if not table.axes:
+        base = time_base(table.values[TIME], table.lines, path.name, table.row)
+        return dict.fromkeys(table.values, base)
+    return {
+        signal: time_base(stamps, table.lines, f"{path.name}, {signal}", table.row)
+        for signal, stamps in table.axes.items()
+    }
+
+
 def _on_one_axis(
     path: Path,
     table: Columns,
     raw: Mapping[str, NDArray[np.float64]],
+    bases: Mapping[str, TimeBase],
     time: ColumnMapping,
     resample: float | None,
     holds: Mapping[str, Hold],
@@ -160,24 +176,16 @@ def _on_one_axis(
     """Return the signals, not yet in SI, on the even axis [s] that they share or are to share."""
     scale = 1.0 if time.scale is None else time.scale
     offset = 0.0 if time.offset is None else time.offset
-    if not table.axes:
-        base = time_base(table.values[TIME], table.lines, path.name, table.row)
-        if resample is None:
-            even = {signal: base.resample(samples, holds.get(signal)) for signal, samples in raw.items()}
-            return Resampled(base.t0 * scale + offset, base.dt * scale, even, base.notes)
-        bases = dict.fromkeys(raw, in_seconds(base, scale, offset))
-    else:
-        bases = {
-            signal: in_seconds(
-                time_base(table.axes[signal], table.lines, f"{path.name}, {signal}", table.row), scale, offset
-            )
-            for signal in raw
-        }
-        if resample is None:
-            refuse_different_axes(path.name, bases, table.labels)
-    mended = [note for base in bases.values() for note in base.notes]
-    on_axis = resampled(path.name, raw, bases, resample, holds)
-    return replace(on_axis, notes=(*dict.fromkeys(mended), *on_axis.notes))
+    mended = tuple(dict.fromkeys(note for base in bases.values() for note in base.notes))
+    if resample is None and not table.axes:
+        base = next(iter(bases.values()))
+        even = {signal: base.resample(samples, holds.get(signal)) for signal, samples in raw.items()}
+        return Resampled(base.t0 * scale + offset, base.dt * scale, even, mended)
+    timed = {signal: in_seconds(base, scale, offset) for signal, base in bases.items()}
+    if resample is None:
+        refuse_different_axes(path.name, timed, table.labels)
+    on_axis = resampled(path.name, raw, timed, resample, holds)
+    return replace(on_axis, notes=(*mended, *on_axis.notes))
 
 
 def _moving(
