@@ -23,8 +23,8 @@ class Named:
 
 
 SIGNALS = {"u": "A", "psi": "rad", "y": "m"}
-# A process is started for every MDF file.
-TRIALS = {"MDF4": 3}
+# A process is started for every such file.
+TRIALS = {"MDF4": 3, "HDF5": 12, "MATLAB 7.3": 12}
 formats = pytest.mark.parametrize("name", FORMATS)
 
 
@@ -167,3 +167,14 @@ def test_a_struct_whose_size_is_no_array_is_no_signal(tmp_path: Path) -> None:
     write(tmp_path / "run.mat", {"t": np.arange(60.0), "u": np.arange(3.0)}, {})
     with pytest.raises(InputError, match="no channel 'psi'"):
         read(tmp_path / "run.mat")
+
+
+@pytest.mark.parametrize("name", ["MATLAB 7.3", "HDF5", "MDF4"])
+def test_a_library_that_does_not_come_back_is_ended_and_told(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, _ = contents(tmp_path, name)
+    monkeypatch.setattr("rigsight.records.isolated_reader.LONGEST_WAIT", 0.0)
+    message = told(path)
+    assert message is not None
+    assert "crash, or run in circles" in message

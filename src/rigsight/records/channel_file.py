@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.records.channel import Channel, ChannelFile, Load, check_count, check_size
+from rigsight.records.isolated_reader import PACKAGES, open_isolated
 
 LARGEST_FILE = 2_000_000_000
 MEND = "Export it again, or as CSV."
@@ -131,6 +133,8 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
 
 def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
     """Return the reader of a format; only its own library is imported."""
+    if kind in PACKAGES:
+        return contextlib.contextmanager(partial(open_isolated, kind))
     reader = getattr(import_module(f"rigsight.records.read_{kind}"), f"open_{kind}")
     return contextlib.contextmanager(reader)
 

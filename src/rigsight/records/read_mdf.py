@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib.util
-import json
-import subprocess
-import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
@@ -26,10 +19,11 @@ from rigsight.records.channel import (
     stated_unit,
     with_distinct_names,
 )
-from rigsight.records.mdf_process import TIME
 
-LONGEST_WAIT = 300.0
-"""For one answer [s]; a damaged file can lead asammdf in a circle."""
+# Types of asammdf.blocks.v4_constants: numbers, and conversions that are formulas with numbers, not text.
+_NUMBERS = range(6)
+_NO_CONVERSION, _ALGEBRAIC, _LAST_NUMERIC = (None, 0), 3, 6
+_FORMULA = "is converted by a formula in text, which is not executed; export it with physical values"
 
 
 def open_mdf(path: Path) -> Iterator[ChannelFile]:
@@ -37,88 +31,64 @@ def open_mdf(path: Path) -> Iterator[ChannelFile]:
 
     Channels whose conversion is a formula in text are refused: evaluating it would execute what the file says.
     """
-    if importlib.util.find_spec("asammdf") is None:
-        raise ModuleNotFoundError("asammdf is not installed", name="asammdf")
+    from asammdf import MDF
+
     with path.open("rb") as stream:
         if stream.read(12)[8:9] < b"4":
             raise InputError(
                 f"{path.name} is an MDF file of version 2 or 3; save it as version 4.10 or newer."
             )
-    with _Reader(path) as reader:
-        channels: list[Channel] = []
-        refused: list[Refused] = []
-        check_count(path.name, reader.contents["n_channels"])
-        groups = reader.contents["groups"]
-        for number, group in enumerate(groups):
-            n_samples = group["n_samples"]
-            unit = stated_unit(group["time_unit"]) or "s"
-            axis = TimeAxis(n_samples, load=reader.load(number, TIME), unit=unit)
-            prefix = f"{group['name'] or f'group {number + 1}'}/" if len(groups) > 1 else ""
-            for name, index, unit, reason in group["channels"]:
-                if reason is not None:
-                    refused.append(Refused(prefix + name, reason))
-                else:
-                    load = reader.load(number, index)
-                    channels.append(Channel(prefix + name, n_samples, load, stated_unit(unit), axis))
-        yield ChannelFile("MDF4", with_distinct_names(channels), tuple(refused))
+        stream.seek(0)
+        with MDF(stream) as file:
+            channels: list[Channel] = []
+            refused: list[Refused] = []
+            groups: list[Any] = list(file.groups)
+            for number, group in enumerate(groups):
+                master = file.masters_db.get(number)
+                n_samples = int(group.channel_group.cycles_nr)
+                axis = _axis(file, group, number, master, n_samples)
+                label = group.channel_group.acq_name or f"group {number + 1}"
+                prefix = f"{label}/" if len(groups) > 1 else ""
+                for index, channel in enumerate(group.channels):
+                    check_count(path.name, len(channels) + len(refused))
+                    if index == master:
+                        continue
+                    name = prefix + channel.name
+                    reason = _refusal(channel, n_samples, axis)
+                    if reason is not None:
+                        refused.append(Refused(name, reason))
+                        continue
+                    unit = stated_unit(channel.unit) or stated_unit(getattr(channel.conversion, "unit", None))
+                    channels.append(Channel(name, n_samples, _load(file, number, index), unit, axis))
+            yield ChannelFile("MDF4", with_distinct_names(channels), tuple(refused))
 
 
-class _Reader:
-    """The process that reads, as long as the file is open."""
+def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int) -> TimeAxis | None:
+    if master is None or _conversion(group.channels[master]) == _ALGEBRAIC:
+        return None
+    unit = stated_unit(group.channels[master].unit) or "s"
+    return TimeAxis(n_samples, load=lambda: file.get_master(number), unit=unit)
 
-    def __init__(self, path: Path) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "rigsight.records.mdf_process", str(path.resolve())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        self.contents: dict[str, Any] = {}
 
-    def __enter__(self) -> _Reader:
-        try:
-            self.contents = self._answer()[0]
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
+def _load(file: Any, number: int, index: int) -> Load:
+    def samples() -> NDArray[Any]:
+        read: NDArray[Any] = file.get(group=number, index=index, samples_only=True)[0]
+        return read
 
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                # Closing flushes what the process no longer takes.
-                with contextlib.suppress(OSError):
-                    pipe.close()
-        self._process.wait()
+    return samples
 
-    def load(self, group: int, index: int) -> Load:
-        def samples() -> NDArray[Any]:
-            assert self._process.stdin is not None
-            self._process.stdin.write(f"{group} {index}\n".encode())
-            self._process.stdin.flush()
-            return self._answer()[1]
 
-        return samples
+def _refusal(channel: Any, n_samples: int, axis: TimeAxis | None) -> str | None:
+    """Return why a channel is no signal, None if it may be one."""
+    conversion = _conversion(channel)
+    if conversion == _ALGEBRAIC:
+        return _FORMULA
+    if channel.data_type not in _NUMBERS or (conversion not in _NO_CONVERSION and conversion > _LAST_NUMERIC):
+        return "holds text, a list or other bytes, no numbers"
+    if n_samples < 2:
+        return "holds a single number" if n_samples else "is empty"
+    return None if axis is not None else "has no time"
 
-    def _answer(self) -> tuple[dict[str, Any], NDArray[Any]]:
-        """Return what the process says, and the samples that come with it."""
-        assert self._process.stdout is not None
-        watch = threading.Timer(LONGEST_WAIT, self._process.kill)
-        watch.daemon = True
-        watch.start()
-        try:
-            line = self._process.stdout.readline()
-            if not line:
-                raise ValueError("it makes the library that reads it crash, or run in circles")
-            answer: dict[str, Any] = json.loads(line)
-            if answer.get("error") == "MemoryError":
-                raise MemoryError
-            if "error" in answer:
-                raise ValueError(f"{answer['error']}: {answer['reason']}")
-            kind = np.dtype(answer.get("type", "<f8"))
-            if kind.kind not in "iufb":
-                raise ValueError(f"its data is of type {kind}")
-            return answer, np.frombuffer(self._process.stdout.read(answer.get("n_bytes", 0)), dtype=kind)
-        finally:
-            watch.cancel()
+
+def _conversion(channel: Any) -> int | None:
+    return None if channel.conversion is None else int(channel.conversion.conversion_type)
