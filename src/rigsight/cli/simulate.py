@@ -23,7 +23,9 @@ def simulate(
     ],
     record: Annotated[
         Path,
-        typer.Argument(metavar="RECORD", help="A CSV file with time and input; other columns are ignored."),
+        typer.Argument(
+            metavar="RECORD", help="A measured file with time and input; other columns are ignored."
+        ),
     ],
     out: Annotated[
         Path | None,
