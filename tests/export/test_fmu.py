@@ -13,7 +13,7 @@ from rigsight.errors import InputError
 from rigsight.export import export_model
 from rigsight.export.fmu import c_compiler
 
-fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed (pip install 'rigsight[fmu]')")
+fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed (pip install fmpy lxml)")
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 
 
@@ -92,7 +92,7 @@ def test_fmpy_simulates_a_constant_hold_by_itself(name: str, case_named, tmp_pat
 
 @pytest.mark.parametrize("name", ["linear axis", "all delays", "element with hysteresis", "friction twice"])
 def test_it_is_valid(name: str, case_named, tmp_path: Path):
-    pytest.importorskip("lxml", reason="lxml is not installed (pip install 'rigsight[fmu]')")
+    pytest.importorskip("lxml", reason="lxml is not installed (pip install fmpy lxml)")
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(written(case_named(name), tmp_path))) == []
