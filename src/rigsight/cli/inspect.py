@@ -52,21 +52,41 @@ def _table(found: Inspection) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=escape(f"{found.file} ({found.format})"), box=box.SIMPLE, title_justify="left")
-    table.add_column("channel", overflow="fold")
-    table.add_column("unit")
-    for heading in ("samples", "rate", "from", "to", "minimum", "maximum", "gaps", "not finite"):
-        table.add_column(heading, justify="right")
+    headings = (
+        "channel",
+        "unit",
+        "samples",
+        "rate",
+        "from",
+        "to",
+        "minimum",
+        "maximum",
+        "gaps",
+        "not finite",
+    )
+    rows = []
     for channel in found.channels:
         rate = "" if not channel.dt else f"{1.0 / channel.dt:.6g}"
         numbers = (channel.t0, channel.t1, channel.minimum, channel.maximum)
-        table.add_row(
-            escape(channel.name),
-            escape(channel.unit or ""),
-            str(channel.n_samples),
-            rate,
-            *("" if number is None else f"{number:.5g}" for number in numbers),
-            "" if channel.n_gaps is None else str(channel.n_gaps),
-            str(channel.n_not_finite or ""),
+        rows.append(
+            (
+                escape(channel.name),
+                escape(channel.unit or ""),
+                str(channel.n_samples),
+                rate,
+                *("" if number is None else f"{number:.5g}" for number in numbers),
+                "" if channel.n_gaps is None else str(channel.n_gaps),
+                str(channel.n_not_finite or ""),
+            )
         )
+    # What no channel has to say leaves its room to the names.
+    told_of = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in rows)]
+    table = Table(title=escape(f"{found.file} ({found.format})"), box=box.SIMPLE, title_justify="left")
+    for i in told_of:
+        if i < 2:
+            table.add_column(headings[i], overflow="fold")
+        else:
+            table.add_column(headings[i], justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(*(row[i] for i in told_of))
     return table
