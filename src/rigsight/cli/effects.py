@@ -9,6 +9,7 @@ import typer
 
 from rigsight.cli.exit_codes import told
 from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
+from rigsight.cli.terminal import show_as_json
 from rigsight.workflow.progress_display import listening
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def list_effects(
 
         own = own_effects(effects or [], listener=listener)
         if json:
-            typer.echo(_as_json((*CATALOGUE, *own)))
+            show_as_json({"effects": _listed((*CATALOGUE, *own))})
             return
         if quiet:
             return
@@ -41,11 +42,10 @@ def list_effects(
             typer.echo(f"\nYour own, checked: {', '.join(effect.name for effect in own)}")
 
 
-def _as_json(effects: Iterable[Effect]) -> str:
+def _listed(effects: Iterable[Effect]) -> list[dict[str, object]]:
     from rigsight.workflow.effect_declaration import equations
-    from rigsight.workflow.results import json_text
 
-    listed = [
+    return [
         {
             "name": effect.name,
             "where": effect.place.value,
@@ -71,4 +71,3 @@ def _as_json(effects: Iterable[Effect]) -> str:
         }
         for effect in effects
     ]
-    return json_text({"schema_version": 1, "effects": listed}).rstrip("\n")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, OwnEffects, Quiet
+from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
+from rigsight.cli.terminal import show_as_json
 
 if TYPE_CHECKING:
     from rigsight.simulate.input_hold import Hold
@@ -54,6 +55,7 @@ def export(
         bool, typer.Option("--source-only", help="An FMU without a binary: the importing tool compiles it.")
     ] = False,
     effects: OwnEffects = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -74,5 +76,7 @@ def export(
             source_only=source_only,
             own_effects=own_effects(effects or [], check=False),
         )
-    if not quiet:
+    if json:
+        show_as_json({"target": to, "file": str(file)})
+    elif not quiet:
         typer.echo(f"{to}: {file}")

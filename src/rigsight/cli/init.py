@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Quiet
+from rigsight.cli.options import Debug, Json, Quiet
+from rigsight.cli.terminal import show_as_json
 
 
 def init(
@@ -24,6 +25,7 @@ def init(
             help="running_gear, axis or element.",
         ),
     ] = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -35,6 +37,17 @@ def init(
         from rigsight.workflow.init import run_init
 
         draft = run_init(folder, model=model)
+    if json:
+        show_as_json(
+            {
+                "file": str(draft.path),
+                "model": draft.model,
+                "records": list(draft.records),
+                "left_out": [{"file": name, "reason": reason} for name, reason in draft.left_out],
+                "n_blanks": draft.n_blanks,
+            }
+        )
+        return
     if quiet:
         return
     typer.echo(f"Written: {draft.path} ({draft.model}, {len(draft.records)} records)")

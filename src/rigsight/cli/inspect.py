@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Quiet
-from rigsight.cli.terminal import show
+from rigsight.cli.options import Debug, Json, Quiet
+from rigsight.cli.terminal import show, show_as_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,19 +24,17 @@ def inspect(
             metavar="FILE", help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet or UFF."
         ),
     ],
-    json: Annotated[bool, typer.Option("--json", help="Print the same for machines.")] = False,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
     """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
     with told(debug):
         from rigsight.workflow.inspect import run_inspect
-        from rigsight.workflow.results import json_text
 
         found = run_inspect(file)
-        text = json_text(found.to_json()) if json else ""
     if json:
-        typer.echo(text, nl=False)
+        show_as_json(found.to_json())
     elif not quiet:
         show(_table(found))
         for name, (step, gaps) in found.times.items():

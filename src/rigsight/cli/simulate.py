@@ -10,6 +10,7 @@ import typer
 
 from rigsight.cli.exit_codes import told
 from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
+from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
 
@@ -76,10 +77,7 @@ def simulate(
             own_effects=own_effects(effects or [], check=False),
         )
     if json:
-        from rigsight.workflow.results import json_text
-
-        told_as_json = {"schema_version": 1, "file": str(file), "n_samples": simulated.n_samples}
-        typer.echo(json_text(told_as_json).rstrip("\n"))
+        show_as_json({"file": str(file), "n_samples": simulated.n_samples})
     elif not quiet:
         typer.echo(f"{simulated.n_samples} samples simulated: {file}")
 

@@ -6,7 +6,7 @@ import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -29,6 +29,13 @@ def show(summary: RenderableType) -> None:
 def show_json(file: Path) -> None:
     """Show a JSON file that was written, as it is, on stdout."""
     typer.echo(file.read_text(encoding="utf-8").rstrip("\n"))
+
+
+def show_as_json(content: Mapping[str, Any]) -> None:
+    """Show content as JSON on stdout; `schema_version` comes first."""
+    from rigsight.workflow.results import json_text
+
+    typer.echo(json_text({"schema_version": 1, **content}), nl=False)
 
 
 def show_files(files: Mapping[str, Path]) -> None:
