@@ -33,6 +33,7 @@ STATED = {
     "rank._INEXACT": (1e-3, "a thousandth of the gap"),
     "rank._PRIOR_PER_EFFECT": (1.0 / 3.0, "counts a third"),
     "rank._FINE": (1e-3, "lowest by a thousandth"),
+    "rank._HINT": (0.9, "nine tenths to the model that is lowest"),
     "verdict.AT_FLOOR": (1.1, "excess up to 1.1;"),
     "verdict.AT_LOWER_BOUND": (3.0, "up to 3 where the floor is a lower bound"),
     "verdict._WORTHWHILE": (1.1, "lower by a factor of 1.1"),
