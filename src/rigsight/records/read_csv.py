@@ -25,8 +25,10 @@ class ColumnMapping:
     ----------
     name
         Column name of the header, or the column's number, counted from 1.
-    scale, offset
-        Conversion to SI.
+    scale
+        SI unit per unit of the column.
+    offset
+        Value of a column of zeros, in the SI unit.
 
     Raises
     ------
@@ -47,7 +49,13 @@ class ColumnMapping:
             raise InputError(f"Column '{self.name}': offset must be a finite number, got {self.offset}.")
 
     def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the column, shape (n_samples,), in SI units."""
+        """Return a column in SI units, shape (n_samples,).
+
+        Parameters
+        ----------
+        column
+            Numbers as they stand in the file, shape (n_samples,).
+        """
         return self.scale * column + self.offset
 
 
