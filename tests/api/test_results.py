@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +83,14 @@ def test_a_notebook_shows_title_and_table(result: Any) -> None:
 
 
 @pytest.mark.parametrize("result", RESULTS, indirect=True)
+def test_what_comes_from_data_cannot_become_markup(result: Any) -> None:
+    hostile = replace(result, title="<script>alert('1')</script>")
+    shown = hostile._repr_html_()
+    assert "<script" not in shown
+    assert "&lt;script&gt;" in shown
+
+
+@pytest.mark.parametrize("result", RESULTS, indirect=True)
 def test_a_console_shows_one_line(result: Any) -> None:
     assert "\n" not in repr(result)
     assert result.title in repr(result)
@@ -96,9 +106,18 @@ def test_saved_it_is_what_the_command_leaves(result: Any, tmp_path: Path) -> Non
     assert expected <= names
 
 
+def test_campaign_record_and_model_are_one_line_each(campaign: rs.Campaign, diagnoser: rs.Diagnoser) -> None:
+    assert repr(campaign) == "Campaign('Example stage', rig='axis', records=['fit', 'score'])"
+    assert repr(campaign.records[0]) == (
+        "Record('fit', 2000 samples of u, x, dt=0.005 s, role='estimation', kind='sweep')"
+    )
+    assert repr(diagnoser.model_) == "Model(rig='axis', effects=['cubic_stiffness'], hold='foh')"
+
+
 def test_a_page_quotes_what_made_it(diagnoser: rs.Diagnoser, tmp_path: Path) -> None:
     diagnoser.diagnosis_.save(tmp_path)
-    assert "Diagnoser(effects=" in (tmp_path / "report.html").read_text("utf-8")
+    page = unescape((tmp_path / "report.html").read_text("utf-8"))
+    assert "rigsight.Diagnoser(effects=['cubic_stiffness', 'quadratic_damping'], seed=0).fit(...)" in page
 
 
 def test_a_result_that_a_workflow_returned_can_be_looked_at(axis_campaign: Path) -> None:

@@ -60,7 +60,8 @@ def test_effects_are_named_or_declared() -> None:
     named = make_campaign("axis", [record()], parameters={"k_3": 2.0}, effects=["cubic_stiffness"])
     own = replace(CUBIC, name="my_spring")
     declared = make_campaign("axis", [record()], parameters={"k_3": 2.0}, effects=[own])
-    assert named.modelled == (CUBIC,)
+    lone = make_campaign("axis", [record()], parameters={"k_3": 2.0}, effects="cubic_stiffness")
+    assert named.modelled == lone.modelled == (CUBIC,)
     assert declared.modelled == (own,)
 
 
@@ -80,7 +81,7 @@ def test_without_validation_records_that_is_noted() -> None:
         ({"parameters": {"kk": 1.0}}, r"stage: rig\.parameters\.kk: unknown.*Did you mean 'k'"),
         ({"constants": {"gian": 1.0}}, r"Did you mean 'gain'"),
         ({"parameters": {"m": -1.0}}, r"stage: rig\.parameters\.m: .*must lie in"),
-        ({"effects": ["cubic"]}, r"'cubic' is unknown.*Did you mean 'cubic_stiffness'"),
+        ({"effects": ["cubic"]}, r"Effect is 'cubic'\. Did you mean 'cubic_stiffness'"),
         ({"effects": ["cubic_stiffness"]}, r"k_3: is missing"),
         ({"records": []}, r'none has role = "estimation"'),
         ({"records": [record(role="validation")]}, r'none has role = "estimation"'),
@@ -99,6 +100,25 @@ def test_without_validation_records_that_is_noted() -> None:
 def test_what_cannot_be_used_is_told(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         make_campaign(**{"rig": "axis", "records": [record()], "title": "stage"} | arguments)
+
+
+@pytest.mark.parametrize(
+    ("rig", "constants", "signals"),
+    [
+        ("element", {}, ("x", "force")),
+        # The lateral displacement need not be measured.
+        ("running_gear", {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}, ("u", "psi")),
+    ],
+)
+def test_every_rig_takes_its_own_signals(
+    rig: str, constants: dict[str, float], signals: tuple[str, str]
+) -> None:
+    moving = np.sin(np.arange(50.0))
+    own = record(signals=dict.fromkeys(signals, moving))
+    made = make_campaign(rig, [own], constants=constants)
+    assert set(made.records[0].units) == set(signals)
+    with pytest.raises(InputError, match=f"has no signal '{signals[1]}'"):
+        make_campaign(rig, [record(signals={signals[0]: moving})], constants=constants)
 
 
 def test_a_constant_input_may_only_be_scored() -> None:

@@ -8,9 +8,10 @@ from typing import Self
 
 from rigsight.api.diagnosis_result import DiagnosisResult
 from rigsight.api.estimator import CampaignEstimator, campaign_of
-from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects import CATALOGUE, Effect
 from rigsight.workflow.campaign import Campaign
 from rigsight.workflow.diagnose import diagnose_campaign
+from rigsight.workflow.in_memory import effects_of
 from rigsight.workflow.kernels import checked_jobs
 from rigsight.workflow.model_file import model_of
 from rigsight.workflow.progress_display import listening
@@ -93,19 +94,15 @@ class Diagnoser(CampaignEstimator):
         SimulationError
             If the given simulation cannot be run.
         """
-        effects = _declared(self.effects)
+        effects = CATALOGUE if self.effects is None else effects_of(self.effects)
         own = [effect for effect in effects if effect not in CATALOGUE]
         jobs = checked_jobs(self.n_jobs)
         read = campaign_of(campaign, own)
         known = (*own, *read.modelled)
         with listening(quiet=not self.verbose) as listener:
             found = diagnose_campaign(read, effects, self.seed, jobs, listener)
-        self.diagnosis_ = DiagnosisResult.of(found, made_by=repr(self), seed=self.seed, own_effects=known)
+        tried = None if self.effects is None else [effect.name for effect in effects]
+        made_by = f"rigsight.Diagnoser(effects={tried}, seed={self.seed}).fit(...)"
+        self.diagnosis_ = DiagnosisResult.of(found, made_by, self.seed, known)
         self.model_ = model_of(found.model, known)
         return self
-
-
-def _declared(effects: Sequence[str | Effect] | None) -> tuple[Effect, ...]:
-    if effects is None:
-        return CATALOGUE
-    return tuple(effect if isinstance(effect, Effect) else effect_named(effect) for effect in effects)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
-from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from rigsight.effects import Effect
@@ -15,9 +14,22 @@ from rigsight.simulate.model import Model
 from rigsight.workflow.campaign import Campaign, read_campaign
 from rigsight.workflow.simulate import simulate_model
 
+if TYPE_CHECKING:
 
-# scikit-learn has no types; what is public of it is declared here once more.
-class CampaignEstimator(BaseEstimator):  # type: ignore[misc]
+    class BaseEstimator:
+        """What is used of scikit-learn's, which has no types: on an unknown base no misspelled attribute would be seen."""
+
+        def get_params(self, deep: bool = True) -> dict[str, Any]:
+            """Return the settings."""
+
+        def set_params(self, **params: Any) -> Self:
+            """Change settings."""
+
+else:
+    from sklearn.base import BaseEstimator
+
+
+class CampaignEstimator(BaseEstimator):
     """What is fitted to the records of a campaign and then predicts what the rig does.
 
     Attributes
@@ -64,7 +76,7 @@ class CampaignEstimator(BaseEstimator):  # type: ignore[misc]
         deep
             Without meaning here: no setting is an estimator.
         """
-        return dict(super().get_params(deep))
+        return super().get_params(deep)
 
     def set_params(self, **params: Any) -> Self:
         """Change settings and return the estimator; it has to be fitted anew.
@@ -79,8 +91,7 @@ class CampaignEstimator(BaseEstimator):  # type: ignore[misc]
         ValueError
             If there is no such setting.
         """
-        super().set_params(**params)
-        return self
+        return super().set_params(**params)
 
 
 def campaign_of(campaign: Campaign | str | Path, own_effects: Iterable[Effect] = ()) -> Campaign:

@@ -110,6 +110,13 @@ class Record:
         self.__dict__.update(state)
         self.__post_init__()
 
+    # That of the dataclass would hold every sample.
+    def __repr__(self) -> str:
+        return (
+            f"Record({self.name!r}, {self.n_samples} samples of {', '.join(self.signals)}, dt={self.dt:.6g} s, "
+            f"role={self.role!r}, kind={self.kind!r})"
+        )
+
     @property
     def n_samples(self) -> int:
         """Number of samples."""

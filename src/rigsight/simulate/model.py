@@ -31,6 +31,11 @@ class Model:
     values: dict[str, float]
     hold: Hold
 
+    # That of the dataclass would hold every symbol of the rig.
+    def __repr__(self) -> str:
+        effects = list(self.structure.effect_names)
+        return f"Model(rig={self.structure.rig.name!r}, effects={effects!r}, hold={self.hold!r})"
+
     @classmethod
     def of(cls, structure: Structure, values: Mapping[str, float], hold: Hold) -> Model:
         """Make a model of a fitted structure, with numbers that were written into its equations as parameters again.

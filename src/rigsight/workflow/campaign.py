@@ -53,6 +53,11 @@ class Campaign:
     records: tuple[Record, ...]
     notes: tuple[str, ...] = ()
 
+    # That of the dataclass would hold every sample.
+    def __repr__(self) -> str:
+        names = [record.name for record in self.records]
+        return f"Campaign({self.title!r}, rig={self.rig.name!r}, records={names!r})"
+
     @property
     def called(self) -> str:
         """How messages call it: by its file, or by its title."""

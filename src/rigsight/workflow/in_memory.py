@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rigsight.effects import Effect, effect_named
@@ -58,8 +58,9 @@ def make_campaign(
     ('axis', {'k': 100.0}, 1)
     """
     called = title or rig
-    names, own = _named(effects)
-    given = checked_simulation(called, rig, names, constants or {}, parameters or {}, own)
+    modelled = effects_of(effects)
+    names = [effect.name for effect in modelled]
+    given = checked_simulation(called, rig, names, constants or {}, parameters or {}, modelled)
     if all(record.role != "estimation" for record in records):
         raise InputError(
             f'{called}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
@@ -111,22 +112,28 @@ def make_model(
     >>> model.to_json()["effect_parameters"]
     {'k_3': 5000000.0}
     """
-    structure = compose(
-        RIGS[check_option("The rig", rig, RIGS)],
-        [effect if isinstance(effect, Effect) else effect_named(effect) for effect in effects],
-    )
+    structure = compose(RIGS[check_option("The rig", rig, RIGS)], effects_of(effects))
     defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
     complete = ParameterSet.from_mapping(structure.parameters, {**defaults, **values})
     return Model(structure, complete.to_mapping(), hold)
 
 
-def _named(effects: Iterable[str | Effect]) -> tuple[list[str], list[Effect]]:
-    """Return the names of effects, and those that are no mere names."""
-    given = list(effects)
-    return (
-        [effect.name if isinstance(effect, Effect) else effect for effect in given],
-        [effect for effect in given if isinstance(effect, Effect)],
-    )
+def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
+    """Return effects that were given by name or as declarations.
+
+    Parameters
+    ----------
+    effects
+        One or several.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest and all effects of the catalogue where a name is unknown.
+    """
+    # A lone name is a sequence too, of letters.
+    given = (effects,) if isinstance(effects, str | Effect) else effects
+    return tuple(effect if isinstance(effect, Effect) else effect_named(effect) for effect in given)
 
 
 def _checked(record: Record, rig: Rig) -> Record:
