@@ -9,11 +9,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEPENDENCIES := $(VENV)/.dependencies-installed
 INSTALLED := $(VENV)/.rigsight-installed
+DOCS_INSTALLED := $(VENV)/.docs-installed
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench blind blind-small clean
+.PHONY: help demo test check bench docs blind blind-small clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
@@ -30,9 +31,15 @@ check: $(INSTALLED)  ## format, lint, types, layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(INSTALLED)  ## measure the simulator against C and scipy, and the time of a diagnosis
+bench: $(INSTALLED)  ## measure the simulator against C and scipy, the time of a diagnosis, and exports against the simulator
 	@$(BIN)/python benchmarks/simulation.py
 	@$(BIN)/python benchmarks/diagnosis.py
+	@$(BIN)/python benchmarks/exports.py
+
+docs: $(INSTALLED) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
+	@# Not --quiet: what is not told does not count as a warning, and would not end a strict build.
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+	@echo "The site is in build/site; open build/site/index.html."
 
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
@@ -42,7 +49,7 @@ blind: $(INSTALLED)  ## the standard blind bench, 300 rigs; writes docs/blind.md
 
 clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)
 	rm -rf demo out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Stamps are written last: an interrupted installation is taken up again by the next call.
 $(DEPENDENCIES): requirements.lock
@@ -58,4 +65,9 @@ $(DEPENDENCIES): requirements.lock
 # hatchling comes from the lock, so that no unpinned build tool is fetched.
 $(INSTALLED): pyproject.toml $(DEPENDENCIES)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(DOCS_INSTALLED): docs/requirements.lock $(DEPENDENCIES)
+	@echo "Installing what builds the site into $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r docs/requirements.lock
 	@touch $@

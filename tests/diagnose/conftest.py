@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.characterize import Scored
+from rigsight.diagnose.workbench import Scored
 from rigsight.effects import effect_named
 from rigsight.identify import FitResult
 from rigsight.rigs import AXIS

@@ -111,6 +111,20 @@ def test_the_gap_is_that_of_the_given_simulation(cubic: Diagnosis, cubic_records
     assert cubic.gap["x"].before == pytest.approx(error, rel=0.02)
 
 
+def test_what_a_loose_rig_does_at_rest_is_not_taken_for_noise(cubic_records: tuple[Record, ...]) -> None:
+    rng = np.random.default_rng(3)
+    wandering = []
+    for record in cubic_records:
+        x = record["x"].copy()
+        x[:200] += 10.0 * NOISE * rng.standard_normal(200)
+        wandering.append(record.with_signals(x=x))
+    diagnosis = diagnosed(wandering)
+    assert diagnosis.effects == ("cubic_stiffness",)
+    assert diagnosis.noise_floors[0].lower_bound
+    assert diagnosis.noise_floors[0].std == pytest.approx(NOISE, rel=0.2)
+    assert any("wanders" in note for note in diagnosis.notes)
+
+
 def test_none_when_the_given_simulation_is_right() -> None:
     diagnosis = diagnosed(stage([]))
     assert (diagnosis.verdict, diagnosis.effects, diagnosis.where) == ("none", (), ())

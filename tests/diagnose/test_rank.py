@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.characterize import Scored
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
+from rigsight.diagnose.workbench import Scored
 
 N = 4000
 

@@ -134,8 +134,8 @@ def test_the_held_out_error_is_that_of_the_polished_equation(
     make_task: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The fits that choose the terms stop short here.
-    monkeypatch.setattr("rigsight.discover.selection._FIRST_EVALUATIONS", 1)
-    monkeypatch.setattr("rigsight.discover.selection._EVALUATIONS", 2)
+    monkeypatch.setattr("rigsight.discover.bench._FIRST_EVALUATIONS", 1)
+    monkeypatch.setattr("rigsight.discover.bench._EVALUATIONS", 2)
     _, task = make_task("cubic", 2e-5)
     found = discover(task)
     before = next(a for a in found.alternatives if set(a.terms) == {term.name for term in found.kept})

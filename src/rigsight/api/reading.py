@@ -22,13 +22,15 @@ def read_record(
     kind: Kind = "operation",
     amplitude: float | None = None,
     hold: Hold = "foh",
+    dt: float | None = None,
+    resample: float | None = None,
 ) -> Record:
     r"""Read, check and repair one record.
 
     Parameters
     ----------
     path
-        The file.
+        Delimited text, or a measurement file of a format that ``rigsight inspect`` reads.
     rig
         Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x) or ``"element"`` (t, x, force).
     columns
@@ -45,6 +47,10 @@ def read_record(
         Amplitude of the input, in its unit.
     hold
         The input between samples: ``"zoh"``, ``"foh"`` or ``"band_limited"``.
+    dt
+        Sample time [s] of a file without time.
+    resample
+        Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
 
     Returns
     -------
@@ -85,4 +91,6 @@ def read_record(
         kind=kind,
         amplitude=amplitude,
         hold=hold,
+        dt=dt,
+        resample=resample,
     )

@@ -15,17 +15,23 @@ from rigsight.cli.diagnose import diagnose
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
 from rigsight.cli.exit_codes import INTERRUPTED, leave
+from rigsight.cli.export import export
 from rigsight.cli.identify import identify
+from rigsight.cli.init import init
+from rigsight.cli.inspect import inspect
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": demo,
+    "inspect": inspect,
+    "init": init,
     "diagnose": diagnose,
     "identify": identify,
     "discover": discover,
     "compare": compare,
     "simulate": simulate,
+    "export": export,
     "vary": vary,
     "blind": blind,
     "effects": list_effects,
@@ -37,7 +43,6 @@ app = typer.Typer(
     help="Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks.",
     epilog="'rigsight COMMAND --help' tells more. Start with 'rigsight demo'.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

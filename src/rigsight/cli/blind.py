@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Jobs, Quiet, Seed
-from rigsight.cli.terminal import command_line, show, show_files
+from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
+from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
 
@@ -72,6 +72,7 @@ def blind(
         ),
     ] = None,
     jobs: Jobs = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -107,7 +108,9 @@ def blind(
             )
         if markdown is not None:
             write_markdown(markdown, content)
-    if not quiet:
+    if json:
+        show_json(out / "blind.json")
+    elif not quiet:
         from rigsight.report.blind import BlindSummary
 
         show(BlindSummary(content))

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Campaign, Debug, Jobs, Quiet, ResultsFolder
-from rigsight.cli.terminal import command_line, show, show_files
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder
+from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
 
@@ -35,6 +35,7 @@ def compare(
         float, typer.Option(metavar="SECONDS", help="How long a step is compared, from its begin on.")
     ] = 4.0,
     jobs: Jobs = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -55,7 +56,9 @@ def compare(
             listener=listener,
             command=command_line(),
         )
-    if not quiet:
+    if json:
+        show_json(out / "comparison.json")
+    elif not quiet:
         from rigsight.report import comparison_summary
 
         show(comparison_summary(comparison))

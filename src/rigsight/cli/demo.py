@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import GOES_ON, told
-from rigsight.cli.options import Debug, Jobs, Quiet, Seed
-from rigsight.cli.terminal import command_line, show, show_files
+from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
+from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
 
@@ -20,6 +20,7 @@ def demo(
     ] = Path("demo"),
     seed: Seed = 0,
     jobs: Jobs = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -31,7 +32,9 @@ def demo(
         from rigsight.workflow.demo import HIDDEN_EFFECT, run_demo
 
         diagnosis = run_demo(out, seed=seed, n_jobs=jobs, listener=listener, command=command_line())
-    if not quiet:
+    if json:
+        show_json(out / "diagnosis.json")
+    elif not quiet:
         from rigsight.report import summary
 
         show(summary(diagnosis))

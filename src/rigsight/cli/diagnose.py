@@ -8,8 +8,18 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import GOES_ON, told
-from rigsight.cli.options import Campaign, Debug, Jobs, OwnEffects, Quiet, ResultsFolder, Seed
-from rigsight.cli.terminal import command_line, show, show_files
+from rigsight.cli.options import (
+    Campaign,
+    Debug,
+    Jobs,
+    Json,
+    OwnEffects,
+    Quiet,
+    ResultsFolder,
+    Seed,
+    effect_names,
+)
+from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
 
@@ -22,11 +32,13 @@ def diagnose(
             metavar="NAME",
             show_default="the catalogue and your own",
             help="Try only this effect. May be repeated.",
+            autocompletion=effect_names,
         ),
     ] = None,
     effects: OwnEffects = None,
     seed: Seed = 0,
     jobs: Jobs = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -49,7 +61,9 @@ def diagnose(
             listener=listener,
             command=command_line(),
         )
-    if not quiet:
+    if json:
+        show_json(out / "diagnosis.json")
+    elif not quiet:
         from rigsight.report import summary
 
         show(summary(diagnosis))

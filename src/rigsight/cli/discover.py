@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Campaign, Debug, Jobs, Quiet, ResultsFolder, Seed
-from rigsight.cli.terminal import show, show_files
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Seed
+from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
 
@@ -32,6 +32,7 @@ def discover(
     ] = False,
     seed: Seed = 0,
     jobs: Jobs = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -52,7 +53,9 @@ def discover(
             n_jobs=jobs,
             listener=listener,
         )
-    if not quiet:
+    if json:
+        show_json(out / "discovery.json")
+    elif not quiet:
         from rigsight.report.discovery import discovery_summary
 
         show(discovery_summary(found))

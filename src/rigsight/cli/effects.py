@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, OwnEffects, Quiet
+from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
 from rigsight.workflow.progress_display import listening
+
+if TYPE_CHECKING:
+    from rigsight.effects import Effect
 
 
 def list_effects(
     effects: OwnEffects = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -23,9 +30,45 @@ def list_effects(
         from rigsight.workflow.own_effects import equation_text, own_effects
 
         own = own_effects(effects or [], listener=listener)
+        if json:
+            typer.echo(_as_json((*CATALOGUE, *own)))
+            return
         if quiet:
             return
         for effect in (*CATALOGUE, *own):
             typer.echo(f"{effect.name:28}{effect.place.value:18}{equation_text(effect)}")
         if own:
             typer.echo(f"\nYour own, checked: {', '.join(effect.name for effect in own)}")
+
+
+def _as_json(effects: Iterable[Effect]) -> str:
+    from rigsight.workflow.effect_declaration import equations
+    from rigsight.workflow.results import json_text
+
+    listed = [
+        {
+            "name": effect.name,
+            "where": effect.place.value,
+            "summary": effect.summary,
+            "equations": {name: str(expression) for name, expression in equations(effect).items()},
+            "states": [
+                {
+                    "name": str(s.symbol),
+                    "rate": str(s.rate),
+                    "limit": None if s.limit is None else str(s.limit),
+                }
+                for s in effect.states
+            ],
+            "parameters": [
+                {
+                    "name": p.name,
+                    "description": p.description,
+                    "dimension": p.dimension,
+                    "vanishes_at": p.null,
+                }
+                for p in effect.parameters
+            ],
+        }
+        for effect in effects
+    ]
+    return json_text({"schema_version": 1, "effects": listed}).rstrip("\n")

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Campaign, Debug, Jobs, Quiet, ResultsFolder
-from rigsight.cli.terminal import show, show_files
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder
+from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
 
@@ -34,6 +34,7 @@ def identify(
         ),
     ] = None,
     jobs: Jobs = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -47,7 +48,9 @@ def identify(
         identification = run_identify(
             campaign, out, method=method, resolution=resolution, n_jobs=jobs, listener=listener
         )
-    if not quiet:
+    if json:
+        show_json(out / "identification.json")
+    elif not quiet:
         from rigsight.report import identification_summary
 
         show(identification_summary(identification))

@@ -7,6 +7,14 @@ from typing import Annotated
 
 import typer
 
+
+def effect_names(begun: str) -> list[str]:
+    """Return the names of the catalogue that begin so, for the shell's completion."""
+    from rigsight.effects import CATALOGUE
+
+    return [effect.name for effect in CATALOGUE if effect.name.startswith(begun)]
+
+
 Campaign = Annotated[
     Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
 ]
@@ -35,4 +43,7 @@ Jobs = Annotated[
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the result as JSON instead of a summary, for other programs.")
+]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, OwnEffects, Quiet
+from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
 
@@ -23,7 +23,9 @@ def simulate(
     ],
     record: Annotated[
         Path,
-        typer.Argument(metavar="RECORD", help="A CSV file with time and input; other columns are ignored."),
+        typer.Argument(
+            metavar="RECORD", help="A measured file with time and input; other columns are ignored."
+        ),
     ],
     out: Annotated[
         Path | None,
@@ -52,6 +54,7 @@ def simulate(
         ),
     ] = None,
     effects: OwnEffects = None,
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -72,7 +75,12 @@ def simulate(
             initial_state=_states(initial_state),
             own_effects=own_effects(effects or [], check=False),
         )
-    if not quiet:
+    if json:
+        from rigsight.workflow.results import json_text
+
+        told_as_json = {"schema_version": 1, "file": str(file), "n_samples": simulated.n_samples}
+        typer.echo(json_text(told_as_json).rstrip("\n"))
+    elif not quiet:
         typer.echo(f"{simulated.n_samples} samples simulated: {file}")
 
 

@@ -26,6 +26,11 @@ def show(summary: RenderableType) -> None:
     Console(highlight=False).print(summary)
 
 
+def show_json(file: Path) -> None:
+    """Show a JSON file that was written, as it is, on stdout."""
+    typer.echo(file.read_text(encoding="utf-8").rstrip("\n"))
+
+
 def show_files(files: Mapping[str, Path]) -> None:
     """Show, after an empty line, where results lie: a label and a path each, paths below each other."""
     typer.echo()

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Quiet, ResultsFolder
+from rigsight.cli.options import Debug, Json, Quiet, ResultsFolder
+from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
 
@@ -46,6 +47,7 @@ def vary(
         typer.Option(metavar="OMEGA", show_default="6 times the natural frequency", help="Its end [rad/s]."),
     ] = None,
     out: ResultsFolder = Path("vary"),
+    json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -70,7 +72,9 @@ def vary(
             band=band,
             listener=listener,
         )
-    if not quiet:
+    if json:
+        show_json(out / "vary.json")
+    elif not quiet:
         for variation in variations:
             typer.echo(table_text(variation) + "\n")
         typer.echo(f"Pictures and numbers: {out}")

@@ -1,51 +1,35 @@
 """Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
 
-Each candidate gets a first look. From all its starts it is fitted to the liveliest stretches of the records: in short pieces with
-initial states of their own, which keeps a model that is far off in step with the motion, then in one piece. From where the best
-of these ended it is fitted roughly to the whole records. Those that come near the best are fitted with care, the best of them
-to full precision.
-
-References
-----------
-H. G. Bock, in *Modelling of Chemical Reaction Systems* (Springer 1981) 102, for fits in pieces (multiple shooting, here without
-the condition that pieces join).
+Each candidate gets a first look. Those that come near the best there are fitted with care, the best of them to full precision.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
-from rigsight.diagnose.starts import restart_values, start_values, with_own_values
-from rigsight.diagnose.windows import cut
+from rigsight.diagnose.first_look import (
+    LOOK_ACCURACY,
+    Look,
+    cut_in_pieces,
+    look_at,
+    looked_again,
+    mean_square,
+    widened,
+)
+from rigsight.diagnose.starts import restart_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
-from rigsight.records.record import Record
 from rigsight.simulate import Structure
 
-_LOOK_EVALUATIONS = 25
-_GLIMPSE_EVALUATIONS = 8
-_MOST_STARTS = 4
-"""Starts that are fitted further; which of more they are, the first few evaluations of each tell."""
 _MOST_RESTARTS = 4
 _WORTH_RESTARTING = 1e-3
 """Share of the cost that a fit from elsewhere must remove to be followed."""
-_PIECE = 4.0
-"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
-
-An assumption, like the lengths and factors below: half to two periods did worse on play of a few widths, nothing else was tried.
-"""
-_WIDE_EVALUATIONS = 12
-_LOOK_TOLERANCE = 1e-3
-_LOOK_ACCURACY = 1e-3
 _LONG_PIECE = 20.0
-_MOST_PIECES = 40
-"""In all: every piece has initial states of its own, and the fit's equations grow with them."""
 _STUCK = 2.0
 """Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit counts as stopped short."""
 _ROUGH_EVALUATIONS = 40
@@ -55,49 +39,14 @@ _REFINE_EVALUATIONS = 150
 """With one integration step per sample; a model that takes more gets fewer: far stiffer ones follow a valley without end."""
 _FEWEST_REFINE_EVALUATIONS = 15
 _HOPELESS_TOLERANCE = 1e-2
-_NEAR = 25.0
-"""A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
 _PROMISING = 9.0
 """A candidate that costs less than this factor of the best on whole records (three times its RMS) is followed to the end."""
 _CONTENDER = 1.5
 """A model whose held-out error is within this factor of the best is fitted to full precision."""
-_ALIKE = 1.05
-"""Starts whose first looks end within this factor of the best cost are all followed."""
 _WORTH_RELEASING = 1.05
 """Excess over the floor above which a fixed exponent is released."""
 _RELEASE_GAIN = 1.02
 """Factor by which a released exponent must lower the held-out error to be kept."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """First fits of a candidate to part of the records or roughly to all, best first, those that ended at the same place once.
-
-    Attributes
-    ----------
-    effects, structure, free
-        What was fitted.
-    fits
-        What was reached.
-    nearest
-        Mean squared error that was reached in their liveliest stretches.
-    """
-
-    effects: tuple[Effect, ...]
-    structure: Structure
-    free: tuple[str, ...]
-    fits: tuple[FitResult, ...]
-    nearest: float
-
-    @property
-    def newest(self) -> str:
-        """Name of the effect that was added last."""
-        return self.effects[-1].name
-
-    @property
-    def cost(self) -> float:
-        """Lowest cost that was reached."""
-        return self.fits[0].cost
 
 
 def fit_linear(bench: Workbench, start: Mapping[str, float]) -> Scored:
@@ -215,131 +164,6 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
     return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(model) for model in models))
 
 
-def look_at(
-    bench: Workbench,
-    effects: tuple[Effect, ...],
-    base: FitResult,
-    parents: Mapping[str, FitResult],
-    regression: EffectRegression | None = None,
-    hold: frozenset[str] = frozenset(),
-    substeps: Sequence[int] | None = None,
-) -> Look:
-    """Fit a set of effects to the liveliest stretches of the records, from all starts of the last effect.
-
-    Parameters
-    ----------
-    bench
-        Records, scales and noise.
-    effects
-        All effects of the model; the last is new.
-    base
-        Fit without the last.
-    parents
-        Fits with a simpler effect in place of the last, by name of that effect.
-    regression
-        Gives one more start, where it can.
-    hold
-        Rig parameters to keep at their base value.
-    substeps
-        Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
-    """
-    special = {name: value for effect in effects for name, value in effect.special_cases.items()}
-    structure = bench.composed(effects, special)
-    free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
-    starts = list(start_values(bench, structure, effects[-1], base, parents))
-    regressed = regression.start(effects[-1]) if regression is not None else None
-    if regressed is not None:
-        starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
-    nearest = _looked(bench, structure, free, starts, substeps)
-    if not np.isfinite(nearest[0].cost) and bench.start:
-        unbent = replace(base, values={**base.values, **bench.start})
-        nearest = _looked(
-            bench, structure, free, list(start_values(bench, structure, effects[-1], unbent, {})), substeps
-        )
-    return Look(effects, structure, free, nearest, _mean_square(nearest[0]))
-
-
-def _looked(
-    bench: Workbench,
-    structure: Structure,
-    free: tuple[str, ...],
-    starts: Sequence[Mapping[str, float]],
-    substeps: Sequence[int] | None = None,
-) -> tuple[FitResult, ...]:
-    """Fit to the liveliest stretches: in pieces from every start, from the best places in one."""
-    fit = bench.problem(structure, bench.look, _LOOK_ACCURACY)
-    pieces = [_pieces(bench, [record], _PIECE) for record in bench.look]
-    in_pieces = bench.problem(structure, [piece for parts in pieces for piece in parts], _LOOK_ACCURACY)
-    of_pieces = None
-    if substeps is not None:
-        of_pieces = [n for n, parts in zip(substeps, pieces, strict=True) for _ in parts]
-
-    def tried(
-        start: Mapping[str, float], states: Sequence[NDArray[np.float64]] | None, most: int
-    ) -> FitResult:
-        return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
-
-    if len(starts) > _MOST_STARTS:
-        glimpses = sorted(
-            (tried(start, None, _GLIMPSE_EVALUATIONS) for start in starts), key=lambda f: f.cost
-        )
-        first = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_MOST_STARTS]]
-    else:
-        first = [tried(start, None, _LOOK_EVALUATIONS) for start in starts]
-    near = [
-        fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
-        for found in _distinct(first, alike=float("inf"))
-    ]
-    return _distinct(near)
-
-
-def widened(
-    bench: Workbench,
-    looks: Sequence[Look],
-    n_jobs: int = 1,
-    substeps: Sequence[int] | None = None,
-    lowest: float = float("inf"),
-) -> list[Look]:
-    """Fit those looks roughly to the whole records that came near the best one in the liveliest stretches; drop the others.
-
-    Parameters
-    ----------
-    bench
-        Records, scales and noise.
-    looks
-        First looks.
-    n_jobs
-        Looks fitted at the same time.
-    substeps
-        Integration steps per sample of each record; None chooses them.
-    lowest
-        Mean squared error in the liveliest stretches that a look beside these has reached.
-    """
-    lowest = min([lowest, *(look.nearest for look in looks)])
-
-    def one(look: Look) -> Look:
-        return replace(look, fits=_on_whole_records(bench, look.structure, look.free, look.fits, substeps))
-
-    near = [look for look in looks if look.nearest <= _NEAR * lowest]
-    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in near))
-
-
-def _on_whole_records(
-    bench: Workbench,
-    structure: Structure,
-    free: tuple[str, ...],
-    fits: Sequence[FitResult],
-    substeps: Sequence[int] | None = None,
-) -> tuple[FitResult, ...]:
-    whole = bench.problem(structure, bench.estimation, _LOOK_ACCURACY)
-    return _distinct(
-        [
-            whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
-            for near in fits
-        ]
-    )
-
-
 def followed(bench: Workbench, look: Look, promising: bool, finish: bool = True) -> Scored:
     """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking.
 
@@ -364,22 +188,14 @@ def finished(bench: Workbench, scored: Scored) -> Scored:
 def restarted(bench: Workbench, settled: Scored) -> Scored:
     """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
-    near = bench.problem(structure, bench.look, _LOOK_ACCURACY)
     for _ in range(_MOST_RESTARTS):
         if settled.excess <= _WORTH_RELEASING:
             break
         starts = [s for effect in settled.effects for s in restart_values(structure, effect, settled.fit)]
         if not starts:
             break
-        looks = sorted(
-            (near.fit(s, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False) for s in starts),
-            key=lambda fit: fit.cost,
-        )
-        better = [
-            found
-            for found in _on_whole_records(bench, structure, free, looks[:_MOST_STARTS])
-            if found.cost < (1.0 - _WORTH_RESTARTING) * settled.fit.cost
-        ]
+        enough = (1.0 - _WORTH_RESTARTING) * settled.fit.cost
+        better = [found for found in looked_again(bench, settled.fit, starts) if found.cost < enough]
         if not better:
             break
         again = _fitted(bench, settled.effects, structure, free, better, True)
@@ -408,7 +224,7 @@ def _fitted(
     promising: bool,
     nearest: float = float("inf"),
 ) -> Scored:
-    fit = bench.problem(structure, bench.estimation, DEFAULT_ACCURACY if promising else _LOOK_ACCURACY)
+    fit = bench.problem(structure, bench.estimation, DEFAULT_ACCURACY if promising else LOOK_ACCURACY)
     evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
     tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
 
@@ -416,8 +232,8 @@ def _fitted(
         return fit.fit(values, free, max_evaluations=evaluations, tolerance=tolerance)
 
     results = [whole(start.values) for start in (starts if promising else starts[:1])]
-    if promising and min(map(_mean_square, results)) > _STUCK * nearest:
-        in_pieces = bench.problem(structure, _pieces(bench, bench.estimation, _LONG_PIECE))
+    if promising and min(map(mean_square, results)) > _STUCK * nearest:
+        in_pieces = bench.problem(structure, cut_in_pieces(bench, bench.estimation, _LONG_PIECE))
         near = in_pieces.fit(
             starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
         )
@@ -426,25 +242,3 @@ def _fitted(
     if not usable:
         return Scored(effects, results[0], (), (), float("inf"))
     return bench.score(effects, min(usable, key=lambda result: result.cost), roughly=not promising)
-
-
-def _pieces(bench: Workbench, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
-    """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
-    duration = sum(record.n_samples * record.dt for record in records)
-    return cut(records, max(periods * bench.period, duration * len(bench.look) / len(records) / _MOST_PIECES))
-
-
-def _mean_square(fit: FitResult) -> float:
-    return fit.cost / fit.n_samples
-
-
-def _distinct(fits: Sequence[FitResult], alike: float = _ALIKE) -> tuple[FitResult, ...]:
-    """Return the best fit, and the next one that ended elsewhere if its cost is within a factor of the best."""
-    ordered = sorted(fits, key=lambda result: result.cost)
-    best = ordered[0]
-    values = np.array([best.values[name] for name in best.free])
-    for other in ordered[1:]:
-        theirs = np.array([other.values[name] for name in other.free])
-        if other.cost <= alike * best.cost and not np.allclose(values, theirs, rtol=0.05, atol=1e-12):
-            return best, other
-    return (best,)

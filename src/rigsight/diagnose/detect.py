@@ -27,11 +27,13 @@ _TOP_OF_SPECTRUM = 0.85
 _FREE_MODES = 6
 _MAX_HANKEL_ROWS = 200
 _SMALLEST = 1e-9
-_AT_REST = "stretches in which the input rests"
+AT_REST = "stretches in which the input rests"
 _WHITE_ONLY = "top of the spectrum (white noise only)"
 
 
-def noise_floors(rig: Rig, records: Sequence[Record], drifts: bool = False) -> tuple[NoiseFloor, ...]:
+def noise_floors(
+    rig: Rig, records: Sequence[Record], drifts: bool = False, at_rest: bool = True
+) -> tuple[NoiseFloor, ...]:
     """Return the noise floor of every output that the records hold.
 
     Parameters
@@ -42,12 +44,14 @@ def noise_floors(rig: Rig, records: Sequence[Record], drifts: bool = False) -> t
         All records of a campaign: they share their sensors.
     drifts
         True for an axis without a spring: where it has drifted to from one period to the next is not noise.
+    at_rest
+        False for a rig whose motion while the input rests is known to be no noise.
     """
     floors = []
     for signal in rig.outputs:
         holding = [record for record in records if signal.name in record]
         if holding:
-            std, method, stretches = _noise_floor(rig, signal.name, holding, drifts)
+            std, method, stretches = _noise_floor(rig, signal.name, holding, drifts, at_rest)
             spread = max(float(np.std(record[signal.name])) for record in holding)
             size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
             floors.append(
@@ -56,7 +60,7 @@ def noise_floors(rig: Rig, records: Sequence[Record], drifts: bool = False) -> t
                     signal.unit,
                     max(std, _SMALLEST * size),
                     method,
-                    lower_bound=method == _WHITE_ONLY or (not rig.is_driven and method == _AT_REST),
+                    lower_bound=method == _WHITE_ONLY or (not rig.is_driven and method == AT_REST),
                     stretches=stretches,
                 )
             )
@@ -64,7 +68,7 @@ def noise_floors(rig: Rig, records: Sequence[Record], drifts: bool = False) -> t
 
 
 def _noise_floor(
-    rig: Rig, output: str, records: Sequence[Record], drifts: bool
+    rig: Rig, output: str, records: Sequence[Record], drifts: bool, at_rest: bool
 ) -> tuple[float, str, Stretches]:
     source = rig.inputs[0].name
     repeated = _repeated(source, output, records)
@@ -79,10 +83,10 @@ def _noise_floor(
     if not rig.is_driven:
         # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
         top = min(top, float(np.median([_roughness(record[output]) for record in records])))
-    quiet = [q for record in records for q in _quiet_stretches(record, source, output)]
+    quiet = [q for record in records if at_rest for q in _quiet_stretches(record, source, output)]
     if quiet:
         deviations = [float(np.std(stretch)) for stretch, _ in quiet]
-        return max(float(np.median(deviations)), top), _AT_REST, tuple(quiet)
+        return max(float(np.median(deviations)), top), AT_REST, tuple(quiet)
     return top, _WHITE_ONLY, ()
 
 

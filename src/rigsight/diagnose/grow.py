@@ -18,7 +18,8 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from rigsight.diagnose.characterize import Look, finished, followed, look_at, refine, widened
+from rigsight.diagnose.characterize import finished, followed, refine
+from rigsight.diagnose.first_look import Look, look_at, widened
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure, carried_over

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigsight.discover.bench import Trial
 from rigsight.discover.hysteresis import LOOP, ForceEquation
 from rigsight.discover.result import Coefficient, Term
-from rigsight.discover.selection import STRONG, Selection, Trial, criterion
+from rigsight.discover.selection import STRONG, Selection, criterion
+from rigsight.discover.task import Task
 from rigsight.effects import Effect
 from rigsight.records.periods import same_signal
 from rigsight.records.record import Record
-
-if TYPE_CHECKING:
-    from rigsight.discover.discovery import Task
 
 _SURE = 0.9
 _ZERO = 3.0

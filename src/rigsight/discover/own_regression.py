@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected
@@ -53,3 +54,13 @@ def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: R
     target = np.concatenate(targets)
     independent = max(target.size * rows.independent_share(order), 10.0)
     return Projected(np.concatenate(blocks), target, independent)
+
+
+def own_terms(rig: Rig, no_spring: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of the rig's damper and spring, which compete in the full form."""
+    motion = rig.motion
+    first = 1 if rig.is_driven else 0
+    own = {motion.damping.name: projected.base[:, first]}
+    if not no_spring:
+        own[motion.stiffness.name] = projected.base[:, first + 1]
+    return own

@@ -1,6 +1,6 @@
 """What was measured, and whether it can be used: records, reading and conditioning."""
 
-from rigsight.records.read_csv import ColumnMapping as ColumnMapping
+from rigsight.records.column_mapping import ColumnMapping as ColumnMapping
 from rigsight.records.read_record import read_record as read_record
 from rigsight.records.record import Hold as Hold
 from rigsight.records.record import Kind as Kind

@@ -56,7 +56,9 @@ class TimeBase:
         return np.asarray(CubicSpline(self.stamps, samples)(grid), dtype=np.float64)
 
 
-def time_base(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) -> TimeBase:
+def time_base(
+    stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str = "line"
+) -> TimeBase:
     """Return the even grid on which the stamps lie.
 
     Parameters
@@ -67,6 +69,8 @@ def time_base(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) 
         Line number of every stamp, shape (n_samples,).
     file
         Name for messages.
+    row
+        What messages call a row.
 
     Raises
     ------
@@ -87,8 +91,8 @@ def time_base(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) 
         tolerated = np.maximum(tolerated, LARGEST_ROUNDING * rounding)
     if slope > 0.0 and bool(np.all(deviation <= tolerated)):
         return TimeBase(float(stamps[0]), _plain(float(slope), float(rounding[-1]) / stamps.size))
-    _check_order(stamps, lines, file)
-    _check_gaps(stamps, lines, file)
+    _check_order(stamps, lines, file, row)
+    _check_gaps(stamps, lines, file, row)
     steps = np.diff(stamps)
     dt = float((stamps[-1] - stamps[0]) / (stamps.size - 1))
     # A clock that wanders keeps its steps even but not its stamps; scattered stamps the other way round.
@@ -101,7 +105,7 @@ def time_base(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) 
             else "Resample the record onto an even grid, or record with a fixed sample time."
         )
         raise InputError(
-            f"{file}, line {lines[worst + 1]}: the samples are not equally spaced; the step to t = {stamps[worst + 1]:.9g} is "
+            f"{file}, {row} {lines[worst + 1]}: the samples are not equally spaced; the step to t = {stamps[worst + 1]:.9g} is "
             f"{steps[worst]:.4g}, the mean step {dt:.4g} (jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
             f"{mend}"
         )
@@ -140,12 +144,12 @@ def _plain(dt: float, uncertainty: float) -> float:
     return dt
 
 
-def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) -> None:
+def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
     steps = np.diff(stamps)
     if np.all(steps > 0.0):
         return
     first = int(np.argmax(steps <= 0.0))
-    where = f"{file}, line {lines[first + 1]}: "
+    where = f"{file}, {row} {lines[first + 1]}: "
     if steps[first] < 0.0:
         raise InputError(
             f"{where}time is not increasing: {stamps[first + 1]:.9g} follows {stamps[first]:.9g}. "
@@ -156,7 +160,7 @@ def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: st
     raise InputError(f"{where}duplicate time stamp {stamps[first]:.9g} ({count} in the file). {mend}")
 
 
-def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str) -> None:
+def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
     """Refuse missing samples; steps that vary everywhere are jitter, not gaps."""
     steps = np.diff(stamps)
     dt = float(np.median(steps))
@@ -167,6 +171,6 @@ def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str
     missing = round(float(steps[first]) / dt) - 1
     more = f" ({gaps.size} gaps in the file)" if gaps.size > 1 else ""
     raise InputError(
-        f"{file}, between lines {lines[first]} and {lines[first + 1]}: {missing} samples are missing, "
+        f"{file}, between {row}s {lines[first]} and {lines[first + 1]}: {missing} samples are missing, "
         f"the time jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}{more}. Split the record there into two files."
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
+from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.dialect import Dialect, is_comment, looks_like_names, sniff
 
 # The text and its lines are held in memory together, about five times the file.
@@ -18,78 +18,31 @@ LARGEST_FILE = 2_000_000_000
 
 
 @dataclass(frozen=True)
-class ColumnMapping:
-    """Where a signal stands in a file: ``value in SI = scale * column + offset``.
+class Layout:
+    """How the columns of a text file are laid out.
 
     Attributes
     ----------
-    name
-        Column name of the header, or the column's number, counted from 1.
-    scale
-        SI unit per unit of the column.
-    offset
-        Value of a column of zeros, in the SI unit.
-
-    Raises
-    ------
-    InputError
-        If the scale is zero, or scale or offset is not finite.
-    """
-
-    name: str | int
-    scale: float = 1.0
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.scale) or self.scale == 0.0:
-            raise InputError(
-                f"Column '{self.name}': scale must be a finite number other than 0, got {self.scale}."
-            )
-        if not math.isfinite(self.offset):
-            raise InputError(f"Column '{self.name}': offset must be a finite number, got {self.offset}.")
-
-    def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a column in SI units, shape (n_samples,).
-
-        Parameters
-        ----------
-        column
-            Numbers as they stand in the file, shape (n_samples,).
-        """
-        return self.scale * column + self.offset
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Numbers of a file as they stand there, before scale and offset.
-
-    Attributes
-    ----------
-    values
-        Signal name -> column, shape (n_samples,); all finite.
-    labels
-        Signal name -> how the file calls the column.
-    lines
-        Line number of every row, shape (n_samples,).
+    dialect
+        How cells and numbers are written.
+    names
+        Of the columns; their numbers where the file has no header.
+    n_above
+        How many of the kept lines stand above the first row of numbers.
+    has_names
+        Whether the file has a header.
     notes
-        What was assumed while reading.
+        What was assumed.
+    units
+        Cells of a units row, empty where there is none.
     """
-
-    values: Mapping[str, NDArray[np.float64]]
-    labels: Mapping[str, str]
-    lines: NDArray[np.int64]
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """Names of the columns, and how many of the kept lines stand above the first row of numbers."""
 
     dialect: Dialect
     names: tuple[str, ...]
     n_above: int
     has_names: bool
     notes: tuple[str, ...]
+    units: tuple[str, ...] = ()
 
 
 def read_csv(
@@ -125,17 +78,13 @@ def read_csv(
         raise InputError(
             f"{path.name}: separator and decimal sign are both '{decimal}'; name two different ones."
         )
-    lines = _text(path).split("\n")
-    kept = [
-        number
-        for number, line in enumerate(lines, 1)
-        if line and not line.isspace() and not is_comment(line, comment)
-    ]
+    lines = read_text(path).split("\n")
+    kept = kept_lines(lines, comment)
     if not kept:
         raise InputError(
             f"{path.name} is empty (nothing but blank or comment lines): a header and rows of numbers are needed."
         )
-    layout = _layout(path, lines, kept, separator, decimal, header, comment)
+    layout = find_layout(path, lines, kept, separator, decimal, header, comment)
     found = {
         signal: position
         for signal, mapping in columns.items()
@@ -158,8 +107,14 @@ def read_csv(
     return Columns(values, labels, np.array(rows, dtype=np.int64), layout.notes)
 
 
-def _text(path: Path) -> str:
-    """Return the text of a file with line feeds only."""
+def read_text(path: Path) -> str:
+    """Return the text of a file with line feeds only.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is too large, or is no text.
+    """
     try:
         if path.is_dir():
             raise InputError(f"{path} is a folder; name the file in it.")
@@ -186,7 +141,16 @@ def _text(path: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _layout(
+def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:
+    """Return the numbers, from 1, of the lines that are neither blank nor comments."""
+    return [
+        number
+        for number, line in enumerate(lines, 1)
+        if line and not line.isspace() and not is_comment(line, comment)
+    ]
+
+
+def find_layout(
     path: Path,
     lines: Sequence[str],
     kept: Sequence[int],
@@ -194,7 +158,8 @@ def _layout(
     decimal: str | None,
     header: bool | None,
     comment: str | None,
-) -> _Layout:
+) -> Layout:
+    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out."""
     dialect = sniff([lines[number - 1] for number in kept[:100]], separator, decimal)
     first = dialect.cells(lines[kept[0] - 1])
     if header is None:
@@ -202,18 +167,20 @@ def _layout(
     if not header:
         names = _names_in_comment(lines, kept[0], dialect, len(first), comment)
         numbers = tuple(str(i + 1) for i in range(len(first)))
-        return _Layout(dialect, names or numbers, 0, bool(names), ())
+        return Layout(dialect, names or numbers, 0, bool(names), ())
     notes: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
     n_above = 1
     if len(kept) > 1:
         second = dialect.cells(lines[kept[1] - 1])
         if any(second) and all(dialect.is_text(cell) for cell in second):
             n_above = 2
+            units = tuple(second)
             listed = ", ".join(second)
             notes = (
                 f"{path.name}, line {kept[1]}: taken as a row of units ({listed}); values are not converted by it.",
             )
-    return _Layout(dialect, tuple(first), n_above, True, notes)
+    return Layout(dialect, tuple(first), n_above, True, notes, units)
 
 
 def _names_in_comment(
@@ -228,7 +195,7 @@ def _names_in_comment(
     return tuple(names) if len(names) == width and looks_like_names(dialect, names) else None
 
 
-def _position(path: Path, signal: str, mapping: ColumnMapping, layout: _Layout, optional: bool) -> int | None:
+def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, optional: bool) -> int | None:
     """Return the index of a signal's column, None if it is missing and may be."""
     listed = ", ".join(f"'{name}'" for name in layout.names)
     if isinstance(mapping.name, int):
@@ -261,7 +228,7 @@ def _position(path: Path, signal: str, mapping: ColumnMapping, layout: _Layout, 
 
 
 def _numbers(
-    path: Path, lines: Sequence[str], rows: Sequence[int], layout: _Layout, found: Mapping[str, int]
+    path: Path, lines: Sequence[str], rows: Sequence[int], layout: Layout, found: Mapping[str, int]
 ) -> NDArray[np.float64]:
     """Return the columns asked for, shape (n_rows, n_columns asked for)."""
     dialect = layout.dialect
@@ -286,7 +253,7 @@ def _numbers(
     return np.asarray(table, dtype=np.float64)
 
 
-def _check_widths(path: Path, texts: Sequence[str], rows: Sequence[int], layout: _Layout) -> None:
+def _check_widths(path: Path, texts: Sequence[str], rows: Sequence[int], layout: Layout) -> None:
     """Refuse rows of another width: a cut last line, or a decimal comma between commas."""
     separator = layout.dialect.separator
     width = len(layout.names)
@@ -303,7 +270,7 @@ def _check_widths(path: Path, texts: Sequence[str], rows: Sequence[int], layout:
 
 
 def _report_culprit(
-    path: Path, texts: Sequence[str], rows: Sequence[int], layout: _Layout, found: Mapping[str, int]
+    path: Path, texts: Sequence[str], rows: Sequence[int], layout: Layout, found: Mapping[str, int]
 ) -> None:
     """Raise for the first cell that is not a number; slow, so only after the fast reading failed."""
     dialect = layout.dialect

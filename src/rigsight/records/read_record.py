@@ -1,8 +1,9 @@
-"""How does a text file become a checked `Record` of a rig's signals?"""
+"""How does a measured file become a checked `Record` of a rig's signals?"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -10,10 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.conditioning import time_base
+from rigsight.records.channel_file import file_format
+from rigsight.records.channel_table import read_channels
+from rigsight.records.channel_units import si_mapping
+from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.conditioning import TimeBase, time_base
 from rigsight.records.plausibility import clipping, is_constant
-from rigsight.records.read_csv import ColumnMapping, Columns, read_csv
+from rigsight.records.read_csv import read_csv
 from rigsight.records.record import Hold, Kind, Record, Role
+from rigsight.records.resampling import Resampled, in_seconds, refuse_different_axes, resampled
 
 TIME = "t"
 
@@ -42,6 +48,8 @@ def read_record(
     kind: Kind = "operation",
     amplitude: float | None = None,
     hold: Hold = "foh",
+    dt: float | None = None,
+    resample: float | None = None,
     separator: str | None = None,
     decimal: str | None = None,
     header: bool | None = None,
@@ -52,7 +60,7 @@ def read_record(
     Parameters
     ----------
     path
-        Delimited text file.
+        Delimited text, or a measurement file of a format in `channel_file`; its content decides, not its name.
     inputs, outputs
         Signals of the rig. All inputs and the first output are required, further outputs are read where the file has them.
     columns
@@ -63,8 +71,12 @@ def read_record(
         How results call the record, by default the file's name without its ending.
     role, kind, amplitude, hold
         See `Record`.
+    dt
+        Sample time [s] of a file without time.
+    resample
+        Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     separator, decimal, header, comment
-        See `read_csv`.
+        See `read_csv`; only delimited text has them.
 
     Raises
     ------
@@ -73,45 +85,107 @@ def read_record(
     """
     columns = columns or {}
     time = columns.get(TIME, ColumnMapping(TIME))
-    if time.scale < 0.0:
+    if time.scale is not None and time.scale < 0.0:
         raise InputError(f"{path.name}: the scale of time must be positive, got {time.scale:g}.")
+    if dt is not None and TIME in columns:
+        raise InputError(f"{path.name}: dt = {dt:g} stands beside a column for time; give one of the two.")
     signals = [*inputs, *outputs]
     wanted = {signal.name: columns.get(signal.name, ColumnMapping(signal.name)) for signal in signals}
     # A column that was mapped by hand is meant to be there.
     spare = [output.name for output in outputs[1 if require_outputs else 0 :] if output.name not in columns]
-    table = read_csv(
-        path,
-        {TIME: time, **wanted},
-        optional=spare,
-        separator=separator,
-        decimal=decimal,
-        header=header,
-        comment=comment,
-    )
-    base = time_base(table.values[TIME], table.lines, path.name)
-    holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
+    if file_format(path) is None:
+        table = read_csv(
+            path,
+            wanted if dt is not None else {TIME: time, **wanted},
+            optional=spare,
+            separator=separator,
+            decimal=decimal,
+            header=header,
+            comment=comment,
+        )
+        if dt is not None:
+            stamps = dt * np.arange(table.lines.size, dtype=np.float64)
+            table = replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
+    else:
+        _refuse_dialect(path, separator=separator, decimal=decimal, header=header, comment=comment)
+        table = read_channels(
+            path, {TIME: time, **wanted}, TIME, time_is_mapped=TIME in columns, optional=spare, dt=dt
+        )
+    units = {TIME: "s"} | {signal.name: signal.unit for signal in signals}
+    unit_notes: list[str] = []
+    to_si: dict[str, ColumnMapping] = {}
+    for signal, label in table.labels.items():
+        mapping = time if signal == TIME else wanted[signal]
+        to_si[signal], notes = si_mapping(
+            path.name, signal, units[signal], mapping, label, table.units.get(signal)
+        )
+        unit_notes += notes
+    bases = _bases(path, table)
     raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
-    notes = [*table.notes, *base.notes]
+    found: list[str] = []
     if require_outputs:
-        raw, constant_notes = _moving(path, raw, table, inputs, outputs, role)
-        notes += constant_notes
-    notes += _clipping_notes(path, raw, table)
+        raw, found = _moving(path, raw, table, inputs, outputs, role)
+    found += _clipping_notes(path, raw, table)
+    holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
+    on_axis = _on_one_axis(
+        path, table, raw, {signal: bases[signal] for signal in raw}, to_si[TIME], resample, holds
+    )
     return Record(
         name=name or path.stem,
-        dt=base.dt * time.scale,
-        signals={
-            signal: wanted[signal].to_si(base.resample(samples, holds.get(signal)))
-            for signal, samples in raw.items()
-        },
-        units={TIME: "s"} | {signal.name: signal.unit for signal in signals if signal.name in raw},
-        t0=base.t0 * time.scale + time.offset,
+        dt=on_axis.dt,
+        signals={signal: to_si[signal].to_si(samples) for signal, samples in on_axis.samples.items()},
+        units={signal: unit for signal, unit in units.items() if signal == TIME or signal in raw},
+        t0=on_axis.t0,
         role=role,
         kind=kind,
         amplitude=amplitude,
         hold=hold,
         source=path,
-        notes=tuple(notes),
+        notes=(*table.notes, *unit_notes, *on_axis.notes, *found),
     )
+
+
+def _refuse_dialect(path: Path, **dialect: object) -> None:
+    for key, value in dialect.items():
+        if value is not None:
+            raise InputError(
+                f"{path.name} is no delimited text, so {key} means nothing for it; remove {key}."
+            )
+
+
+def _bases(path: Path, table: Columns) -> dict[str, TimeBase]:
+    """Return the even grid of every signal, in the unit of the stamps: one for all, or each its own."""
+    if not table.axes:
+        base = time_base(table.values[TIME], table.lines, path.name, table.row)
+        return dict.fromkeys(table.values, base)
+    return {
+        signal: time_base(stamps, table.lines, f"{path.name}, {signal}", table.row)
+        for signal, stamps in table.axes.items()
+    }
+
+
+def _on_one_axis(
+    path: Path,
+    table: Columns,
+    raw: Mapping[str, NDArray[np.float64]],
+    bases: Mapping[str, TimeBase],
+    time: ColumnMapping,
+    resample: float | None,
+    holds: Mapping[str, Hold],
+) -> Resampled:
+    """Return the signals, not yet in SI, on the even axis [s] that they share or are to share."""
+    scale = 1.0 if time.scale is None else time.scale
+    offset = 0.0 if time.offset is None else time.offset
+    mended = tuple(dict.fromkeys(note for base in bases.values() for note in base.notes))
+    if resample is None and not table.axes:
+        base = next(iter(bases.values()))
+        even = {signal: base.resample(samples, holds.get(signal)) for signal, samples in raw.items()}
+        return Resampled(base.t0 * scale + offset, base.dt * scale, even, mended)
+    timed = {signal: in_seconds(base, scale, offset) for signal, base in bases.items()}
+    if resample is None:
+        refuse_different_axes(path.name, timed, table.labels)
+    on_axis = resampled(path.name, raw, timed, resample, holds)
+    return replace(on_axis, notes=(*mended, *on_axis.notes))
 
 
 def _moving(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,11 +55,29 @@ def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[E
     names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
     if rig is None or not names.keys() <= known.keys():
         return []
+    return equations_of(rig, [known[name] for name in names])
+
+
+def equations_of(rig: Rig, effects: Sequence[Effect]) -> list[EquationGroup]:
+    """Return the equations of a rig, then those of each effect on it, in the order of the signal path.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    effects
+        Effects that act on it, in any order.
+
+    Raises
+    ------
+    InputError
+        If the rig does not offer one of the effects.
+    """
     writer = _Writer(rig)
     chain = _Chain(rig, writer)
     groups = [
         EquationGroup(sentence_case(effect_label(effect.name)), list(chain.equations(effect)))
-        for effect in compose(rig, [known[name] for name in names]).effects
+        for effect in compose(rig, effects).effects
     ]
     return [EquationGroup(sentence_case(rig.name.replace("_", " ")), list(chain.motion())), *groups]
 

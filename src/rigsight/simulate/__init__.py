@@ -1,5 +1,7 @@
 """Rig and effects -> compiled kernel -> outputs for a record's input."""
 
+from rigsight.simulate.composition import compose as compose
+from rigsight.simulate.composition import structure_named as structure_named
 from rigsight.simulate.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.simulation import choose_substeps as choose_substeps
@@ -11,8 +13,6 @@ from rigsight.simulate.simulation import simulate_sets as simulate_sets
 from rigsight.simulate.state_limits import state_limits as state_limits
 from rigsight.simulate.structure import Structure as Structure
 from rigsight.simulate.structure import carried_over as carried_over
-from rigsight.simulate.structure import compose as compose
-from rigsight.simulate.structure import structure_named as structure_named
 
 __all__ = [
     "Structure",

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigsight.effects import Effect
+from rigsight.simulate.composition import compose
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.structure import Structure, compose
+from rigsight.simulate.structure import Structure
 
 SCHEMA_VERSION = 1
 

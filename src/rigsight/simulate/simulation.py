@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, SimulationError
 from rigsight.records.record import Record
+from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
 from rigsight.simulate.kernel_cache import run_kernel
 from rigsight.simulate.kernel_source import LANES
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
-from rigsight.simulate.structure import Structure, without_vanished_effects
+from rigsight.simulate.structure import Structure
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""

@@ -314,7 +314,7 @@ def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, f
             if isinstance(column, str | int):
                 columns[signal] = ColumnMapping(column)
             else:
-                columns[signal] = ColumnMapping(column.name, column.scale, column.offset)
+                columns[signal] = ColumnMapping(column.name, column.scale, column.offset, column.unit)
         except InputError as error:
             raise InputError(f"{key}: columns.{signal}: {error}") from None
     try:
@@ -328,6 +328,8 @@ def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, f
             kind=record.kind,
             amplitude=record.amplitude,
             hold=record.hold,
+            dt=record.dt,
+            resample=record.resample,
             separator=record.separator,
             decimal=record.decimal,
             header=record.header,

@@ -17,6 +17,7 @@ _LISTS = ("records", "withheld")
 """Keys that hold lists of records."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
+Seconds = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
 
 
 class FileTable(BaseModel):
@@ -29,11 +30,12 @@ Checked = TypeVar("Checked", bound=FileTable)
 
 
 class ColumnTable(FileTable):
-    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset."""
+    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead."""
 
     name: str | int
-    scale: Number = 1.0
-    offset: Number = 0.0
+    scale: Number | None = None
+    offset: Number | None = None
+    unit: Annotated[str, Field(min_length=1)] | None = None
 
 
 class RigTable(FileTable):
@@ -54,6 +56,8 @@ class RecordTable(FileTable):
     kind: Kind = "operation"
     amplitude: Number | None = None
     hold: Hold = "foh"
+    dt: Seconds | None = None
+    resample: Seconds | None = None
     columns: dict[str, str | int | ColumnTable] = {}
     separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None
@@ -183,7 +187,7 @@ def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dic
     if "columns" in location[:-1]:
         return (
             f"{path.name}: {key}: got {got!r}. Write the column's name, its number counted from 1, "
-            'or { name = "...", scale = 1.0, offset = 0.0 }.'
+            'or { name = "...", scale = 1.0, offset = 0.0 }, or { name = "...", unit = "mm" }.'
         )
     return f"{path.name}: {key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {got!r}.{_how_to_write(location)}"
 

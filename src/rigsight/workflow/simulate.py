@@ -40,7 +40,7 @@ def run_simulate(
     model
         A ``model.json`` or the folder that holds one.
     record
-        Delimited text file with time and input; the outputs are read only where initial states are estimated.
+        Measured file with time and input; the outputs are read only where initial states are estimated.
     out
         CSV file for time, input and simulated outputs; None writes nothing.
     columns

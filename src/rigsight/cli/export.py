@@ -1,0 +1,78 @@
+"""What does ``rigsight export`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Debug, OwnEffects, Quiet
+
+if TYPE_CHECKING:
+    from rigsight.simulate.input_hold import Hold
+
+
+def export(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
+    ],
+    to: Annotated[
+        str,
+        typer.Option("--to", metavar="TARGET", help="python, control, c, fmu, matlab, latex or modelica."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            show_default="the rig's name with the target's suffix",
+            help="File to write; function, C prefix and model are named after it.",
+        ),
+    ] = None,
+    hold: Annotated[
+        str | None,
+        typer.Option(
+            "--hold",
+            metavar="HOLD",
+            show_default="the model's",
+            help="How the input will behave between samples: zoh (constant) or foh (linear).",
+        ),
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            "--step",
+            metavar="SECONDS",
+            show_default="from the model's own time scales",
+            help="Longest internal step of python, c, fmu and matlab.",
+        ),
+    ] = None,
+    source_only: Annotated[
+        bool, typer.Option("--source-only", help="An FMU without a binary: the importing tool compiles it.")
+    ] = False,
+    effects: OwnEffects = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write a model for other tools: Python, python-control, C, an FMU, MATLAB, LaTeX or Modelica.
+
+    One file, with the equations, the numbers and their units, and nothing of rigsight needed to run it.
+    """
+    with told(debug):
+        from rigsight.workflow.export import run_export
+        from rigsight.workflow.own_effects import own_effects
+
+        file = run_export(
+            model,
+            to,
+            out,
+            hold=cast("Hold | None", hold),
+            step=step,
+            source_only=source_only,
+            own_effects=own_effects(effects or [], check=False),
+        )
+    if not quiet:
+        typer.echo(f"{to}: {file}")

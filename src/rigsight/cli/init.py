@@ -1,0 +1,46 @@
+"""What does ``rigsight init`` accept, run and show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigsight.cli.exit_codes import told
+from rigsight.cli.options import Debug, Quiet
+
+
+def init(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="The folder that holds the measured files.")
+    ],
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            metavar="RIG",
+            show_default="the one that the channels fit best",
+            help="running_gear, axis or element.",
+        ),
+    ] = None,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Write a commented campaign.toml for the measured files of a folder.
+
+    Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten.
+    """
+    with told(debug):
+        from rigsight.workflow.init import run_init
+
+        draft = run_init(folder, model=model)
+    if quiet:
+        return
+    typer.echo(f"Written: {draft.path} ({draft.model}, {len(draft.records)} records)")
+    for name, reason in draft.left_out:
+        typer.echo(f"Not used: {name}: {reason}")
+    if draft.n_blanks:
+        typer.echo(f'Fill in what reads "FILL IN" ({draft.n_blanks} times). Then: rigsight diagnose {folder}')
+    else:
+        typer.echo(f"Check the comments in it. Then: rigsight diagnose {folder}")

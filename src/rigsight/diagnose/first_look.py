@@ -1,0 +1,248 @@
+"""From where is a candidate worth fitting to all records with care? First looks from all its starts.
+
+From every start a candidate is fitted to the liveliest stretches of the records: in short pieces with initial states of their
+own, which keeps a model that is far off in step with the motion, then in one piece. From where the best of these ended it is
+fitted roughly to the whole records.
+
+References
+----------
+H. G. Bock, in *Modelling of Chemical Reaction Systems* (Springer 1981) 102, for fits in pieces (multiple shooting, here without
+the condition that pieces join).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from rigsight.diagnose.starts import start_values, with_own_values
+from rigsight.diagnose.windows import cut
+from rigsight.diagnose.workbench import Workbench
+from rigsight.effects import Effect
+from rigsight.identify import EffectRegression, FitResult
+from rigsight.records.record import Record
+from rigsight.simulate import Structure
+
+_LOOK_EVALUATIONS = 25
+_GLIMPSE_EVALUATIONS = 8
+_MOST_STARTS = 4
+"""Starts that are fitted further; which of more they are, the first few evaluations of each tell."""
+_PIECE = 4.0
+"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
+
+An assumption, like the lengths and factors below: half to two periods did worse on play of a few widths, nothing else was tried.
+"""
+_WIDE_EVALUATIONS = 12
+_LOOK_TOLERANCE = 1e-3
+LOOK_ACCURACY = 1e-3
+_MOST_PIECES = 40
+"""In all: every piece has initial states of its own, and the fit's equations grow with them."""
+_NEAR = 25.0
+"""A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
+_ALIKE = 1.05
+"""Starts whose first looks end within this factor of the best cost are all followed."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """First fits of a candidate to part of the records or roughly to all, best first, those that ended at the same place once.
+
+    Attributes
+    ----------
+    effects, structure, free
+        What was fitted.
+    fits
+        What was reached.
+    nearest
+        Mean squared error that was reached in their liveliest stretches.
+    """
+
+    effects: tuple[Effect, ...]
+    structure: Structure
+    free: tuple[str, ...]
+    fits: tuple[FitResult, ...]
+    nearest: float
+
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last."""
+        return self.effects[-1].name
+
+    @property
+    def cost(self) -> float:
+        """Lowest cost that was reached."""
+        return self.fits[0].cost
+
+
+def look_at(
+    bench: Workbench,
+    effects: tuple[Effect, ...],
+    base: FitResult,
+    parents: Mapping[str, FitResult],
+    regression: EffectRegression | None = None,
+    hold: frozenset[str] = frozenset(),
+    substeps: Sequence[int] | None = None,
+) -> Look:
+    """Fit a set of effects to the liveliest stretches of the records, from all starts of the last effect.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects
+        All effects of the model; the last is new.
+    base
+        Fit without the last.
+    parents
+        Fits with a simpler effect in place of the last, by name of that effect.
+    regression
+        Gives one more start, where it can.
+    hold
+        Rig parameters to keep at their base value.
+    substeps
+        Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
+    """
+    special = {name: value for effect in effects for name, value in effect.special_cases.items()}
+    structure = bench.composed(effects, special)
+    free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
+    starts = list(start_values(bench, structure, effects[-1], base, parents))
+    regressed = regression.start(effects[-1]) if regression is not None else None
+    if regressed is not None:
+        starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
+    nearest = _looked(bench, structure, free, starts, substeps)
+    if not np.isfinite(nearest[0].cost) and bench.start:
+        unbent = replace(base, values={**base.values, **bench.start})
+        nearest = _looked(
+            bench, structure, free, list(start_values(bench, structure, effects[-1], unbent, {})), substeps
+        )
+    return Look(effects, structure, free, nearest, mean_square(nearest[0]))
+
+
+def _looked(
+    bench: Workbench,
+    structure: Structure,
+    free: tuple[str, ...],
+    starts: Sequence[Mapping[str, float]],
+    substeps: Sequence[int] | None = None,
+) -> tuple[FitResult, ...]:
+    """Fit to the liveliest stretches: in pieces from every start, from the best places in one."""
+    fit = bench.problem(structure, bench.look, LOOK_ACCURACY)
+    stretches = [cut_in_pieces(bench, [record], _PIECE) for record in bench.look]
+    in_pieces = bench.problem(structure, [piece for parts in stretches for piece in parts], LOOK_ACCURACY)
+    of_pieces = None
+    if substeps is not None:
+        of_pieces = [n for n, parts in zip(substeps, stretches, strict=True) for _ in parts]
+
+    def tried(
+        start: Mapping[str, float], states: Sequence[NDArray[np.float64]] | None, most: int
+    ) -> FitResult:
+        return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
+
+    if len(starts) > _MOST_STARTS:
+        glimpses = sorted(
+            (tried(start, None, _GLIMPSE_EVALUATIONS) for start in starts), key=lambda f: f.cost
+        )
+        first = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_MOST_STARTS]]
+    else:
+        first = [tried(start, None, _LOOK_EVALUATIONS) for start in starts]
+    near = [
+        fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+        for found in _distinct(first, alike=float("inf"))
+    ]
+    return _distinct(near)
+
+
+def widened(
+    bench: Workbench,
+    looks: Sequence[Look],
+    n_jobs: int = 1,
+    substeps: Sequence[int] | None = None,
+    lowest: float = float("inf"),
+) -> list[Look]:
+    """Fit those looks roughly to the whole records that came near the best one in the liveliest stretches; drop the others.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    looks
+        First looks.
+    n_jobs
+        Looks fitted at the same time.
+    substeps
+        Integration steps per sample of each record; None chooses them.
+    lowest
+        Mean squared error in the liveliest stretches that a look beside these has reached.
+    """
+    lowest = min([lowest, *(look.nearest for look in looks)])
+
+    def one(look: Look) -> Look:
+        return replace(look, fits=_on_whole_records(bench, look.structure, look.free, look.fits, substeps))
+
+    near = [look for look in looks if look.nearest <= _NEAR * lowest]
+    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in near))
+
+
+def looked_again(
+    bench: Workbench, settled: FitResult, starts: Sequence[Mapping[str, float]]
+) -> tuple[FitResult, ...]:
+    """Fit from other starts than those of a candidate: to the liveliest stretches, from the best places roughly to all records.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    settled
+        Gives the equations and the free parameters.
+    starts
+        Values of all parameters.
+    """
+    near = bench.problem(settled.structure, bench.look, LOOK_ACCURACY)
+    looks = [
+        near.fit(start, settled.free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False) for start in starts
+    ]
+    best = sorted(looks, key=lambda fit: fit.cost)[:_MOST_STARTS]
+    return _on_whole_records(bench, settled.structure, settled.free, best)
+
+
+def _on_whole_records(
+    bench: Workbench,
+    structure: Structure,
+    free: tuple[str, ...],
+    fits: Sequence[FitResult],
+    substeps: Sequence[int] | None = None,
+) -> tuple[FitResult, ...]:
+    whole = bench.problem(structure, bench.estimation, LOOK_ACCURACY)
+    return _distinct(
+        [
+            whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+            for near in fits
+        ]
+    )
+
+
+def cut_in_pieces(bench: Workbench, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
+    """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
+    duration = sum(record.n_samples * record.dt for record in records)
+    return cut(records, max(periods * bench.period, duration * len(bench.look) / len(records) / _MOST_PIECES))
+
+
+def mean_square(fit: FitResult) -> float:
+    """Return the mean squared residual of a fit, in units of the noise floor squared."""
+    return fit.cost / fit.n_samples
+
+
+def _distinct(fits: Sequence[FitResult], alike: float = _ALIKE) -> tuple[FitResult, ...]:
+    """Return the best fit, and the next one that ended elsewhere if its cost is within a factor of the best."""
+    ordered = sorted(fits, key=lambda result: result.cost)
+    best = ordered[0]
+    values = np.array([best.values[name] for name in best.free])
+    for other in ordered[1:]:
+        theirs = np.array([other.values[name] for name in other.free])
+        if other.cost <= alike * best.cost and not np.allclose(values, theirs, rtol=0.05, atol=1e-12):
+            return best, other
+    return (best,)

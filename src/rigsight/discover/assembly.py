@@ -1,0 +1,129 @@
+"""How does what the stages found become one result?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.doubts import doubts, warnings_of
+from rigsight.discover.equations import equations
+from rigsight.discover.hysteresis import ForceEquation
+from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
+from rigsight.discover.selection import Selection, criterion, next_terms
+from rigsight.discover.task import Task
+from rigsight.identify import FitResult
+from rigsight.records.record import Record
+from rigsight.simulate.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the stages of a discovery hand on."""
+
+    estimation: tuple[Record, ...]
+    held_out: tuple[Record, ...]
+    how: str
+    selection: Selection
+    chosen: Trial
+    judged: Trial
+    final: FitResult
+    inclusion: Mapping[str, float]
+    force: ForceEquation | None
+    same: Mapping[str, list[str]]
+    held: str
+
+
+def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Found) -> Discovery:
+    """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
+    rig, final, selection = task.rig, found.final, found.selection
+    output = rig.outputs[0].name
+    structure = final.structure
+    constants = {p.name for p in rig.constants}
+    numbers = {n: v for n, v in final.values.items() if n not in final.free and n not in constants}
+    text, latex = equations(structure, numbers)
+    own = {p.name for p in rig.parameters}
+    units = {p.name: p.unit for p in structure.parameters}
+    coefficients = {
+        name: Coefficient(final.values[name], final.standard_errors[name], units[name]) for name in final.free
+    }
+    terms = _terms(bench, found, coefficients)
+    measured = np.concatenate([record[output] for record in found.held_out])
+    size = float(np.std(measured)) or 1.0
+    warnings = warnings_of(
+        task,
+        found.estimation,
+        found.held_out,
+        found.how,
+        selection,
+        found.chosen,
+        found.judged.excess,
+        terms,
+        found.held,
+        found.force,
+        task.noise[output] / size,
+        next(iter(next_terms(bench, found.chosen.support)), ""),
+    )
+    return Discovery(
+        title=task.title,
+        rig=rig.name,
+        method=method,
+        form="pointwise" if pointwise else "weak",
+        equations=text,
+        latex=latex,
+        rig_parameters={name: c for name, c in coefficients.items() if name in own},
+        terms=terms,
+        alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
+        force_equation={} if found.force is None else dict(found.force.inclusion),
+        held_out=tuple(record.name for record in found.held_out),
+        held_out_error=found.judged.excess,
+        held_out_nrmse=found.judged.excess * task.noise[output] / size,
+        noise_floor=task.noise[output] / size,
+        independent=selection.independent,
+        runs=_runs(bench, found, output),
+        output=output,
+        unit=rig.outputs[0].unit,
+        model=Model.of(structure, final.values, found.estimation[0].hold).to_json(),
+        warnings=warnings,
+    )
+
+
+def _terms(bench: Bench, found: Found, coefficients: Mapping[str, Coefficient]) -> tuple[Term, ...]:
+    structure = found.final.structure
+    kept = {effect.name for effect in structure.effects}
+    terms = []
+    for name in bench.own_terms:
+        stays = name in coefficients
+        own = {name: coefficients[name]} if stays else {}
+        terms.append(Term(name, "The rig's own.", stays, found.inclusion.get(name, 0.0), own))
+    for effect in structure.effects:
+        names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
+        own = {name: coefficients[name] for name in names if name in coefficients}
+        terms.append(
+            Term(
+                effect.name, effect.summary, True, found.inclusion.get(effect.name, 0.0), own,
+                doubts(effect, own, found.inclusion.get(effect.name, 0.0), found.same.get(effect.name, [])),
+            )
+        )  # fmt: skip
+    rest = sorted(set(found.inclusion) - kept - set(bench.own_terms), key=lambda n: -found.inclusion[n])
+    terms += [Term(n, bench.candidates[n].effect.summary, False, found.inclusion[n], {}) for n in rest]
+    return tuple(terms)
+
+
+def _alternative(trial: Trial, selection: Selection) -> Alternative:
+    bic = criterion(trial, selection.independent)
+    aic = bic - trial.n_free * (math.log(selection.independent) - 2.0)
+    return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.excess, aic, bic)
+
+
+def _runs(bench: Bench, found: Found, output: str) -> tuple[Run, ...]:
+    """Return the free runs of the chosen model on the held-out records."""
+    ends = np.cumsum([record.n_samples for record in found.held_out])
+    parts = np.split(found.judged.residuals * bench.noise[output], ends[:-1])
+    return tuple(
+        Run(record.name, record.role, record.t, record[output], record[output] - error)
+        for record, error in zip(found.held_out, parts, strict=True)
+    )

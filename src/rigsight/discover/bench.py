@@ -1,0 +1,271 @@
+"""What does a support of terms explain? It is polished by output error and scored by free runs of records it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.hysteresis import LOOPS
+from rigsight.discover.library import Candidate
+from rigsight.discover.regression import Projected
+from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, carried_over, compose
+
+Support = frozenset[str]
+_EVALUATIONS = 40
+_FIRST_EVALUATIONS = 12
+_HOPELESS = 10.0
+"""Factor over the best RMS so far at which a support is given up after the first evaluations."""
+_TOLERANCE = 1e-5
+_SMALL = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One polished support with its held-out score.
+
+    Attributes
+    ----------
+    support
+        Names of the effects.
+    fit
+        Output-error fit to the estimation records.
+    excess
+        RMS of the first output's held-out free-run error in units of the noise floor.
+    residuals
+        Held-out errors of the first output in units of the noise floor, all records one after the other.
+    """
+
+    support: Support
+    fit: FitResult
+    excess: float
+    residuals: NDArray[np.float64]
+
+    @property
+    def n_free(self) -> int:
+        """Number of fitted parameters."""
+        return len(self.fit.free)
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What every support is polished and scored with.
+
+    Attributes
+    ----------
+    rig
+        The rig.
+    estimation, held_out
+        Records to fit and records to score.
+    values
+        Constants, and linear parameters as start values.
+    scales, noise
+        Size of each base quantity, noise floor of each output.
+    held
+        Parameters of the rig that no fit moves.
+    candidates
+        The library, by name.
+    projected
+        The regression.
+    own_terms
+        Columns of the rig's own terms that compete (full form), by parameter.
+    trials
+        What has been polished.
+    """
+
+    rig: Rig
+    estimation: tuple[Record, ...]
+    held_out: tuple[Record, ...]
+    values: Mapping[str, float]
+    scales: Mapping[str, float]
+    noise: Mapping[str, float]
+    held: frozenset[str]
+    candidates: Mapping[str, Candidate]
+    projected: Projected
+    own_terms: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    trials: dict[tuple[Support, Support, Support], Trial] = field(default_factory=dict)
+
+    @property
+    def sparse(self) -> Projected:
+        """The regression with nothing projected out that competes."""
+        if not self.own_terms:
+            return self.projected
+        kept = [
+            i
+            for i in range(self.projected.base.shape[1])
+            if not any(
+                np.array_equal(self.projected.base[:, i], column) for column in self.own_terms.values()
+            )
+        ]
+        return replace(self.projected, base=self.projected.base[:, kept])
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Return the column of a term, one of the library or of the rig's own."""
+        return self.own_terms[name] if name in self.own_terms else self.candidates[name].column
+
+    def structure(self, support: Support, release: frozenset[str] = frozenset()) -> Structure:
+        """Return the equations of a support; special values of its effects are written in unless released."""
+        effects = [self.candidates[name].effect for name in sorted(support)]
+        fixed = {
+            name: value
+            for effect in effects
+            for name, value in effect.special_cases.items()
+            if name not in release and self.candidates[effect.name].inner.get(name, value) == value
+        }
+        return compose(self.rig, effects, fixed)
+
+    def free_parameters(self, structure: Structure, held: frozenset[str] = frozenset()) -> list[str]:
+        """Return what a fit of a structure moves."""
+        fixed = dict(structure.fixed)
+        names = {p.name for p in self.rig.parameters} - self.held - held
+        for effect in structure.effects:
+            for parameter in effect.parameters:
+                name = structure.parameter_name(effect, parameter.name)
+                if parameter.fitted and name not in fixed:
+                    names.add(name)
+        return [name for name in structure.names if name in names]
+
+    def start(self, structure: Structure, support: Support) -> dict[str, float]:
+        """Return the values that the regression gives a support, in SI."""
+        chosen = [self.candidates[name] for name in sorted(support)]
+        columns = (
+            np.column_stack([c.column for c in chosen])
+            if chosen
+            else np.zeros((self.projected.target.size, 0))
+        )
+        solution, _ = self.projected.solved(columns)
+        values, force = _rig_values(self.rig, self.values, solution[: self.projected.base.shape[1]])
+        for candidate, coefficient in zip(
+            chosen, solution[self.projected.base.shape[1] :] * force, strict=True
+        ):
+            values |= self._effect_values(structure, candidate, float(coefficient), values)
+        bounds = {p.name: p for p in structure.parameters}
+        return {
+            name: float(np.clip(value, bounds[name].lower, bounds[name].upper))
+            for name, value in values.items()
+            if name in bounds
+        }
+
+    def _effect_values(
+        self, structure: Structure, candidate: Candidate, coefficient: float, values: Mapping[str, float]
+    ) -> dict[str, float]:
+        effect = candidate.effect
+        own = {p.name: p.default for p in effect.parameters if p.default is not None}
+        own |= candidate.inner
+        own |= {name: share * coefficient for name, share in candidate.linear.items()}
+        found: dict[str, float] = {}
+        if effect.name in LOOPS:
+            stiffness = self.rig.motion.stiffness.name
+            without = max(values[stiffness], _SMALL * coefficient)
+            total = without + max(coefficient, _SMALL * without)
+            found[stiffness] = total
+            own["a"] = without / total
+        for parameter in effect.parameters:
+            if parameter.name in candidate.linear and parameter.lower == 0.0:
+                # A resisting force that the regression turns round is one that is hardly there.
+                own[parameter.name] = max(own[parameter.name], _SMALL * abs(own[parameter.name]))
+            if parameter.name in own:
+                found[structure.parameter_name(effect, parameter.name)] = own[parameter.name]
+        return found
+
+    def trial(
+        self,
+        support: Support,
+        release: Support = frozenset(),
+        start: Mapping[str, float] | None = None,
+        left_out: Support = frozenset(),
+    ) -> Trial:
+        """Polish a support and score it; what has been done is not done again.
+
+        Parameters
+        ----------
+        support
+            Names of the effects.
+        release
+            Parameters that are not to be held at their special values.
+        start
+            Values to start from; default are those of the regression.
+        left_out
+            Rig parameters that stay where `start` has them.
+        """
+        key = support, release, left_out
+        if key not in self.trials:
+            self.trials[key] = self._polished(support, release, start, left_out)
+        return self.trials[key]
+
+    def shortened(self, support: Support, longer: Trial) -> Trial:
+        """Polish a support once more from the values that a longer one ended at, and keep the better of both."""
+        kept = {name for name, _ in longer.fit.structure.fixed}
+        special = {name for n in support for name in self.candidates[n].effect.special_cases}
+        release = frozenset(special - kept)
+        structure = self.structure(support, release)
+        start = {
+            **self.start(structure, support),
+            **carried_over(longer.fit.values, longer.fit.structure, structure),
+        }
+        before = self.trial(support)
+        again = self._polished(support, release, start, frozenset())
+        return again if again.excess < before.excess else before
+
+    def _polished(
+        self, support: Support, release: Support, start: Mapping[str, float] | None, left_out: Support
+    ) -> Trial:
+        structure = self.structure(support, release)
+        values = dict(start) if start is not None else self.start(structure, support)
+        free = self.free_parameters(structure, left_out)
+        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise)
+        fit = problem.fit(
+            values, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
+        )
+        best = min((trial.fit.cost for trial in self.trials.values()), default=float("inf"))
+        if not fit.success and fit.cost < _HOPELESS**2 * best:
+            fit = problem.fit(
+                fit.values,
+                free,
+                fit.initial_states,
+                max_evaluations=_EVALUATIONS - _FIRST_EVALUATIONS,
+                tolerance=_TOLERANCE,
+                finish=False,
+                substeps=fit.substeps,
+            )
+        return self.scored(support, fit)
+
+    def scored(self, support: Support, fit: FitResult) -> Trial:
+        """Simulate the held-out records with a fit; only their initial states are estimated."""
+        if not np.isfinite(fit.cost):
+            return Trial(support, fit, float("inf"), np.zeros(0))
+        score = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise).fit(fit.values, [])
+        if not score.residuals:
+            return Trial(support, fit, float("inf"), np.zeros(0))
+        output = self.rig.outputs[0].name
+        errors = np.concatenate([r[:, 0] for r in score.residuals]) / self.noise[output]
+        return Trial(support, fit, float(np.sqrt(np.mean(errors**2))), errors)
+
+
+def _rig_values(
+    rig: Rig, known: Mapping[str, float], base: NDArray[np.float64]
+) -> tuple[dict[str, float], float]:
+    """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the others'."""
+    values = dict(known)
+    motion = rig.motion
+    if not rig.is_driven:
+        values |= {motion.damping.name: base[0], motion.stiffness.name: base[1], motion.bias.name: base[2]}
+        return values, 1.0
+    gain = float(motion.drive_gain.subs({s: known[s.name] for s in motion.drive_gain.free_symbols}))
+    assert motion.inertia is not None
+    inertia = gain / base[0] if base[0] * gain > 0.0 else known[motion.inertia.name]
+    values[motion.inertia.name] = inertia
+    values[motion.damping.name] = max(base[1] * inertia, 1e-4 * known[motion.damping.name])
+    if len(base) == 4:
+        stiffness = max(base[2] * inertia, 1e-3 * known[motion.stiffness.name])
+        values[motion.stiffness.name] = stiffness
+        values[motion.rest.name] = known[motion.rest.name] + base[3] * inertia / stiffness
+    else:
+        for symbol in motion.bias.free_symbols:
+            values[symbol.name] = base[2] * inertia
+    return values, inertia

@@ -1,0 +1,122 @@
+"""How surely does each term belong? Regressions of resampled rows about the rest position of the polished equation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import sympy as sp
+
+from rigsight.discover.bench import Bench
+from rigsight.discover.hysteresis import LOOP, LOOPS, ForceEquation, force_equation
+from rigsight.discover.library import candidates, torque_along
+from rigsight.discover.motion import Motion
+from rigsight.discover.own_regression import own_regression, own_terms
+from rigsight.discover.regression import inclusion_probabilities
+from rigsight.discover.selection import Selection, proposals
+from rigsight.discover.task import Task
+from rigsight.discover.weak_form import Rows
+from rigsight.identify import FitResult
+
+_ENSEMBLE_TERMS = 6
+_SAME_REST = 1e-5
+"""Shift of the rest position, in units of the motion, that changes no column."""
+
+
+def inclusion(
+    task: Task,
+    bench: Bench,
+    selection: Selection,
+    final: FitResult,
+    motions: Sequence[Motion],
+    rows: Rows,
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    """Return the inclusion probability of the terms that came near the equation, and of the rig's own in the full form.
+
+    The columns are taken about the rest position of the polished equation: about any other, a cubic spring shows a square.
+    """
+    polished = [name for trial in selection.trials for name in sorted(trial.support)]
+    proposed = [name for support in proposals(bench) for name in sorted(support)]
+    shares = {n: bench.projected.explained(c.column[:, None])[1] for n, c in bench.candidates.items()}
+    ranked = sorted(shares, key=lambda name: -shares[name])
+    kept = set(final.structure.effect_names)
+    # An effect that contains a kept one as a special case explains whatever that does, and would only share its draws.
+    offered_terms = [
+        name
+        for name in dict.fromkeys((*polished, *proposed, *ranked))
+        if name in kept or not kept & _ancestors(bench, name)
+    ]
+    names = offered_terms[:_ENSEMBLE_TERMS]
+    shift = _rest_shift(bench, final)
+    if abs(shift) < _SAME_REST * bench.scales["x"]:
+        shift = 0.0
+    moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
+    projected = own_regression(task.rig, task.no_spring, moved, rows) if shift else bench.projected
+    own_columns = own_terms(task.rig, task.no_spring, projected) if bench.own_terms else {}
+    library = [bench.candidates[name] for name in names]
+    if shift:
+        # The loop does not know where rest is.
+        loops = [candidate for candidate in library if candidate.name in LOOPS]
+        effects = [candidate.effect for candidate in library if candidate.name not in LOOPS]
+        library = loops + candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
+    again = replace(
+        bench,
+        candidates={candidate.name: candidate for candidate in library},
+        projected=projected,
+        own_terms=own_columns,
+    )
+    offered = [*own_columns, *again.candidates]
+    if not offered:
+        return {}
+    columns = np.column_stack([again.column(name) for name in offered])
+    found = inclusion_probabilities(again.sparse, columns, rng)
+    return dict(zip(offered, map(float, found), strict=True))
+
+
+def regressed_force(
+    bench: Bench, final: FitResult, motions: Sequence[Motion], rows: Rows, rng: np.random.Generator
+) -> ForceEquation | None:
+    """Regress the equation of the hysteretic force that the polished model leaves as a residual of the measured motion."""
+    rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
+    loops = [effect for effect in final.structure.effects if effect.name == LOOP]
+    if not loops or not rig.is_driven:
+        return None
+    others = [e for e in final.structure.effects if e.name != LOOP]
+    if any(effect.torque is None for effect in others):
+        return None
+    motion = rig.motion
+
+    def number(expression: sp.Expr) -> float:
+        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
+
+    without_memory = values[final.structure.parameter_name(loops[0], "a")] * number(motion.stiffness)
+    shift = _rest_shift(bench, final)
+    forces = []
+    for own in motions:
+        force = (
+            number(motion.drive_gain) * own.u
+            + number(motion.bias)
+            - number(motion.inertia) * own.acceleration
+        )
+        force -= number(motion.damping) * own.v + without_memory * (own.x - shift)
+        for effect in others:
+            force -= torque_along(effect, final.structure.values_of(effect, values), own)
+        forces.append(force)
+    n = values[final.structure.parameter_name(loops[0], "n")]
+    return force_equation(motions, rows, forces, n, rng)
+
+
+def _ancestors(bench: Bench, name: str) -> set[str]:
+    """Return the effects that a term has as special or limiting cases, and theirs."""
+    parents = [parent for parent in bench.candidates[name].effect.parents if parent in bench.candidates]
+    return set(parents).union(*(_ancestors(bench, parent) for parent in parents))
+
+
+def _rest_shift(bench: Bench, final: FitResult) -> float:
+    """Return how far the polished rest position lies from the one that the motion was smoothed about."""
+    motion = bench.rig.motion
+    if not bench.rig.is_driven:
+        return 0.0
+    return sum(final.values[s.name] - bench.values[s.name] for s in motion.rest.free_symbols)

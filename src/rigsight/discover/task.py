@@ -1,0 +1,37 @@
+"""What is to be discovered: records and a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be discovered.
+
+    Attributes
+    ----------
+    title
+        For people.
+    rig
+        The rig.
+    constants
+        Every constant of the rig.
+    records
+        Estimation and validation records, cut into windows where the rig drifts.
+    noise
+        Noise floor of each output.
+    no_spring
+        True for an axis that has none.
+    """
+
+    title: str
+    rig: Rig
+    constants: Mapping[str, float]
+    records: tuple[Record, ...]
+    noise: Mapping[str, float]
+    no_spring: bool = False

@@ -1,0 +1,67 @@
+"""How does a model become a Python file that defines a python-control system?"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import sympy as sp
+
+from rigsight.export.at_rest import state_at_rest
+from rigsight.export.description import filled, header_lines, indented
+from rigsight.export.equations import Exported
+from rigsight.export.languages import PYTHON
+from rigsight.export.python_function import (
+    code_names,
+    parameter_entries,
+    sequence,
+    unpacked_parameters,
+    unpacked_states,
+)
+
+_KINKS = "Its equations have kinks, which a solver of variable step crosses unseen: keep max_step short of the events."
+_SMOOTH = "Its equations are smooth."
+
+
+def control_system(exported: Exported, source: str, name: str) -> str:
+    """Return the text of a Python file that defines ``system``.
+
+    Parameters
+    ----------
+    exported
+        The model; the sticking of dry friction and delays have no place in it.
+    source
+        The file it comes from.
+    name
+        Name of the system.
+    """
+    structure = exported.structure
+    inputs = [quantity.name for quantity in exported.inputs]
+    unpack = indented(unpacked_parameters(exported))
+    template = files("rigsight.export").joinpath("templates/control.py.txt").read_text("utf-8")
+    return filled(
+        template,
+        {
+            "TITLE": exported.title[0].upper() + exported.title[1:],
+            "HEADER": "\n".join(header_lines(exported, source, with_parameters=False)),
+            "CALL": inputs[0] if len(inputs) == 1 else f"[{', '.join(inputs)}]",
+            "KINKS": _KINKS if exported.frozen.modes else _SMOOTH,
+            "PARAMETERS": indented(parameter_entries(exported)),
+            "REST": sequence([repr(value) for value in state_at_rest(exported)]),
+            "UNPACK_PARAMETERS": unpack,
+            "UNPACK_INPUT": "input_value, input_rate = given"
+            if len(inputs) > 1
+            else "(input_value,) = given",
+            "RATES": _array(exported, [equation.limited_rate for equation in structure.equations]),
+            "OUTPUTS": _array(exported, list(structure.outputs)),
+            "INPUTS": ", ".join(map(repr, inputs)),
+            "OUTPUT_NAMES": ", ".join(repr(output.name) for output in exported.outputs),
+            "STATES": ", ".join(repr(state.name) for state in exported.states),
+            "NAME": repr(name),
+        },
+    )
+
+
+def _array(exported: Exported, expressions: list[sp.Expr]) -> str:
+    targets = [f"result{i}" for i in range(len(expressions))]
+    lines = [*unpacked_states(exported), *PYTHON.statements(targets, expressions, code_names(exported))]
+    return indented([*lines, f"return np.array([{', '.join(targets)}])"])

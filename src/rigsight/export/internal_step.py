@@ -1,0 +1,107 @@
+"""Which fixed step follows a model's own motion to the accuracy of the engine?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.simulate import parameter_vector
+from rigsight.simulate.composition import without_vanished_effects
+from rigsight.simulate.kinks import FrozenStructure, freeze
+from rigsight.simulate.model import Model
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+
+OSCILLATION = 0.03
+"""Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""
+SETTLING = 0.1
+"""Step times the rate at which the fastest lag settles."""
+LONGEST = 1e9
+"""Step of a model without motion of its own [s]: the sample time alone decides."""
+CAUTION = 0.4
+"""Share of that step for nonlinear equations, whose time scales grow shorter with the motion."""
+_NUDGE = 1e-6
+
+
+def internal_step(model: Model) -> float:
+    """Return the longest internal step for a fixed-step integrator [s].
+
+    It follows from the eigenvalues about the rest position, with every kink to either side: what a stop or a play changes
+    is seen, what a smooth nonlinearity does at large motions is not.
+
+    Parameters
+    ----------
+    model
+        The model.
+    """
+    structure, values = without_vanished_effects(model.structure, model.values)
+    if not structure.states:
+        return LONGEST
+    p = parameter_vector(structure, values)
+    frozen = freeze(structure)
+    bound = dict(zip(structure.parameter_symbols, p, strict=True))
+    rates = sp.lambdify(
+        [INPUT, INPUT_RATE, TIME, structure.states, frozen.modes],
+        [rate.xreplace(bound) for rate in frozen.rates],
+        modules=[{"absolute": abs}, "math"],
+    )
+    rest = np.zeros(len(structure.states))
+    if structure.rig.is_driven:
+        known = dict(zip(structure.names, p, strict=True))
+        motion_rest = structure.rig.motion.rest
+        rest[0] = float(motion_rest.subs({s: known[s.name] for s in motion_rest.free_symbols}))
+    step = LONGEST
+    for modes in _sides(frozen):
+        jacobian = np.zeros((rest.size, rest.size))
+        for i in range(rest.size):
+            ahead, behind = rest.copy(), rest.copy()
+            ahead[i] += _NUDGE
+            behind[i] -= _NUDGE
+            rise = np.array(rates(0.0, 0.0, 0.0, ahead, modes)) - rates(0.0, 0.0, 0.0, behind, modes)
+            jacobian[:, i] = rise / (2.0 * _NUDGE)
+        step = min(step, _of_eigenvalues(jacobian))
+    return _rounded(step if is_linear(frozen, structure.states) else CAUTION * step)
+
+
+def is_linear(frozen: FrozenStructure, states: Iterable[sp.Symbol]) -> bool:
+    """Return True if the rates have neither kinks nor products of states and input."""
+    moving = {*states, INPUT, INPUT_RATE}
+    return not frozen.modes and all(
+        sp.diff(rate, a, b) == 0
+        for rate in frozen.rates
+        for a in moving & rate.free_symbols
+        for b in moving & rate.free_symbols
+    )
+
+
+def _sides(frozen: FrozenStructure) -> Iterator[NDArray[np.float64]]:
+    count = len(frozen.modes)
+    for side in (1.0, -1.0):
+        yield np.full(count, side)
+        for i in range(count):
+            modes = np.full(count, side)
+            modes[i] = -side
+            yield modes
+
+
+def _of_eigenvalues(jacobian: NDArray[np.float64]) -> float:
+    if not np.all(np.isfinite(jacobian)):
+        return LONGEST
+    step = LONGEST
+    for value in np.linalg.eigvals(jacobian):
+        size = abs(value)
+        if size > 1.0 / LONGEST:
+            oscillates = abs(value.imag) > 0.1 * size
+            step = min(step, (OSCILLATION if oscillates else SETTLING) / size)
+    return step
+
+
+def _rounded(step: float) -> float:
+    """Return two significant digits, rounded down: a number that a reader can remember and change."""
+    if step >= LONGEST:
+        return LONGEST
+    scale = 10.0 ** (math.floor(math.log10(step)) - 1)
+    return float(f"{math.floor(step / scale) * scale:.2g}")

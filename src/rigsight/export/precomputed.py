@@ -1,0 +1,59 @@
+"""Which parts of the equations depend on parameters alone and are too costly to be computed anew at every step?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from rigsight.export.equations import Exported
+
+PREFIX = "constant_"
+
+
+@dataclass(frozen=True)
+class Equations:
+    """What an integrator evaluates.
+
+    Attributes
+    ----------
+    rates, switches, outputs
+        Expressions of states, inputs, modes, parameters and `constants`.
+    constants
+        Symbol -> the expression of parameters that it stands for.
+    """
+
+    rates: tuple[sp.Expr, ...]
+    switches: tuple[sp.Expr, ...]
+    outputs: tuple[sp.Expr, ...]
+    constants: dict[sp.Symbol, sp.Expr]
+
+
+def equations_of(exported: Exported) -> Equations:
+    """Return a model's equations with powers and functions of parameters as symbols.
+
+    Sums and products of parameters stay: they cost little, and a reader looks for them.
+
+    Parameters
+    ----------
+    exported
+        The model.
+    """
+    fixed = set(exported.structure.parameter_symbols)
+    found: dict[sp.Expr, sp.Symbol] = {}
+
+    def walk(expression: sp.Expr) -> sp.Expr:
+        if not expression.args:
+            return expression
+        if expression.free_symbols and expression.free_symbols <= fixed and _costly(expression):
+            return found.setdefault(expression, sp.Symbol(f"{PREFIX}{len(found)}", real=True))
+        return expression.func(*map(walk, expression.args))
+
+    groups = (exported.frozen.rates, exported.frozen.switches, exported.structure.computed_outputs)
+    rates, switches, outputs = (tuple(map(walk, group)) for group in groups)
+    return Equations(rates, switches, outputs, {symbol: expression for expression, symbol in found.items()})
+
+
+def _costly(expression: sp.Expr) -> bool:
+    powers = (power for power in expression.atoms(sp.Pow) if not power.exp.is_Integer)
+    return bool(expression.atoms(sp.Function)) or any(True for _ in powers)

@@ -1,0 +1,212 @@
+"""How does a model become one Python file that needs numpy and nothing else?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+
+import sympy as sp
+
+from rigsight.export.description import filled, header_lines, hold_text, indented
+from rigsight.export.equations import Exported
+from rigsight.export.internal_step import is_linear
+from rigsight.export.languages import PYTHON
+from rigsight.export.precomputed import equations_of
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+
+MIN_STEPS = 4
+"""Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
+MIN_STEPS_PRESCRIBED = 32
+"""The same where the motion is prescribed: the model has no time scale of its own that says more."""
+
+_PIECES = {
+    "zoh": "return [(value, 0.0, 0.0, 0.0) for value in samples]",
+    "foh": (
+        "slopes = [(b - a) / dt for a, b in zip(samples, samples[1:])] + [0.0]\n"
+        "    return [(value, slope, 0.0, 0.0) for value, slope in zip(samples, slopes)]"
+    ),
+}
+_MOTION_PIECES = '''def _pieces(dt, {inputs}):
+    """Return the motion between samples as cubics (c0, c1, c2, c3) of the time since each sample [s]."""
+    x = np.append(np.asarray({value}, dtype=float), 0.0)
+    v = np.append(np.asarray({rate}, dtype=float), 0.0)
+    rise, first, last = np.diff(x), v[:-1] * dt, v[1:] * dt
+    c2 = (3.0 * rise - 2.0 * first - last) / dt**2
+    c3 = (first + last - 2.0 * rise) / dt**3
+    return list(zip(x[:-1].tolist(), v[:-1].tolist(), c2.tolist(), c3.tolist()))'''
+_DRIVE_PIECES = '''def _pieces(dt, {inputs}):
+    """Return the input between samples as cubics (c0, c1, c2, c3) of the time since each sample [s]."""
+    samples = [float(value) for value in {inputs}]
+    {pieces}'''
+_REST = '''def _rest(numbers, first):
+    """Return the static equilibrium at the first input, reached slowly from rest without memory."""
+{unpack}
+    state = [0.0] * N_STATES
+{values}
+    if stiffness <= 0.0:
+        return state
+    damping = max(numbers["{damping}"], 2.0 * math.sqrt(stiffness * inertia))
+    quiet = {{**numbers, "{damping}": damping{silenced}}}
+    length = 40.0 * math.pi * math.sqrt(inertia / stiffness)
+    for last in (0.0, first) if first != 0.0 else (0.0,):
+        try:
+            state = _settled(quiet, state, last, length)
+        except ArithmeticError:
+            break
+    return state
+
+
+def _settled(numbers, state, last, length):
+    """Return the states after a ramp of the input from zero, and waits until nothing moves."""
+    piece, duration = (0.0, last / length, 0.0, 0.0), length
+    for wait in range(7):
+        motion = _Motion(numbers, state)
+        motion.read_signs(piece, 0.0, 0.0)
+        if last == 0.0 and not any(motion.slopes(piece, 0.0, 0.0, motion.x)):
+            return state
+        motion.advance(piece, 0.0, 0.0, duration)
+        if not all(map(math.isfinite, motion.x)):
+            raise ArithmeticError("no equilibrium")
+        still = all(
+            abs(new - old) <= 1e-9 * abs(new)
+            for i, (new, old) in enumerate(zip(motion.x, state))
+            if i != VELOCITY
+        )
+        state = motion.x
+        if still:
+            break
+        piece, duration = (last, 0.0, 0.0, 0.0), length * 2.0**wait
+    state[VELOCITY] = 0.0
+    return state'''
+_NO_REST = '''def _rest(numbers, first):
+    """Return the states without memory."""
+    return [0.0] * N_STATES'''
+
+
+def min_steps(exported: Exported) -> int:
+    """Return how many internal steps a sample has at least: 1 where the equations are linear."""
+    if not exported.states or is_linear(exported.frozen, exported.structure.states):
+        return 1
+    return MIN_STEPS_PRESCRIBED if exported.rest is None else MIN_STEPS
+
+
+def python_function(exported: Exported, source: str) -> str:
+    """Return the text of a Python file with a function ``simulate``.
+
+    Parameters
+    ----------
+    exported
+        The model.
+    source
+        The file it comes from.
+    """
+    structure, frozen, equations = exported.structure, exported.frozen, equations_of(exported)
+    names = code_names(exported)
+    modes = {mode: f"modes[{i}]" for i, mode in enumerate(frozen.modes)}
+    every = {**names, **modes}
+    inputs = [quantity.name for quantity in exported.inputs]
+    unpack = unpacked_states(exported)
+    limits = [PYTHON.expression(limit, names) for limit in exported.limits.values()]
+    template = files("rigsight.export").joinpath("templates/model.py.txt").read_text("utf-8")
+    fragments = {
+        "TITLE": f"Simulation of {exported.title}",
+        "HEADER": "\n".join(header_lines(exported, source, with_parameters=False)),
+        "PARAMETERS": indented(parameter_entries(exported)),
+        "STATES": sequence([repr(state.name) for state in exported.states]),
+        "STEP": repr(exported.step),
+        "MIN_STEPS": min_steps(exported),
+        "FRICTION": repr(frozen.friction_mode),
+        "VELOCITY": repr(structure.velocity_index),
+        "N_STATES": len(exported.states),
+        "N_MODES": len(frozen.modes),
+        "DEPENDENT_MODES": sequence([str(i) for i in frozen.dependent_modes]),
+        "LIMITED": sequence([str(i) for i in exported.limits]),
+        "INPUTS": ", ".join(inputs),
+        "HOLD_TEXT": hold_text(exported),
+        "N_OUTPUTS": len(structure.computed_outputs),
+        "UNPACK_PARAMETERS": indented(
+            [
+                *unpacked_parameters(exported),
+                *PYTHON.statements(
+                    [symbol.name for symbol in equations.constants], list(equations.constants.values()), names
+                ),
+            ]
+        ),
+        "RATES": _returned(unpack, list(equations.rates), every),
+        "SWITCHES": _returned(unpack, list(equations.switches), every),
+        "OUTPUTS": _returned(unpack, list(equations.outputs), names),
+        "LIMITS": sequence(limits),
+        "DELAY": _number(exported, structure.delay, "0.0"),
+        "SENSOR_DELAY": _number(exported, structure.measured_late, "None"),
+        "READ_SIGNS": "        motion.read_signs(piece, start + split, 0.0)"
+        if exported.hold == "zoh"
+        else "",
+        "PIECES": _pieces(exported, inputs),
+        "REST": _rest(exported),
+        "OUTPUT_NAMES": sequence([repr(output.name) for output in exported.outputs]),
+        "FIRST_OUTPUT": repr(exported.outputs[0].name),
+    }
+    text = filled(template, fragments)
+    return text.replace("else before\n\n        motion", "else before\n        motion")
+
+
+def code_names(exported: Exported) -> dict[sp.Symbol, str]:
+    """Return the names of the symbols inside generated functions, where the input has a name of its own."""
+    return {**exported.names(), INPUT: "input_value", INPUT_RATE: "input_rate", TIME: "time"}
+
+
+def parameter_entries(exported: Exported) -> list[str]:
+    """Return the lines of a dict of the parameters with their units."""
+    pairs = zip(exported.parameters, exported.values, strict=True)
+    return [f'"{q.name}": {value!r},  # [{q.unit}] {q.description}' for q, value in pairs]
+
+
+def unpacked_parameters(exported: Exported) -> list[str]:
+    """Return statements that give every parameter its name."""
+    return [f'{q.name} = numbers["{q.name}"]' for q in exported.parameters]
+
+
+def unpacked_states(exported: Exported) -> list[str]:
+    """Return the statement that gives every state its name."""
+    return [f"{sequence([q.name for q in exported.states])} = state"] if exported.states else []
+
+
+def sequence(items: list[str]) -> str:
+    """Return items as the inside of a tuple."""
+    return ", ".join(items) + ("," if len(items) == 1 else "")
+
+
+def _returned(unpack: list[str], expressions: list[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
+    targets = [f"result{i}" for i in range(len(expressions))]
+    lines = PYTHON.statements(targets, expressions, names)
+    return indented([*unpack, *lines, f"return [{', '.join(targets)}]"], 2)
+
+
+def _number(exported: Exported, expression: sp.Expr | None, without: str) -> str:
+    if expression is None:
+        return indented([f"return {without}"])
+    used = {exported.names()[symbol] for symbol in expression.free_symbols}
+    lines = [f'{name} = numbers["{name}"]' for name in sorted(used)]
+    return indented([*lines, f"return {PYTHON.expression(expression, exported.names())}"])
+
+
+def _pieces(exported: Exported, inputs: list[str]) -> str:
+    joined = ", ".join(inputs)
+    if exported.rest is None:
+        return _MOTION_PIECES.format(inputs=joined, value=inputs[0], rate=inputs[1])
+    return _DRIVE_PIECES.format(inputs=joined, pieces=_PIECES[exported.hold])
+
+
+def _rest(exported: Exported) -> str:
+    rest = exported.rest
+    if rest is None:
+        return _NO_REST
+    wanted = {"state[0]": rest.displacement, "inertia": rest.inertia, "stiffness": rest.stiffness}
+    names = exported.names()
+    used = sorted({names[s] for expression in wanted.values() for s in expression.free_symbols})
+    return _REST.format(
+        unpack=indented([f'{name} = numbers["{name}"]' for name in used]),
+        values=indented(PYTHON.statements(list(wanted), list(wanted.values()), names)),
+        damping=rest.damping,
+        silenced="".join(f', "{name}": 0.0' for name in rest.silenced),
+    )

@@ -1,0 +1,176 @@
+"""Into which languages can a model be written, and what can each of them not say?"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import sympy as sp
+
+from rigsight.errors import InputError, check_in_range, check_option
+from rigsight.export.c_source import c_source
+from rigsight.export.control_system import control_system
+from rigsight.export.equations import Exported, exported, harmless
+from rigsight.export.fmu import fmu
+from rigsight.export.internal_step import LONGEST, internal_step
+from rigsight.export.latex import latex
+from rigsight.export.matlab_function import matlab_function
+from rigsight.export.modelica import modelica
+from rigsight.export.python_function import python_function
+from rigsight.export.reserved_words import MATLAB, MODELICA
+from rigsight.simulate import Structure
+from rigsight.simulate.input_hold import Hold
+from rigsight.simulate.model import Model
+
+STICKING = "the sticking of dry friction"
+DELAY = "a delay"
+SENSOR_DELAY = "a late sensor"
+_SHORTEST = 1e-9
+_RESERVED = {"matlab": MATLAB, "modelica": MODELICA}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A language or format.
+
+    Attributes
+    ----------
+    name, suffix, summary
+        What ``--to`` takes, how its files end, and one plain sentence.
+    write
+        Text or bytes for the model, the name of its source and its own name.
+    lacks
+        What it is written without.
+    steps
+        True if it goes from sample to sample itself, so that the hold of the input is its business.
+    named
+        True if the text holds a name of its own, taken from the file's.
+    """
+
+    name: str
+    suffix: str
+    summary: str
+    write: Callable[[Exported, str, str], str | bytes]
+    lacks: frozenset[str] = frozenset()
+    steps: bool = True
+    named: bool = True
+
+
+TARGETS: dict[str, Target] = {
+    target.name: target
+    for target in (
+        Target("python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s), named=False),
+        Target(
+            "control", ".py", "a python-control NonlinearIOSystem", control_system,
+            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY}), steps=False, named=False,
+        ),
+        Target("c", ".c", "one C99 file without dependencies", c_source),
+        Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu),
+        Target("matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function),
+        Target("latex", ".tex", "equations and numbers for a document", lambda e, s, _: latex(e, s), steps=False, named=False),
+        Target("modelica", ".mo", "a Modelica model", modelica, lacks=frozenset({STICKING}), steps=False),
+    )
+}  # fmt: skip
+"""In the order in which they are shown."""
+
+
+def export_model(
+    model: Model,
+    target: str,
+    *,
+    source: str,
+    name: str = "model",
+    hold: Hold | None = None,
+    step: float | None = None,
+    source_only: bool = False,
+) -> str | bytes:
+    """Return what a target writes for a model: text, or the bytes of an FMU.
+
+    Parameters
+    ----------
+    model
+        The model.
+    target
+        A key of `TARGETS`.
+    source
+        Where the model comes from, for the head of the text.
+    name
+        Name of the function, model or prefix.
+    hold
+        How the input behaves between samples; default is the model's.
+    step
+        Longest internal step [s]; default follows from the model's own time scales.
+    source_only
+        True for an FMU without a binary.
+
+    Raises
+    ------
+    InputError
+        If the target is unknown or has no words for an effect, hold or name, or if an FMU cannot be compiled.
+    """
+    chosen = TARGETS[check_option("Target", target, TARGETS)]
+    if source_only and target != "fmu":
+        raise InputError(f"--source-only is of an FMU; '{target}' is source anyway. Leave it out.")
+    if chosen.named:
+        _check_name(chosen, name)
+    if step is not None:
+        check_in_range("--step", step, _SHORTEST, LONGEST, "s")
+    content = exported(
+        model, _hold(chosen, model, hold), step or (internal_step(model) if chosen.steps else LONGEST)
+    )
+    _check_expressible(chosen, content)
+    if target == "fmu":
+        return fmu(content, harmless(source), name, source_only=source_only)
+    return chosen.write(content, harmless(source), name)
+
+
+def unsaid(content: Exported) -> dict[str, str]:
+    """Return what of a model not every target can say, with the effect that it comes from."""
+    structure: Structure = content.structure
+    found = {}
+    if content.frozen.friction_mode is not None:
+        dry = [e.name for e in structure.effects if e.torque is not None and e.torque.has(sp.sign)]
+        found[STICKING] = (dry or list(structure.effect_names))[0]
+    for effect in structure.effects:
+        if effect.delay is not None:
+            found[DELAY] = effect.name
+        if effect.measured_late is not None:
+            found[SENSOR_DELAY] = effect.name
+    return found
+
+
+def _check_expressible(target: Target, content: Exported) -> None:
+    for what, effect in unsaid(content).items():
+        if what in target.lacks:
+            able = ", ".join(t.name for t in TARGETS.values() if what not in t.lacks)
+            raise InputError(
+                f"'{effect}' cannot be exported to {target.name}, which is written without {what}. Targets with it: {able}."
+            )
+
+
+def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
+    hold = model.hold if wished is None else wished
+    if wished is not None:
+        check_option("--hold", wished, ("foh", "zoh"))
+    if not model.structure.rig.is_driven or not target.steps:
+        return "foh"
+    if hold == "band_limited":
+        raise InputError(
+            "The model's hold is 'band_limited': what a sampled analog signal does between two samples follows from samples on "
+            f"both sides, and {target.name} goes from one sample to the next. Say how its input will behave: --hold foh (linear; "
+            "sample faster for the same accuracy) or --hold zoh."
+        )
+    return hold
+
+
+def _check_name(target: Target, name: str) -> None:
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,59}", name):
+        raise InputError(
+            f"'{name}' cannot be the name of a {target.name} model, which is that of its file: letters, digits and underscores, "
+            "a letter first, at most 60. Name another file with --out."
+        )
+    if name in _RESERVED.get(target.name, ()):
+        raise InputError(
+            f"'{name}' is a word of the language and no name for a {target.name} model. Name another file with --out."
+        )

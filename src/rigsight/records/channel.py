@@ -1,0 +1,225 @@
+"""What is a channel of a measurement file, before anybody has said which signal it is?"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+
+MOST_SAMPLES = 50_000_000
+"""Of one channel: 400 MB once read."""
+MOST_CHANNELS = 20_000
+MOST_COLUMNS = 64
+"""Of one table in a file; a wider one is a matrix, not signals side by side."""
+_NO_UNIT = {"", "-", "--", "none", "null", "n/a", "unknown", "unit"}
+
+Load = Callable[[], NDArray[Any]]
+"""Reads stored numbers as they are, shape (n_samples,), while the file is open."""
+
+
+@dataclass(frozen=True, eq=False)
+class TimeAxis:
+    """The time of a channel, where the file keeps one beside the samples.
+
+    Attributes
+    ----------
+    n_samples
+        Number of stamps.
+    dt, t0
+        Sample time and first stamp of an even axis; `dt` is None where stamps are stored.
+    load
+        Reads stored stamps; None for an even axis.
+    unit
+        Of dt, t0 and stamps.
+    """
+
+    n_samples: int
+    dt: float | None = None
+    t0: float = 0.0
+    load: Load | None = None
+    unit: str = "s"
+
+    def stamps(self) -> NDArray[np.float64]:
+        """Return the time stamps, shape (n_samples,)."""
+        if self.load is not None:
+            return as_stamps(self.load())
+        return self.t0 + (self.dt or 0.0) * np.arange(self.n_samples, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Samples under a name.
+
+    Attributes
+    ----------
+    name
+        Unique in the file; ``group/channel`` where the file has groups.
+    n_samples
+        Number of samples.
+    load
+        Reads the samples.
+    unit
+        What the file states, None where it states none.
+    axis
+        Its own time; None where time is a channel like any other.
+    """
+
+    name: str
+    n_samples: int
+    load: Load
+    unit: str | None = None
+    axis: TimeAxis | None = None
+
+    @property
+    def short_name(self) -> str:
+        """The name without its group."""
+        return self.name.rpartition("/")[2] or self.name
+
+    @property
+    def group(self) -> str:
+        """The group, ``""`` where there is none."""
+        return self.name.rpartition("/")[0]
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Something in a file that is no signal over time, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelFile:
+    """What a file holds, found out without reading any samples.
+
+    Attributes
+    ----------
+    format
+        Plain name: ``"MATLAB"``.
+    channels
+        In the order of the file, with distinct names.
+    refused
+        What else is in it.
+    """
+
+    format: str
+    channels: tuple[Channel, ...]
+    refused: tuple[Refused, ...] = ()
+
+
+def check_size(file: str, name: str, n_samples: int) -> None:
+    """Refuse a channel that is too long, before it is read.
+
+    Raises
+    ------
+    InputError
+        Naming file, channel, its samples and the limit.
+    """
+    if n_samples > MOST_SAMPLES:
+        raise InputError(
+            f"{file}, channel '{name}': {n_samples} samples, more than the {MOST_SAMPLES} that are read. "
+            "Split the record, or reduce the sample rate."
+        )
+
+
+def check_count(file: str, n_channels: int) -> None:
+    """Refuse a file with more channels than any measurement has.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the limit.
+    """
+    if n_channels > MOST_CHANNELS:
+        raise InputError(
+            f"{file} holds more than {MOST_CHANNELS} channels; export those that are needed into a file of their own."
+        )
+
+
+def as_floats(samples: object) -> NDArray[np.float64]:
+    """Return stored numbers as floats, shape (n_samples,)."""
+    return np.ascontiguousarray(np.asarray(samples).reshape(-1), dtype=np.float64)
+
+
+def as_stamps(samples: object) -> NDArray[np.float64]:
+    """Return stored time as floats, shape (n_samples,).
+
+    Stamps in single precision are read as the decimal numbers that they print as: 0.1 was meant, not 0.10000000149.
+    """
+    array = np.asarray(samples).reshape(-1)
+    if array.dtype == np.float32:
+        return np.array([float(str(stamp)) for stamp in array], dtype=np.float64)
+    return as_floats(array)
+
+
+def columns_of(
+    name: str,
+    shape: tuple[int, ...],
+    read: Load,
+    unit: str | None = None,
+) -> list[Channel] | Refused:
+    """Return the channels of a stored array: one of a vector, one per column of a table.
+
+    Parameters
+    ----------
+    name
+        Of the array; columns are called ``name(:,1)`` and so on.
+    shape
+        As stored; the longer side of a table is time.
+    read
+        Reads the whole array.
+    unit
+        Of all its columns.
+    """
+    long = [length for length in shape if length != 1]
+    if not long or 0 in long:
+        return Refused(name, "holds a single number" if not long else "is empty")
+    if len(long) == 1:
+        return [Channel(name, long[0], lambda: read().reshape(-1), unit)]
+    if len(long) > 2 or min(long) > MOST_COLUMNS:
+        return Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")
+
+    def column(index: int) -> Load:
+        return lambda: _upright(read())[:, index]
+
+    return [Channel(f"{name}(:,{i + 1})", max(long), column(i), unit) for i in range(min(long))]
+
+
+def _upright(table: NDArray[Any]) -> NDArray[Any]:
+    table = np.squeeze(table)
+    return table.T if table.shape[0] < table.shape[1] else table
+
+
+def stated_unit(text: object) -> str | None:
+    """Return a unit as a file states it, None for the ways of saying that there is none."""
+    if isinstance(text, bytes):
+        text = text.decode("utf-8", errors="replace")
+    if isinstance(text, np.ndarray) and text.size == 1:
+        return stated_unit(text.reshape(-1)[0])
+    if not isinstance(text, str):
+        return None
+    text = re.sub(r"^\[(.*)\]$", r"\1", text.replace("\x00", "").strip()).strip()
+    return None if text.lower() in _NO_UNIT else text
+
+
+def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
+    """Return the channels with a number behind the name of each that is not the first of its name."""
+    channels = tuple(channels)
+    taken, used, named = {channel.name for channel in channels}, Counter[str](), []
+    for channel in channels:
+        used[channel.name] += 1
+        name = channel.name
+        while used[channel.name] > 1 and name in taken:
+            name = f"{channel.name}_{used[channel.name]}"
+            used[channel.name] += name in taken
+        taken.add(name)
+        named.append(channel if name == channel.name else replace(channel, name=name))
+    return tuple(named)

@@ -1,0 +1,56 @@
+"""What does the name of a channel give away: which signal it may be, and in which unit?"""
+
+from __future__ import annotations
+
+import re
+
+# In English and German, as rigs are labeled; the shorter and plainer the earlier.
+NAMES_OF: dict[str, tuple[str, ...]] = {
+    "t": ("t", "time", "zeit", "times", "timestamp", "time stamp", "elapsed time", "tout"),
+    "u": (
+        "u", "input", "current", "strom", "motor current", "motorstrom", "i", "voltage", "spannung", "drive", "command",
+        "control", "excitation", "anregung", "stellgröße", "drive force", "antriebskraft",
+    ),
+    "psi": ("psi", "yaw", "yaw angle", "gierwinkel", "wendewinkel"),
+    "y": ("y", "lateral", "lateral displacement", "lateral position", "querverschiebung", "spurlage"),
+    "x": ("x", "position", "displacement", "weg", "pos", "auslenkung", "stroke", "travel", "hub", "deflection"),
+    "force": ("force", "kraft", "f", "load", "last", "damper force", "dämpferkraft"),
+}  # fmt: skip
+# A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
+_UNITS_BEHIND = frozenset({
+    "s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm",
+    "m", "mm", "cm", "um", "µm", "rad", "mrad", "deg", "°",
+})  # fmt: skip
+_IN_BRACKETS = re.compile(r"^(?P<bare>.*?)\s*[\[(<]\s*(?P<unit>[^\[\]()<>]*?)\s*[\])>]\s*$")
+_BEHIND = re.compile(r"^(?P<bare>.+?)(?:\s+(?:in\s+)?|_in_|_|,\s*)(?P<unit>[A-Za-zµμ°]+)$")
+
+
+def split_unit(name: str) -> tuple[str, str | None]:
+    """Return a channel's name without its unit, and the unit: ``"Kraft [kN]"``, ``"Weg mm"``, ``"pos_mm"``."""
+    match = _IN_BRACKETS.match(name)
+    if match and match["unit"]:
+        return match["bare"], match["unit"]
+    match = _BEHIND.match(name)
+    if match and match["unit"] in _UNITS_BEHIND:
+        return match["bare"], match["unit"]
+    return name, None
+
+
+def closeness(name: str, signal: str) -> float:
+    """Return how well a channel's name, without group and unit, fits a signal, from 0 (not at all) to 3 (its own name)."""
+    bare = split_unit(name)[0]
+    whole, last = _plain(bare), _plain(bare.rpartition("/")[2])
+    known = NAMES_OF.get(signal, (signal,))
+    if signal.lower() in (whole, last):
+        return 3.0
+    if whole in known or last in known:
+        return 2.0
+    words = set(last.split())
+    return 1.0 if any(word in words for word in known if len(word) > 2) else 0.0
+
+
+def _plain(name: str) -> str:
+    """Return a name in lower case, words apart, without numbers at its end."""
+    words = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", name)
+    words = re.sub(r"[\W_]+", " ", words).lower().strip()
+    return re.sub(r"\s*\d+$", "", words) or words

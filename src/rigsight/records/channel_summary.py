@@ -1,0 +1,93 @@
+"""What is in a channel, at a glance: how long, how fast, how large, and what is missing?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.records.channel import Channel, as_floats, as_stamps
+
+# Of the median step: a longer one is a gap.
+_GAP = 1.5
+
+
+@dataclass(frozen=True)
+class ChannelSummary:
+    """What `rigsight inspect` tells of a channel.
+
+    Attributes
+    ----------
+    name, unit
+        As the file states them; None for no unit.
+    n_samples
+        Number of samples.
+    dt, t0, t1
+        Median step, first and last stamp of its own time axis, in that axis' unit; None where it has none.
+    minimum, maximum
+        Of the finite samples; None without any.
+    n_not_finite
+        NaN, infinite or unreadable samples.
+    n_gaps
+        Places where its own time jumps; None where it has none.
+    n_stands
+        Steps on which the value does not change.
+    """
+
+    name: str
+    unit: str | None
+    n_samples: int
+    dt: float | None
+    t0: float | None
+    t1: float | None
+    minimum: float | None
+    maximum: float | None
+    n_not_finite: int
+    n_gaps: int | None
+    n_stands: int
+
+
+def summarize(channel: Channel) -> ChannelSummary:
+    """Return the summary of a channel of an open file.
+
+    Raises
+    ------
+    InputError
+        If its samples cannot be read.
+    """
+    samples = as_floats(channel.load())
+    finite = samples[np.isfinite(samples)]
+    dt = t0 = t1 = None
+    n_gaps = None
+    if channel.axis is not None:
+        stamps = channel.axis.stamps()
+        dt, n_gaps = step_and_gaps(stamps)
+        t0, t1 = float(stamps[0]), float(stamps[-1])
+    return ChannelSummary(
+        channel.name,
+        channel.unit,
+        channel.n_samples,
+        dt,
+        t0,
+        t1,
+        float(finite.min()) if finite.size else None,
+        float(finite.max()) if finite.size else None,
+        samples.size - finite.size,
+        n_gaps,
+        int(np.count_nonzero(np.diff(samples) == 0.0)),
+    )
+
+
+def step_and_gaps(stamps: NDArray[np.float64]) -> tuple[float | None, int | None]:
+    """Return the median step of time stamps, shape (n_samples,), and how often they jump; None where they do not rise."""
+    steps = np.diff(stamps)
+    if steps.size == 0 or not np.all(steps > 0.0):
+        return None, None
+    dt = float(np.median(steps))
+    return dt, int(np.count_nonzero(steps > _GAP * dt))
+
+
+def time_summary(channel: Channel) -> tuple[float | None, int | None]:
+    """Return median step and number of gaps of a channel that holds time, see `step_and_gaps`."""
+    return step_and_gaps(as_stamps(channel.load()))

@@ -1,0 +1,150 @@
+"""What makes SI of a unit as files and people write it? The only place that knows pint."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+from rigsight.errors import InputError
+from rigsight.records.column_mapping import ColumnMapping
+
+_SI = ("A", "rad", "m", "N", "N m", "s", "V", "kg", "Hz")
+"""Units that need no library to be known."""
+# Only products of units with small powers reach pint: its parser would work out 9**9**9 for as long as that takes.
+_UNIT = r"[A-Za-zµμΩ°%]+(?:(?:\^|\*\*)?-?[1-4])?"
+_PRODUCT = re.compile(rf"{_UNIT}(?:\s*[*/·.⋅ ]\s*{_UNIT}){{0,5}}")
+_LONGEST = 40
+_POWERS = str.maketrans({"²": "^2", "³": "^3", "⁻": "-", "¹": "1", "μ": "µ", "⋅": "*", "·": "*"})
+# As loggers write them; pint would not know these, or take Nm for something else.
+_USUAL = {
+    "Nm": "N*m",
+    "mNm": "mN*m",
+    "kNm": "kN*m",
+    "Deg": "deg",
+    "DEG": "deg",
+    "degrees": "deg",
+    "Rad": "rad",
+    "RAD": "rad",
+    "Amp": "A",
+    "amp": "A",
+    "Sec": "s",
+    "SEC": "s",
+    "seconds": "s",
+    "Newton": "newton",
+    "KN": "kN",
+    "MM": "mm",
+}
+# German for degree, to pint a gigaradian and a gon.
+_MISLEADING = {"Grad": "deg", "grad": "deg, or gon"}
+
+
+class UnknownUnitError(ValueError):
+    """A unit that nobody knows, or that is no unit of the quantity; the text says which."""
+
+
+def factor(unit: str, si: str) -> float:
+    """Return what one `unit` is in the unit `si`, an angle never taken for a plain number.
+
+    Raises
+    ------
+    UnknownUnitError
+        If the unit is not known or measures something else.
+    """
+    unit = unit.strip()
+    if unit == si:
+        return 1.0
+    return _ratio(unit, si)
+
+
+@cache
+def _ratio(unit: str, si: str) -> float:
+    from pint.errors import PintError
+
+    if unit in _MISLEADING:
+        raise UnknownUnitError(f"means different things; write {_MISLEADING[unit]}")
+    text = _USUAL.get(unit, unit).translate(_POWERS)
+    if len(text) > _LONGEST or not _PRODUCT.fullmatch(text):
+        raise UnknownUnitError("is no unit")
+    registry = _registry()
+    try:
+        # Root units, not dimensions: pint counts angles, shares and plain numbers as one dimension.
+        size, base = registry.get_root_units(registry.parse_units(text))
+        target_size, target = registry.get_root_units(registry.parse_units(si))
+    except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError):
+        raise UnknownUnitError("is no known unit") from None
+    if base != target:
+        raise UnknownUnitError(f"does not measure the same as {si}")
+    ratio = float(size / target_size)
+    if ratio <= 0.0:
+        raise UnknownUnitError("is no known unit")
+    return ratio
+
+
+@cache
+def _registry() -> Any:
+    from pint import UnitRegistry
+
+    return UnitRegistry(cache_folder=None)
+
+
+def has_si(unit: str) -> bool:
+    """Return True if a rig's signal has a unit of its own; an axis takes its input in any."""
+    return unit in _SI
+
+
+def is_a(unit: str, si: str) -> bool:
+    """Return True if a unit as a file states it measures the same as `si`."""
+    try:
+        factor(unit, si)
+    except UnknownUnitError:
+        return False
+    return True
+
+
+def si_mapping(
+    file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None
+) -> tuple[ColumnMapping, tuple[str, ...]]:
+    """Return a mapping with the scale that makes SI of a column, and notes on what was converted.
+
+    Parameters
+    ----------
+    file, label
+        How messages call the file and its column.
+    signal, si
+        The rig's signal and its unit.
+    mapping
+        What the campaign says: scale and offset win, then its unit, then the file's.
+    stated
+        Unit that the file states, None where it states none.
+
+    Raises
+    ------
+    InputError
+        Naming file, column and unit, and what to write instead: it is unknown, or measures something else.
+    """
+    unit = mapping.unit if mapping.unit is not None else stated
+    if mapping.is_converted or unit is None:
+        return mapping, ()
+    where = f"{file}, column '{label}'"
+    if not has_si(si):
+        if mapping.unit is not None:
+            raise InputError(
+                f'{where}: unit = "{unit}" cannot be converted: {signal} has no unit of its own on this rig. '
+                "Give scale and offset instead."
+            )
+        return mapping, (
+            f"{where}: {signal} has no unit of its own on this rig; values were taken as they stand, in {unit}.",
+        )
+    try:
+        scale = factor(unit, si)
+    except UnknownUnitError as error:
+        by = "" if mapping.unit is not None else ", which the file states,"
+        raise InputError(
+            f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write "
+            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 for the values as they stand.'
+        ) from None
+    converted = ColumnMapping(mapping.name, scale=scale)
+    if mapping.unit is not None or scale == 1.0:
+        return converted, ()
+    return converted, (f"{where}: converted from {unit}, the unit that the file states, to {si}.",)

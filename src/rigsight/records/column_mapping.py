@@ -1,0 +1,100 @@
+"""Where does a signal stand in a file, and what makes SI of its numbers?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+
+
+@dataclass(frozen=True)
+class ColumnMapping:
+    """Where a signal stands in a file: ``value in SI = scale * column + offset``.
+
+    Attributes
+    ----------
+    name
+        Name of the column or channel, or its number, counted from 1.
+    scale
+        SI unit per unit of the column. None here and for `offset` leaves it to the unit, or takes the values as they stand.
+    offset
+        What is added after scaling, in the SI unit.
+    unit
+        Unit of the column, instead of scale and offset: ``"deg"``.
+
+    Raises
+    ------
+    InputError
+        If the scale is zero, scale or offset is not finite, or a unit stands beside them.
+    """
+
+    name: str | int
+    scale: float | None = None
+    offset: float | None = None
+    unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.scale is not None and (not math.isfinite(self.scale) or self.scale == 0.0):
+            raise InputError(
+                f"Column '{self.name}': scale must be a finite number other than 0, got {self.scale}."
+            )
+        if self.offset is not None and not math.isfinite(self.offset):
+            raise InputError(f"Column '{self.name}': offset must be a finite number, got {self.offset}.")
+        if self.unit is not None and self.is_converted:
+            raise InputError(
+                f"Column '{self.name}': unit = \"{self.unit}\" stands beside scale or offset, which convert as well; "
+                "give one of the two."
+            )
+
+    @property
+    def is_converted(self) -> bool:
+        """True if scale or offset is given, so that no unit is asked."""
+        return self.scale is not None or self.offset is not None
+
+    def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a column in SI units, shape (n_samples,).
+
+        Parameters
+        ----------
+        column
+            Numbers as they stand in the file, shape (n_samples,).
+        """
+        scale = 1.0 if self.scale is None else self.scale
+        offset = 0.0 if self.offset is None else self.offset
+        return scale * column + offset
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Numbers of a file as they stand there, before scale and offset.
+
+    Attributes
+    ----------
+    values
+        Signal name -> column, shape (n_samples,); all finite. Without time where `axes` has it.
+    labels
+        Signal name -> how the file calls the column.
+    lines
+        Number of every row, shape (n_samples,), as messages name it.
+    notes
+        What was assumed while reading.
+    units
+        Signal name -> unit that the file itself states in a place made for units.
+    axes
+        Signal name -> time stamps [s], shape (n_samples,), where the signals do not share one axis; else empty.
+    row
+        What a row is called: ``"line"`` of a text, ``"sample"`` of anything else.
+    """
+
+    values: Mapping[str, NDArray[np.float64]]
+    labels: Mapping[str, str]
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    row: str = "line"

@@ -1,0 +1,71 @@
+"""Which channels does a MATLAB file of version 5, 6 or 7 hold?"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.channel import Channel, ChannelFile, Load, Refused, columns_of, with_distinct_names
+from rigsight.records.matlab_elements import Variable, declared_variables
+from rigsight.records.matlab_names import DEEPER, NUMERIC, why_no_signal
+
+
+def open_matlab(path: Path) -> Iterator[ChannelFile]:
+    """Yield the channels of a MATLAB file: arrays, and those in structs one level deep as ``struct/field``.
+
+    MATLAB files state no units. Tables and timetables are objects that only MATLAB reads; they are refused by name.
+    """
+    data = path.read_bytes()
+    read: dict[str, Any] = {}
+
+    def load(variable: str, field: str | None) -> Load:
+        def numbers() -> NDArray[Any]:
+            if variable not in read:
+                read[variable] = _read(data, variable)
+            content = read[variable]
+            numbers: NDArray[Any] = content if field is None else content[field].item()
+            return numbers
+
+        return numbers
+
+    channels: list[Channel] = []
+    refused: list[Refused] = []
+    try:
+        variables = list(declared_variables(data, path.name))
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(path.name) else f"{path.name}: {text}") from None
+    for variable in variables:
+        parts: list[tuple[str, Variable, str | None]] = [(variable.name, variable, None)]
+        if variable.kind == "struct" and math.prod(variable.shape) == 1:
+            parts = [(f"{variable.name}/{field.name}", field, field.name) for field in variable.fields]
+        for name, part, field in parts:
+            found = _channels(name, part, load(variable.name, field))
+            if isinstance(found, Refused):
+                # MATLAB keeps the workspace of functions and objects under an empty name.
+                refused += [found] if variable.name else []
+            else:
+                channels.extend(found)
+    yield ChannelFile("MATLAB", with_distinct_names(channels), tuple(refused))
+
+
+def _channels(name: str, declared: Variable, load: Load) -> list[Channel] | Refused:
+    if declared.kind not in NUMERIC:
+        return Refused(
+            name, DEEPER if declared.kind == "struct" and "/" in name else why_no_signal(declared.kind)
+        )
+    return columns_of(name, declared.shape, load)
+
+
+def _read(data: bytes, variable: str) -> Any:
+    from scipy.io import loadmat
+
+    # The stream and not the path: what was checked is what is read.
+    stream: Any = io.BytesIO(data)
+    return loadmat(stream, variable_names=[variable])[variable]

@@ -1,0 +1,64 @@
+"""Which channels does a MATLAB file of version 7.3 hold, which is HDF5 inside?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rigsight.records.channel import (
+    Channel,
+    ChannelFile,
+    Refused,
+    check_count,
+    columns_of,
+    with_distinct_names,
+)
+from rigsight.records.matlab_names import DEEPER, NUMERIC, why_no_signal
+
+_INTERNAL = ("#refs#", "#subsystem#")
+
+
+def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
+    """Yield the channels of a file saved with ``-v7.3``: arrays, and those in structs one level deep as ``struct/field``."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        channels: list[Channel] = []
+        refused: list[Refused] = []
+
+        def take(name: str, item: Any) -> None:
+            check_count(path.name, len(channels) + len(refused))
+            found = _channels(name, item)
+            if isinstance(found, Refused):
+                refused.append(found)
+            else:
+                channels.extend(found)
+
+        for name in map(str, file):
+            if name in _INTERNAL or file.get(name, getlink=True).__class__ is not h5py.HardLink:
+                continue
+            item = file[name]
+            if not isinstance(item, h5py.Group):
+                take(name, item)
+                continue
+            for field in map(str, item):
+                if item.get(field, getlink=True).__class__ is h5py.HardLink:
+                    inside = item[field]
+                    if isinstance(inside, h5py.Group):
+                        refused.append(Refused(f"{name}/{field}", DEEPER))
+                    else:
+                        take(f"{name}/{field}", inside)
+        yield ChannelFile("MATLAB 7.3", with_distinct_names(channels), tuple(refused))
+
+
+def _channels(name: str, dataset: Any) -> list[Channel] | Refused:
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    kind = kind.decode("ascii", errors="replace") if isinstance(kind, bytes) else str(kind)
+    if "MATLAB_empty" in dataset.attrs:
+        return Refused(name, "is empty")
+    if kind not in NUMERIC or dataset.dtype.kind not in "iuf":
+        return Refused(name, why_no_signal(kind if kind not in NUMERIC else "complex"))
+    if dataset.is_virtual or dataset.external:
+        return Refused(name, "keeps its data in another file, which is not followed")
+    return columns_of(name, dataset.shape, lambda: dataset[()])

@@ -1,0 +1,121 @@
+"""Which channels of a file are probably a rig's signals, and which rig is it then?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rigsight.records.channel import Channel
+from rigsight.records.channel_names import closeness, split_unit
+from rigsight.records.channel_units import has_si, is_a
+from rigsight.records.read_record import TIME
+from rigsight.rigs import RIGS, Rig
+
+MODELS = ("running_gear", "axis", "element")
+"""In the order in which they are tried: a yaw angle is telling, a displacement belongs to two."""
+_FITTING_UNIT = 0.5
+_CLEAR = 2.0
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Where a signal may stand.
+
+    Attributes
+    ----------
+    signal, si
+        Signal of the rig and its unit.
+    channel
+        The channel that fits best, None where none or several do.
+    unit
+        Unit of the channel: stated by the file, or else in its name.
+    is_stated
+        Whether the file itself states the unit, in a place made for it.
+    candidates
+        Names of the channels that fit equally well, where several do.
+    """
+
+    signal: str
+    si: str
+    channel: Channel | None = None
+    unit: str | None = None
+    is_stated: bool = False
+    candidates: tuple[str, ...] = ()
+
+    @property
+    def is_clear(self) -> bool:
+        """True if the channel can be named."""
+        return self.channel is not None
+
+
+@dataclass(frozen=True)
+class FileGuess:
+    """What the channels of a file probably are, for one rig."""
+
+    rig: Rig
+    time: Guess
+    signals: tuple[Guess, ...] = field(default=())
+    score: float = 0.0
+
+    @property
+    def open_questions(self) -> int:
+        """Number of required signals without a channel."""
+        required = len(self.rig.inputs) + 1
+        return sum(not guess.is_clear for guess in self.signals[:required])
+
+
+def guess_file(channels: Sequence[Channel], is_text: bool, model: str | None = None) -> FileGuess:
+    """Return the rig that the channels fit best, and which channels its signals are.
+
+    Parameters
+    ----------
+    channels
+        Of an open file; none is read.
+    is_text
+        True for delimited text, whose row of units a reading does not apply.
+    model
+        The rig, where it is known.
+    """
+    guesses = [_guess_rig(RIGS[name], channels, is_text) for name in ([model] if model else MODELS)]
+    # Python keeps the first of equals.
+    return min(guesses, key=lambda guess: (guess.open_questions, -guess.score))
+
+
+def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGuess:
+    time, _ = _guess(TIME, "s", channels, (), is_text)
+    taken = [time.channel] if time.channel is not None else []
+    signals, score = [], 0.0
+    for signal in (*rig.inputs, *rig.outputs):
+        guess, closest = _guess(signal.name, signal.unit, channels, taken, is_text)
+        if guess.channel is not None:
+            taken.append(guess.channel)
+            score += closest
+        signals.append(guess)
+    return FileGuess(rig, time, tuple(signals), score / len(signals))
+
+
+def _guess(
+    signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel], is_text: bool
+) -> tuple[Guess, float]:
+    """Return where a signal may stand, and how well it fits there."""
+    scores: list[tuple[float, Channel]] = []
+    for channel in channels:
+        score = 0.0 if channel in taken else closeness(channel.name, signal)
+        if score > 0.0:
+            unit = channel.unit or split_unit(channel.name)[1]
+            if unit is not None and has_si(si):
+                score += _FITTING_UNIT if is_a(unit, si) else -_FITTING_UNIT
+            scores.append((score, channel))
+    if not scores:
+        return Guess(signal, si), 0.0
+    best = max(score for score, _ in scores)
+    closest = [channel for score, channel in scores if score == best]
+    # The times of several groups are told apart by the groups of the signals.
+    if len(closest) > 1 and not (signal == TIME and len({channel.short_name for channel in closest}) == 1):
+        return Guess(signal, si, candidates=tuple(channel.name for channel in closest)), 0.0
+    channel = closest[0]
+    if best < _CLEAR - _FITTING_UNIT:
+        return Guess(signal, si, candidates=(channel.name,)), 0.0
+    stated = None if is_text else channel.unit
+    unit = channel.unit or split_unit(channel.name)[1]
+    return Guess(signal, si, channel, unit, stated is not None), best

@@ -1,0 +1,93 @@
+"""What ``rigsight inspect`` and ``rigsight init`` tell."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ..records.formats import FORMATS, Write, write_matlab, write_text
+
+Run = Callable[..., tuple[int, str, str]]
+T = 0.01 * np.arange(300)
+ROWS = {"t": T, "u": np.sin(9 * T**2), "x": 0.01 * np.cos(9 * T**2)}
+
+
+@pytest.mark.parametrize(("suffix", "write"), FORMATS.values(), ids=FORMATS)
+def test_every_format_is_told_to_people_and_machines(
+    tmp_path: Path, run: Run, suffix: str, write: Write
+) -> None:
+    path = tmp_path / f"run{suffix}"
+    write(path, ROWS, {"u": "N", "x": "m"})
+    code, stdout, stderr = run("inspect", path, "--json")
+    assert (code, stderr) == (0, "")
+    told = json.loads(stdout)
+    channels = {one["name"].rpartition("/")[2]: one for one in told["channels"]}
+    assert channels["x"]["n_samples"] == 300
+    assert channels["x"]["minimum"] == pytest.approx(-0.01, rel=1e-3)
+    assert channels["x"]["unit"] in ("m", None)
+    assert channels["x"]["n_not_finite"] == 0
+    (record,) = tomllib.loads(told["proposal"]["toml"])["records"]
+    assert record["file"] == path.name
+    assert told["proposal"]["model"] == "axis"
+
+
+def test_text_is_inspected_with_its_gaps(tmp_path: Path, run: Run) -> None:
+    path = tmp_path / "run.csv"
+    write_text(path, {"Zeit [ms]": 1e3 * np.delete(T, 100), "u": ROWS["u"][1:], "Weg mm": ROWS["x"][1:]}, {})
+    lines = path.read_text().splitlines()
+    lines[5] = lines[5].rpartition(",")[0] + ",NaN"
+    path.write_text("\n".join(lines) + "\n")
+    code, stdout, _ = run("inspect", path)
+    assert code == 0
+    for part in ("run.csv", "Weg mm", "299", "step 10, 1 gaps", 'unit = "ms"', 'unit = "mm"', "[[records]]"):
+        assert part in stdout
+    told = json.loads(run("inspect", path, "--json")[1])
+    assert [one["n_not_finite"] for one in told["channels"]] == [0, 0, 1]
+
+
+def test_what_is_no_signal_is_told(tmp_path: Path, run: Run) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", {**ROWS, "fs": 100.0, "note": "bench"})
+    _, stdout, _ = run("inspect", tmp_path / "run.mat")
+    assert "'fs' holds a single number" in stdout
+    assert "'note' is text" in stdout
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", bytes(100)])
+def test_what_cannot_be_read_is_one_message(tmp_path: Path, run: Run, content: bytes) -> None:
+    (tmp_path / "run.mat").write_bytes(content)
+    code, stdout, stderr = run("inspect", tmp_path / "run.mat")
+    assert (code, stdout) == (2, "")
+    assert stderr.startswith("rigsight: run.mat ")
+    assert stderr.count("\n") == 1
+
+
+def test_quiet_says_nothing(tmp_path: Path, run: Run) -> None:
+    write_matlab(tmp_path / "run.mat", ROWS, {})
+    assert run("inspect", tmp_path / "run.mat", "--quiet") == (0, "", "")
+    assert run("init", tmp_path, "--quiet") == (0, "", "")
+    assert (tmp_path / "campaign.toml").is_file()
+
+
+def test_init_tells_what_is_left_to_do(tmp_path: Path, run: Run) -> None:
+    write_text(tmp_path / "run.csv", {"t": T, "u": ROWS["u"], "psi": ROWS["x"]}, {})
+    code, stdout, stderr = run("init", tmp_path)
+    assert (code, stderr) == (0, "")
+    assert "running_gear, 1 records" in stdout
+    assert '"FILL IN" (4 times)' in stdout
+    code, _, stderr = run("init", tmp_path)
+    assert code == 2
+    assert "not overwritten" in stderr
+
+
+def test_an_unknown_rig_is_told(tmp_path: Path, run: Run) -> None:
+    write_matlab(tmp_path / "run.mat", ROWS, {})
+    code, _, stderr = run("init", tmp_path, "--model", "bicycle")
+    assert code == 2
+    assert "running_gear, axis, element" in stderr

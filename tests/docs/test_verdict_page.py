@@ -1,0 +1,64 @@
+"""The page on the verdict states the thresholds that the diagnosis has, and names files that exist."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = " ".join((ROOT / "docs/verdict.md").read_text(encoding="utf-8").split())
+STATED = {
+    "detect._SAME_INPUT": (1e-3, "inputs equal within 0.1 % of their size"),
+    "detect._MIN_QUIET": (100, "at least 100 samples"),
+    "detect._TOP_OF_SPECTRUM": (0.85, "above 85 % of the lines"),
+    "diagnosis._REFUTES": (0.7, "less than 0.7 of a floor"),
+    "input_timing._GOOD_PART": (0.5, "at least half (a hold)"),
+    "input_timing._NEARLY_ALL": (0.8, "four fifths (a shift)"),
+    "first_look._PIECE": (4.0, "in pieces of four periods"),
+    "first_look._NEAR": (25.0, "within five times the RMS of the best"),
+    "characterize._PROMISING": (9.0, "within three times the RMS of the best"),
+    "characterize._RELEASE_GAIN": (1.02, "lowers the held-out error by 2 %"),
+    "characterize._CONTENDER": (1.5, "within 1.5 times the best"),
+    "predictability.PREDICTABLE": (3.0, "more than three times what they do to the linear rig"),
+    "windows._CYCLES": (4, "windows of four cycles"),
+    "grow.MOST_EFFECTS": (2, "names two effects at most"),
+    "grow._BEAM": (1.3, "within 1.3 times the best error"),
+    "grow._HALF": (0.5, "at least half of what the best single effect leaves"),
+    "examination._SIGNIFICANT": (3.0, "three standard errors from zero"),
+    "rank._TIE": (0.01, "1 % of the error"),
+    "rank._MODEL_ERROR": (0.1, "a tenth of what the best model leaves above the floor"),
+    "rank._INEXACT": (1e-3, "a thousandth of the gap"),
+    "rank._PRIOR_PER_EFFECT": (1.0 / 3.0, "counts a third"),
+    "rank._FINE": (1e-3, "lowest by a thousandth"),
+    "verdict.AT_FLOOR": (1.1, "excess up to 1.1;"),
+    "verdict.AT_LOWER_BOUND": (3.0, "up to 3 where the floor is a lower bound"),
+    "verdict._WORTHWHILE": (1.1, "lower by a factor of 1.1"),
+    "verdict._LEFT_OF_GAP": (0.05, "1 + 5 % of the gap's excess"),
+    "verdict.LEAST_LEFT": (1.3, "at least 1.3"),
+    "verdict.MOST_LEFT": (1.6, "at most 1.6"),
+    "verdict._NEARLY_ALL": (0.9, "nine tenths of the re-identified gap closed"),
+    "verdict._HALF": (0.5, "at least half of the re-identified gap closed"),
+    "in_catalogue._ODDS_OUTSIDE_ONE": (0.25, "1 : 4 against one effect"),
+    "in_catalogue._ODDS_OUTSIDE_TWO": (1.0, "1 : 1 against two"),
+    "in_catalogue._ONE_FORCE": (0.5, "get at most one half"),
+    "in_catalogue._AT_MOST_UNKNOWN": (0.3, "at most 0.3"),
+    "advise._AMPLITUDES": ((0.3, 1.0, 1.5), "0.3, 1 and 1.5 times the largest input"),
+}
+
+
+@pytest.mark.parametrize("constant", STATED)
+def test_a_threshold_is_stated_as_it_is(constant: str) -> None:
+    module, _, name = constant.partition(".")
+    value, words = STATED[constant]
+    now = getattr(importlib.import_module(f"rigsight.diagnose.{module}"), name)
+    assert now == value, f"{constant} has changed: docs/verdict.md still says '{words}'"
+    assert words in PAGE
+
+
+def test_the_files_that_are_named_exist() -> None:
+    named = set(re.findall(r"`(\w+\.py)`", PAGE))
+    assert "verdict.py" in named
+    assert named <= {file.name for file in (ROOT / "src/rigsight/diagnose").glob("*.py")}

@@ -1,0 +1,44 @@
+"""What names of channels give away."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigsight.records.channel_names import closeness, split_unit
+
+
+@pytest.mark.parametrize(
+    ("name", "bare", "unit"),
+    [
+        ("Kraft [kN]", "Kraft", "kN"),
+        ("Strom (A)", "Strom", "A"),
+        ("Signal/Weg mm", "Signal/Weg", "mm"),
+        ("pos_mm", "pos", "mm"),
+        ("time_in_ms", "time", "ms"),
+        ("Winkel °", "Winkel", "°"),
+        ("x", "x", None),
+        ("x_a", "x_a", None),
+        ("run 2", "run 2", None),
+        ("[]", "[]", None),
+    ],
+)
+def test_units_in_names(name: str, bare: str, unit: str | None) -> None:
+    assert split_unit(name) == (bare, unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("u", "u"), ("Motor current [A]", "u"), ("MotorCurrent", "u"), ("Strom", "u"), ("log/u", "u"), ("Time_s", "t"),
+        ("Zeit [ms]", "t"), ("Weg mm", "x"), ("Signal/Weg mm", "x"), ("Kraft [kN]", "force"), ("yaw angle", "psi"),
+    ],
+)  # fmt: skip
+def test_names_of_signals(name: str, signal: str) -> None:
+    assert closeness(name, signal) >= 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [("Temperatur", "t"), ("xylophone", "x"), ("", "u"), ("fs", "force")]
+)
+def test_names_that_only_look_alike(name: str, signal: str) -> None:
+    assert closeness(name, signal) == 0.0

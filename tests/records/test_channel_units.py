@@ -1,0 +1,90 @@
+"""Units as files and people write them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.records import ColumnMapping
+from rigsight.records.channel_units import UnknownUnitError, factor, si_mapping
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "expected"),
+    [
+        ("A", "A", 1.0),
+        ("mA", "A", 1e-3),
+        ("deg", "rad", math.pi / 180),
+        ("°", "rad", math.pi / 180),
+        ("mrad", "rad", 1e-3),
+        ("mm", "m", 1e-3),
+        ("µm", "m", 1e-6),
+        ("μm", "m", 1e-6),
+        ("um", "m", 1e-6),
+        ("in", "m", 0.0254),
+        ("kN", "N", 1e3),
+        ("KN", "N", 1e3),
+        ("kg m/s²", "N", 1.0),
+        ("kgf", "N", 9.80665),
+        ("Nm", "N m", 1.0),
+        ("kNm", "N m", 1e3),
+        ("N·m", "N m", 1.0),
+        ("ms", "s", 1e-3),
+        ("min", "s", 60.0),
+    ],
+)
+def test_known_units(unit: str, si: str, expected: float) -> None:
+    assert factor(unit, si) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("unit", ["A", "mA", "ms", "mm", "kN", "m", "N"])
+def test_powers_of_ten_are_exact(unit: str) -> None:
+    si = {"A": "A", "s": "s", "m": "m", "N": "N"}[unit[-1]]
+    assert factor(unit, si) == {"m": 1e-3, "k": 1e3}.get(unit[:-1], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "si"),
+    [
+        ("mm", "rad"),
+        ("%", "rad"),
+        ("1", "rad"),
+        ("rad", "m"),
+        ("Nm", "N"),
+        ("Grad", "rad"),
+        ("grad", "rad"),
+        ("degC", "m"),
+        ("counts", "A"),
+        ("furlongs per", "m"),
+        ("m**999999999", "m"),
+        ("9**9**9**9", "m"),
+        ("__import__('os')", "m"),
+        ("m" * 200, "m"),
+        ("", "m"),
+    ],
+)
+def test_what_is_no_unit_of_the_quantity_is_refused(unit: str, si: str) -> None:
+    with pytest.raises(UnknownUnitError):
+        factor(unit, si)
+
+
+def test_the_message_says_what_to_write() -> None:
+    with pytest.raises(InputError) as caught:
+        si_mapping("run.mf4", "psi", "rad", ColumnMapping("Winkel"), "Winkel", "Grad")
+    for part in (
+        "run.mf4",
+        "'Winkel'",
+        "'Grad'",
+        "the file states",
+        "write deg",
+        'unit = "..."',
+        "scale = 1.0",
+    ):
+        assert part in str(caught.value)
+
+
+def test_scale_and_unit_exclude_each_other() -> None:
+    with pytest.raises(InputError, match="give one of the two"):
+        ColumnMapping("u", scale=1.0, unit="mA")

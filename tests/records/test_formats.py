@@ -1,0 +1,357 @@
+"""The same record in every format, and what a file has to say about its channels."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records.channel_file import open_channels
+
+from .formats import (
+    FORMATS,
+    Write,
+    write_hdf5,
+    write_matlab,
+    write_matlab_hdf5,
+    write_mdf,
+    write_parquet,
+    write_tdms,
+    write_text,
+    write_uff,
+)
+
+
+@dataclass(frozen=True)
+class Named:
+    name: str
+    unit: str
+
+
+INPUTS = (Named("u", "A"),)
+OUTPUTS = (Named("psi", "rad"), Named("y", "m"))
+UNITS = {"u": "A", "psi": "rad", "y": "m"}
+formats = pytest.mark.parametrize(("suffix", "write"), FORMATS.values(), ids=FORMATS)
+
+
+def rows(n_samples: int = 120, dt: float = 0.01) -> dict[str, np.ndarray]:
+    t = dt * np.arange(n_samples)
+    return {
+        "t": t,
+        "u": np.sin(3 * t**2),
+        "psi": 0.1 * np.sin(3 * t**2 - 0.4),
+        "y": 0.01 * np.cos(2 * t),
+    }
+
+
+def read(path: Path, **options: object) -> Record:
+    return read_record(path, INPUTS, OUTPUTS, **options)
+
+
+@formats
+def test_the_same_record_in_any_format(tmp_path: Path, suffix: str, write: Write) -> None:
+    write_text(tmp_path / "run.csv", rows(), {})
+    write(tmp_path / f"run{suffix}", rows(), UNITS)
+    text, other = read(tmp_path / "run.csv"), read(tmp_path / f"run{suffix}")
+    assert (other.name, other.dt, other.t0, other.notes) == ("run", text.dt, text.t0, ())
+    assert dict(other.units) == dict(text.units)
+    for signal in ("u", "psi", "y"):
+        np.testing.assert_array_equal(other[signal], text[signal], strict=True)
+
+
+@formats
+def test_single_precision_is_kept_and_its_time_meant_as_decimals(
+    tmp_path: Path, suffix: str, write: Write
+) -> None:
+    single = {name: samples.astype(np.float32) for name, samples in rows().items()}
+    path = tmp_path / f"run{suffix}"
+    write(path, single, {})
+    record = read(path)
+    np.testing.assert_array_equal(record["psi"], single["psi"].astype(np.float64))
+    assert record.dt == pytest.approx(0.01, rel=1e-6)
+    assert record.notes == ()
+
+
+@formats
+def test_content_decides_and_not_the_name(tmp_path: Path, suffix: str, write: Write) -> None:
+    write(tmp_path / f"run{suffix}", rows(), {})
+    path = (tmp_path / f"run{suffix}").rename(tmp_path / "run.csv")
+    np.testing.assert_array_equal(read(path)["psi"], rows()["psi"])
+
+
+@pytest.mark.parametrize("suffix", [".mat", ".h5", ".mf4", ".tdms", ".parquet", ".uff"])
+@pytest.mark.parametrize("content", [b"", b"t,u,psi\n0,1,2\n", bytes(300)])
+def test_a_name_that_promises_what_the_content_is_not(tmp_path: Path, suffix: str, content: bytes) -> None:
+    path = tmp_path / f"run{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"run{suffix} is (no .* file inside|empty)"):
+        read(path)
+
+
+@pytest.mark.parametrize("write", [write_hdf5, write_mdf, write_tdms, write_parquet, write_uff])
+def test_units_that_the_file_states_are_converted_and_told(tmp_path: Path, write: Write) -> None:
+    path = tmp_path / "run"
+    scaled = rows() | {"u": rows()["u"] * 1e3, "psi": np.degrees(rows()["psi"])}
+    write(path, scaled, {"u": "mA", "psi": "deg", "y": "m"})
+    record = read(path)
+    np.testing.assert_allclose(record["u"], rows()["u"], rtol=1e-14)
+    np.testing.assert_allclose(record["psi"], rows()["psi"], rtol=1e-14)
+    assert sum("converted from" in note for note in record.notes) == 2
+    assert any("mA" in note and "'" in note for note in record.notes)
+
+
+def test_scale_wins_over_the_unit_of_the_file(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "run", rows(), {"u": "mA"})
+    record = read(tmp_path / "run", columns={"u": ColumnMapping("u", scale=2.0)})
+    np.testing.assert_array_equal(record["u"], 2.0 * rows()["u"])
+    assert record.notes == ()
+
+
+def test_a_unit_of_the_campaign_wins_over_that_of_the_file(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "run", rows(), {"u": "kA"})
+    record = read(tmp_path / "run", columns={"u": ColumnMapping("u", unit="mA")})
+    np.testing.assert_allclose(record["u"], 1e-3 * rows()["u"], rtol=1e-14)
+
+
+def test_a_unit_converts_text_too_but_a_row_of_units_does_not(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    write_text(path, rows(), {})
+    path.write_text(path.read_text().replace("t,u,psi,y\n", "t,u,psi,y\ns,mA,deg,mm\n"))
+    plain = read(path)
+    np.testing.assert_array_equal(plain["u"], rows()["u"])
+    record = read(path, columns={"u": ColumnMapping("u", unit="mA")})
+    np.testing.assert_allclose(record["u"], 1e-3 * rows()["u"], rtol=1e-14)
+
+
+def test_a_unit_that_does_not_fit_is_told_with_the_mend(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "run.parquet", rows(), {"psi": "mm"})
+    with pytest.raises(InputError) as caught:
+        read(tmp_path / "run.parquet")
+    for part in ("run.parquet", "'psi'", "'mm'", "rad", "scale = 1.0"):
+        assert part in str(caught.value)
+
+
+def test_an_input_without_a_unit_of_its_own_is_taken_as_it_stands_and_told(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "run", rows(), {"u": "kN"})
+    record = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS)
+    np.testing.assert_array_equal(record["u"], rows()["u"])
+    assert "in kN" in record.notes[0]
+    with pytest.raises(InputError, match="no unit of its own"):
+        read_record(
+            tmp_path / "run", (Named("u", "input"),), OUTPUTS, columns={"u": ColumnMapping("u", unit="N")}
+        )
+
+
+ODD = {"Zeit [ms]": "t", "Strom (A)": "u", "Signal/Winkel °": "psi", "Weg, quer µm": "y"}
+
+
+@pytest.mark.parametrize("write", [write_parquet, write_hdf5])
+def test_odd_names(tmp_path: Path, write: Write) -> None:
+    good = rows()
+    odd = {name: good[signal] * (1e3 if signal == "t" else 1.0) for name, signal in ODD.items()}
+    write(tmp_path / "run", odd, {})
+    prefix = "run 1/" if write is write_hdf5 else ""
+    columns = {signal: ColumnMapping(prefix + name) for name, signal in ODD.items()}
+    columns["t"] = ColumnMapping(prefix + "Zeit [ms]", unit="ms")
+    record = read(tmp_path / "run", columns=columns)
+    assert record.dt == pytest.approx(0.01, rel=1e-12)
+    np.testing.assert_array_equal(record["y"], good["y"])
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_struct_one_level_deep(tmp_path: Path, packed: bool) -> None:
+    from scipy.io import savemat
+
+    content = {
+        "log": {**rows(), "info": "bench 3", "deep": {"x": rows()["u"]}},
+        "names": np.array(["a", "b"], dtype=object),
+        "fs": 100.0,
+    }
+    savemat(tmp_path / "run.mat", content, do_compression=packed)
+    np.testing.assert_array_equal(read(tmp_path / "run.mat")["psi"], rows()["psi"])
+    with open_channels(tmp_path / "run.mat") as file:
+        assert [channel.name for channel in file.channels] == ["log/t", "log/u", "log/psi", "log/y"]
+        refused = {one.name: one.reason for one in file.refused}
+    assert "one level deep" in refused["log/deep"]
+    assert "text" in refused["log/info"]
+    assert "cell" in refused["names"]
+    with pytest.raises(
+        InputError, match="'log/deep', which signal 'u' is mapped to, is a struct in a struct"
+    ):
+        read(tmp_path / "run.mat", columns={"u": ColumnMapping("log/deep")})
+
+
+def test_columns_of_a_matrix(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", {"data": np.column_stack(list(rows().values()))})
+    columns = {signal: ColumnMapping(f"data(:,{i})") for i, signal in enumerate(rows(), 1)}
+    np.testing.assert_array_equal(read(tmp_path / "run.mat", columns=columns)["y"], rows()["y"])
+    by_number = {signal: ColumnMapping(i) for i, signal in enumerate(rows(), 1)}
+    np.testing.assert_array_equal(read(tmp_path / "run.mat", columns=by_number)["y"], rows()["y"])
+
+
+def test_time_may_be_given_as_a_sample_time(tmp_path: Path) -> None:
+    timeless = {name: samples for name, samples in rows().items() if name != "t"}
+    write_matlab(tmp_path / "run.mat", timeless, {})
+    write_text(tmp_path / "run.csv", timeless, {})
+    with pytest.raises(InputError, match=r"dt = 0\.001"):
+        read(tmp_path / "run.mat")
+    for name in ("run.mat", "run.csv"):
+        record = read(tmp_path / name, dt=0.01)
+        assert (record.dt, record.t0, record.n_samples) == (0.01, 0.0, 120)
+    with pytest.raises(InputError, match="give one of the two"):
+        read(tmp_path / "run.csv", dt=0.01, columns={"t": ColumnMapping("u")})
+
+
+def test_dates_count_in_seconds_from_the_first(tmp_path: Path) -> None:
+    stamps = np.datetime64("2024-05-01T12:00:00", "us") + (10_000 * np.arange(120)).astype("timedelta64[us]")
+    write_parquet(tmp_path / "run", rows() | {"t": stamps}, {})
+    record = read(tmp_path / "run")
+    assert (record.dt, record.t0) == (0.01, 0.0)
+
+
+def test_whole_numbers_are_read_as_numbers(tmp_path: Path) -> None:
+    counts = rows() | {"u": np.round(1000 * rows()["u"]).astype(np.int16)}
+    write_hdf5(tmp_path / "run", counts, {})
+    np.testing.assert_array_equal(read(tmp_path / "run")["u"], counts["u"].astype(np.float64))
+
+
+@pytest.mark.parametrize("write", [write_matlab, write_hdf5, write_mdf, write_tdms, write_parquet])
+def test_a_gap_is_told_with_channel_and_sample(tmp_path: Path, write: Write) -> None:
+    broken = rows()
+    broken["psi"][7] = np.nan
+    write(tmp_path / "run", broken, {})
+    with pytest.raises(InputError, match=r"run, channel '.*psi', sample 8: nan"):
+        read(tmp_path / "run")
+
+
+def test_a_missing_channel_is_told_with_those_that_are_there(tmp_path: Path) -> None:
+    write_matlab(tmp_path / "run.mat", {"t": rows()["t"], "current": rows()["u"], "psi": rows()["psi"]}, {})
+    with pytest.raises(InputError, match=r"no channel 'u' for signal 'u'.*'t', 'current', 'psi'"):
+        read(tmp_path / "run.mat")
+    assert "y" not in read(tmp_path / "run.mat", columns={"u": ColumnMapping("current")})
+
+
+def test_frequency_responses_are_listed_and_refused(tmp_path: Path) -> None:
+    pyuff = pytest.importorskip("pyuff")
+    path = tmp_path / "run.uff"
+    write_uff(path, rows(), {})
+    response = {
+        "type": 58, "binary": 0, "func_type": 4, "rsp_node": 9, "rsp_dir": 3, "ref_node": 1, "ref_dir": 1,
+        "data": np.exp(1j * np.arange(60.0)), "x": np.arange(60.0), "id1": "FRF seat", "rsp_ent_name": "NONE",
+        "ref_ent_name": "NONE", "abscissa_spacing": 1, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 8,
+        "orddenom_spec_data_type": 13,
+    }  # fmt: skip
+    pyuff.UFF(str(path)).write_sets([response], mode="add")
+    with open_channels(path) as file:
+        assert len(file.channels) == 3
+        assert [(one.name, "frequency response" in one.reason) for one in file.refused] == [
+            ("FRF seat", True)
+        ]
+    with pytest.raises(InputError, match=r"FRF seat.*is a frequency response function; a record needs"):
+        read(path, columns={"u": ColumnMapping("FRF seat")})
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+def test_universal_files_as_text_and_binary(tmp_path: Path, binary: int) -> None:
+    write_uff(tmp_path / "run.uff", rows(), UNITS, binary=binary)
+    np.testing.assert_allclose(read(tmp_path / "run.uff")["psi"], rows()["psi"], rtol=1e-11)
+
+
+PACKAGES = {
+    "MATLAB 7.3": "h5py", "HDF5": "h5py", "MDF4": "asammdf", "TDMS": "nptdms", "Parquet": "pyarrow", "UFF": "pyuff",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_missing_library_is_told_with_the_extra(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    suffix, write = FORMATS[name]
+    path = tmp_path / f"run{suffix}"
+    write(path, rows(), {})
+    for module in [m for m in sys.modules if m.partition(".")[0] == PACKAGES[name]]:
+        monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setitem(sys.modules, PACKAGES[name], None)
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert 'pip install "rigsight[formats]"' in str(caught.value)
+    assert PACKAGES[name] in str(caught.value)
+
+
+@pytest.mark.parametrize("write", [write_matlab, write_matlab_hdf5])
+def test_matlab_needs_no_extra_before_7_3(
+    tmp_path: Path, write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "run.mat", rows(), {})
+    for package in set(PACKAGES.values()):
+        monkeypatch.setitem(sys.modules, package, None)
+    if write is write_matlab:
+        assert read(tmp_path / "run.mat").n_samples == 120
+    else:
+        with pytest.raises(InputError, match="formats"):
+            read(tmp_path / "run.mat")
+
+
+def test_a_dialect_means_nothing_for_other_formats(tmp_path: Path) -> None:
+    write_matlab(tmp_path / "run.mat", rows(), {})
+    with pytest.raises(InputError, match="separator means nothing"):
+        read(tmp_path / "run.mat", separator=";")
+
+
+def test_references_and_data_in_other_files_are_not_followed(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    (tmp_path / "secret").write_bytes(np.arange(120.0).tobytes())
+    path = tmp_path / "run.h5"
+    write_hdf5(path, rows(), {})
+    with h5py.File(path, "r+") as file:
+        file["refs"] = np.array([file["run 1/u"].ref], dtype=h5py.ref_dtype)
+        file.create_dataset("outside", (120,), "f8", external=[(str(tmp_path / "secret"), 0, 960)])
+        file["link"] = h5py.ExternalLink("secret.h5", "/x")
+    with open_channels(path) as opened:
+        assert [channel.short_name for channel in opened.channels] == ["psi", "t", "u", "y"]
+        refused = {one.name: one.reason for one in opened.refused}
+    assert "references" in refused["refs"]
+    assert "another file" in refused["outside"]
+    assert "link" not in refused
+
+
+def test_a_formula_in_a_file_is_not_executed(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    signals = [
+        asammdf.Signal(rows()[name], rows()["t"], name=name, conversion=conversion)
+        for name, conversion in {"u": None, "psi": None, "y": {"formula": "X1 * 2"}}.items()
+    ]
+    with asammdf.MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(tmp_path / "run.mf4")
+    with open_channels(tmp_path / "run.mf4") as opened:
+        assert [(one.name, "not executed" in one.reason) for one in opened.refused] == [("y", True)]
+    with pytest.raises(InputError, match="formula"):
+        read(tmp_path / "run.mf4")
+
+
+@pytest.mark.parametrize(
+    "write", [write_matlab, write_matlab_hdf5, write_hdf5, write_tdms, write_parquet, write_uff]
+)
+def test_too_many_samples_are_refused_before_they_are_read(
+    tmp_path: Path, write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / "run", rows(), {})
+    for module in ("channel", "matlab_elements"):
+        monkeypatch.setattr(f"rigsight.records.{module}.MOST_SAMPLES", 100)
+    with pytest.raises(InputError, match=r"run.*120 .*more than the 100 that are read"):
+        read(tmp_path / "run")
+
+
+def test_too_large_a_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_matlab(tmp_path / "run.mat", rows(), {})
+    monkeypatch.setattr("rigsight.records.channel_file.LARGEST_FILE", 10)
+    with pytest.raises(InputError, match="more than the 1e-08 GB"):
+        read(tmp_path / "run.mat")

@@ -1,0 +1,118 @@
+"""Signals of different rates: refused, unless the campaign asks, and then told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.records import Record, read_record
+
+from .formats import write_text
+
+
+@dataclass(frozen=True)
+class Named:
+    name: str
+    unit: str
+
+
+def write_two_rates(path: Path, start: float = 0.0) -> None:
+    """An input every 0.02 s and an output every 0.01 s."""
+    nptdms = pytest.importorskip("nptdms")
+    slow, fast = 0.02 * np.arange(200), 0.01 * np.arange(400) + start
+    channels = [
+        nptdms.ChannelObject("log", name, samples, properties={"wf_increment": dt, "wf_start_offset": t0})
+        for name, samples, dt, t0 in (
+            ("u", np.sin(3 * slow), 0.02, 0.0),
+            ("x", np.sin(3 * fast - 0.4), 0.01, start),
+        )
+    ]
+    with nptdms.TdmsWriter(path) as file:
+        file.write_segment(channels)
+
+
+def read(path: Path, **options: object) -> Record:
+    return read_record(path, (Named("u", "input"),), (Named("x", "m"),), **options)
+
+
+def test_different_rates_are_refused_with_the_key_that_resamples(tmp_path: Path) -> None:
+    write_two_rates(tmp_path / "run.tdms")
+    with pytest.raises(InputError) as caught:
+        read(tmp_path / "run.tdms")
+    for part in ("run.tdms", "do not share one time axis", "every 0.02 s", "every 0.01 s", "resample = 0.01"):
+        assert part in str(caught.value)
+
+
+def test_different_starts_are_refused_as_well(tmp_path: Path) -> None:
+    write_two_rates(tmp_path / "run.tdms", start=0.005)
+    with pytest.raises(InputError, match=r"from 0.005 s"):
+        read(tmp_path / "run.tdms")
+
+
+@pytest.mark.parametrize(
+    ("hold", "manner", "error"),
+    [("foh", "linearly", 5e-4), ("zoh", "held", 0.06), ("band_limited", "cubic", 1e-5)],
+)
+def test_resampling_is_done_when_asked_and_told(tmp_path: Path, hold: str, manner: str, error: float) -> None:
+    write_two_rates(tmp_path / "run.tdms")
+    record = read(tmp_path / "run.tdms", resample=0.01, hold=hold)
+    assert (record.dt, record.t0, record.n_samples) == (0.01, 0.0, 399)
+    np.testing.assert_array_equal(record["x"], np.sin(3 * (0.01 * np.arange(400)) - 0.4)[:399])
+    np.testing.assert_allclose(record["u"], np.sin(3 * record.t), atol=error)
+    np.testing.assert_array_equal(record["u"][::2], np.sin(3 * (0.02 * np.arange(200))))
+    (note,) = record.notes
+    assert "resampled onto 0.01 s" in note
+    assert f"u from 0.02 s ({manner}" in note
+    assert "x from" not in note
+
+
+def test_the_axis_is_what_all_signals_cover(tmp_path: Path) -> None:
+    write_two_rates(tmp_path / "run.tdms", start=0.105)
+    record = read(tmp_path / "run.tdms", resample=0.01)
+    assert record.t0 == pytest.approx(0.105)
+    assert record.t[-1] <= 3.98 + 1e-9
+    np.testing.assert_allclose(record["u"], np.sin(3 * record.t), atol=5e-4)
+
+
+def test_a_coarser_axis_would_alias_and_is_refused(tmp_path: Path) -> None:
+    write_two_rates(tmp_path / "run.tdms")
+    with pytest.raises(InputError, match=r"coarser than the samples of x.*Give at most 0.01"):
+        read(tmp_path / "run.tdms", resample=0.02)
+
+
+def test_signals_that_hardly_overlap_are_refused(tmp_path: Path) -> None:
+    write_two_rates(tmp_path / "run.tdms", start=3.9)
+    with pytest.raises(InputError, match=r"in common.*at least 50"):
+        read(tmp_path / "run.tdms", resample=0.01)
+
+
+def test_the_own_rate_changes_nothing_and_is_not_told(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(100)
+    write_text(tmp_path / "run.csv", {"t": t, "u": np.sin(9 * t), "x": np.cos(9 * t)}, {})
+    plain, same = read(tmp_path / "run.csv"), read(tmp_path / "run.csv", resample=0.01)
+    assert (same.dt, same.t0, same.notes) == (plain.dt, plain.t0, ())
+    np.testing.assert_array_equal(same["x"], plain["x"])
+
+
+def test_groups_with_a_time_each_go_by_their_own(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    slow, fast = 0.02 * np.arange(200), 0.01 * np.arange(400)
+    content = {"drive": {"t": slow, "u": np.sin(slow)}, "stage": {"t": fast, "x": np.cos(fast)}}
+    savemat(tmp_path / "run.mat", content)
+    with pytest.raises(InputError, match="do not share one time axis"):
+        read(tmp_path / "run.mat")
+    assert read(tmp_path / "run.mat", resample=0.005).dt == 0.005
+
+
+def test_a_time_of_another_length_is_told(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    t = 0.02 * np.arange(200)
+    savemat(tmp_path / "run.mat", {"t": t, "u": np.sin(t), "x": np.cos(0.01 * np.arange(400))})
+    with pytest.raises(InputError, match=r"'x' has 400 samples, but the time 't' 200"):
+        read(tmp_path / "run.mat")

@@ -1,0 +1,152 @@
+"""A campaign written from the files of a folder."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.init import run_init
+
+from ..records.formats import write_mdf, write_parquet, write_text
+
+T = 0.01 * np.arange(600)
+SWEEP = np.sin(2 * np.pi * (1.0 + 2.0 * T) * T)
+ANSWER = np.roll(SWEEP, 3) * 0.02
+
+
+def test_clear_names_make_a_campaign_at_once(tmp_path: Path) -> None:
+    for name in ("run_1.csv", "run_2.csv", "run_3.csv"):
+        write_text(tmp_path / name, {"t": T, "u": 2.0 * SWEEP, "x": ANSWER}, {})
+    draft = run_init(tmp_path)
+    assert (draft.model, draft.n_blanks, len(draft.records)) == ("axis", 0, 3)
+    campaign = read_campaign(tmp_path)
+    assert campaign.rig.name == "axis"
+    assert [record.role for record in campaign.records] == ["estimation", "estimation", "validation"]
+    assert [record.kind for record in campaign.records] == ["sweep"] * 3
+    assert campaign.records[0].amplitude == pytest.approx(2.0, rel=0.02)
+
+
+def test_units_in_names_are_written_and_applied(tmp_path: Path) -> None:
+    odd = {"Zeit [ms]": 1e3 * T, "Anregung": SWEEP, "Signal/Weg mm": 1e3 * ANSWER, "Temperatur": ANSWER}
+    write_text(tmp_path / "messung.csv", odd, {})
+    write_parquet(tmp_path / "validierung.parquet", odd, {})
+    run_init(tmp_path)
+    first, second = read_campaign(tmp_path).records
+    np.testing.assert_allclose(first["x"], ANSWER, rtol=1e-12)
+    np.testing.assert_array_equal(second["x"], first["x"])
+    assert (first.dt, second.role) == (pytest.approx(0.01, rel=1e-12), "validation")
+
+
+def test_the_kind_of_rig_is_guessed_from_the_channels(tmp_path: Path) -> None:
+    for folder, columns in {
+        "element": ("t", "Hub [mm]", "Kraft [kN]"),
+        "running_gear": ("time", "motor current", "psi"),
+        "axis": ("t", "u", "position"),
+    }.items():
+        (tmp_path / folder).mkdir()
+        write_text(tmp_path / folder / "a.csv", dict(zip(columns, (T, SWEEP, ANSWER), strict=True)), {})
+        assert run_init(tmp_path / folder).model == folder
+
+
+def test_blanks_are_refused_by_name_and_accepted_once_filled(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "psi": ANSWER}, {})
+    draft = run_init(tmp_path)
+    assert draft.n_blanks == 4
+    with pytest.raises(InputError, match=r"rig.constants.v.*FILL IN"):
+        read_campaign(tmp_path)
+    text = draft.path.read_text(encoding="utf-8")
+    draft.path.write_text(text.replace('"FILL IN"', "0.5", 4 + 1), encoding="utf-8")
+    assert read_campaign(tmp_path).constants["v"] == 0.5
+
+
+def test_ambiguous_channels_are_listed_and_not_guessed(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "Weg 1": ANSWER, "Weg 2": 2 * ANSWER}, {})
+    draft = run_init(tmp_path, model="axis")
+    text = draft.path.read_text(encoding="utf-8")
+    (line,) = [line for line in text.splitlines() if line.startswith("x = ")]
+    assert "FILL IN" in line
+    assert '"Weg 1", "Weg 2"' in line
+    with pytest.raises(InputError, match="no column 'FILL IN' for signal 'x'"):
+        read_campaign(tmp_path)
+    draft.path.write_text(text.replace('x = "FILL IN"', 'x = "Weg 2"'), encoding="utf-8")
+    np.testing.assert_array_equal(read_campaign(tmp_path).records[0]["x"], 2 * ANSWER)
+
+
+def test_a_file_without_time_leaves_the_sample_time_open(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"u": SWEEP, "x": ANSWER})
+    draft = run_init(tmp_path)
+    text = draft.path.read_text(encoding="utf-8")
+    assert 'dt = "FILL IN"' in text
+    draft.path.write_text(text.replace('dt = "FILL IN"', "dt = 0.01"), encoding="utf-8")
+    assert read_campaign(tmp_path).records[0].dt == 0.01
+
+
+def test_different_rates_are_written_out(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    channels = [
+        nptdms.ChannelObject("log", "u", SWEEP[::2], properties={"wf_increment": 0.02}),
+        nptdms.ChannelObject("log", "x", ANSWER, properties={"wf_increment": 0.01}),
+    ]
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment(channels)
+    run_init(tmp_path)
+    (record,) = read_campaign(tmp_path).records
+    assert record.dt == 0.01
+    assert "resampled" in record.notes[0]
+
+
+def test_units_that_the_file_states_need_no_mapping(tmp_path: Path) -> None:
+    write_mdf(tmp_path / "a.mf4", {"t": T, "u": SWEEP, "x": 1e3 * ANSWER}, {"u": "N", "x": "mm"})
+    draft = run_init(tmp_path)
+    table = tomllib.loads(draft.path.read_text(encoding="utf-8"))["records"][0]
+    assert table["columns"] == {"u": "u"}
+    np.testing.assert_allclose(read_campaign(tmp_path).records[0]["x"], ANSWER, rtol=1e-14)
+
+
+def test_what_is_no_record_is_left_out_with_its_reason(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "x": ANSWER}, {})
+    (tmp_path / "notes.txt").write_text("measured on a Monday\nby hand\n")
+    (tmp_path / "broken.mat").write_bytes(b"no")
+    (tmp_path / "picture.png").write_bytes(b"no")
+    draft = run_init(tmp_path)
+    assert draft.records == ("a.csv",)
+    assert [name for name, _ in draft.left_out] == ["broken.mat", "notes.txt"]
+    assert "# broken.mat: " in draft.path.read_text(encoding="utf-8")
+    read_campaign(tmp_path)
+
+
+def test_a_campaign_is_never_overwritten(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "x": ANSWER}, {})
+    (tmp_path / "campaign.toml").write_text("mine")
+    with pytest.raises(InputError, match="not overwritten"):
+        run_init(tmp_path)
+    assert (tmp_path / "campaign.toml").read_text() == "mine"
+
+
+def test_nothing_is_written_where_there_is_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no measured file"):
+        run_init(tmp_path)
+    (tmp_path / "broken.mat").write_bytes(b"no")
+    with pytest.raises(InputError, match=r"broken.mat: is no MATLAB file"):
+        run_init(tmp_path)
+    with pytest.raises(InputError, match="no folder"):
+        run_init(tmp_path / "nowhere")
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.mat"]
+
+
+@pytest.mark.parametrize("name", ['qu"ote.csv', "back\\slash.csv", "zeile\nzwei.csv", "ünï # hash.csv"])
+def test_odd_file_and_channel_names_are_written_as_they_are(tmp_path: Path, name: str) -> None:
+    good = tmp_path / "good.parquet"
+    write_parquet(good, {"t": T, "u": SWEEP, 'Weg "\\" [mm]': 1e3 * ANSWER}, {})
+    shutil.move(good, tmp_path / name)
+    run_init(tmp_path)
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["x"], ANSWER, rtol=1e-12)
