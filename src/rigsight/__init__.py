@@ -1,1 +1,109 @@
-"""Diagnosis of the gap between a test rig and its simulation: where it lies, what causes it, how far it shrinks."""
+"""Diagnosis of the gap between a test rig and its simulation: where it lies, what causes it, how far it shrinks.
+
+``import rigsight as rs`` offers what the commands do. Nothing is loaded before a name is used: command lines answer at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rigsight.api.comparing import compare_models as compare_models
+    from rigsight.api.comparison_result import ComparisonResult as ComparisonResult
+    from rigsight.api.diagnoser import Diagnoser as Diagnoser
+    from rigsight.api.diagnosis_result import DiagnosisResult as DiagnosisResult
+    from rigsight.api.discovery_result import DiscoveryResult as DiscoveryResult
+    from rigsight.api.equation_discoverer import EquationDiscoverer as EquationDiscoverer
+    from rigsight.api.example import example_campaign as example_campaign
+    from rigsight.api.identification_result import IdentificationResult as IdentificationResult
+    from rigsight.api.linear_identifier import LinearIdentifier as LinearIdentifier
+    from rigsight.api.reading import read_record as read_record
+    from rigsight.effects import CATALOGUE as CATALOGUE
+    from rigsight.effects import Effect as Effect
+    from rigsight.errors import InputError as InputError
+    from rigsight.errors import RigsightError as RigsightError
+    from rigsight.errors import SimulationError as SimulationError
+    from rigsight.records import ColumnMapping as ColumnMapping
+    from rigsight.records import Record as Record
+    from rigsight.simulate.model import Model as Model
+    from rigsight.workflow.campaign import Campaign as Campaign
+    from rigsight.workflow.campaign import read_campaign as read_campaign
+    from rigsight.workflow.in_memory import make_campaign as make_campaign
+    from rigsight.workflow.in_memory import make_model as make_model
+    from rigsight.workflow.model_file import read_model as read_model
+    from rigsight.workflow.own_effects import own_effects as own_effects
+    from rigsight.workflow.simulate import simulate_model as simulate_model
+
+_HOMES = {
+    "CATALOGUE": "rigsight.effects",
+    "Campaign": "rigsight.workflow.campaign",
+    "ColumnMapping": "rigsight.records",
+    "ComparisonResult": "rigsight.api.comparison_result",
+    "Diagnoser": "rigsight.api.diagnoser",
+    "DiagnosisResult": "rigsight.api.diagnosis_result",
+    "DiscoveryResult": "rigsight.api.discovery_result",
+    "Effect": "rigsight.effects",
+    "EquationDiscoverer": "rigsight.api.equation_discoverer",
+    "IdentificationResult": "rigsight.api.identification_result",
+    "InputError": "rigsight.errors",
+    "LinearIdentifier": "rigsight.api.linear_identifier",
+    "Model": "rigsight.simulate.model",
+    "Record": "rigsight.records",
+    "RigsightError": "rigsight.errors",
+    "SimulationError": "rigsight.errors",
+    "compare_models": "rigsight.api.comparing",
+    "example_campaign": "rigsight.api.example",
+    "make_campaign": "rigsight.workflow.in_memory",
+    "make_model": "rigsight.workflow.in_memory",
+    "own_effects": "rigsight.workflow.own_effects",
+    "read_campaign": "rigsight.workflow.campaign",
+    "read_model": "rigsight.workflow.model_file",
+    "read_record": "rigsight.api.reading",
+    "simulate_model": "rigsight.workflow.simulate",
+}
+"""Public name -> module that holds it."""
+
+__all__ = [
+    "CATALOGUE",
+    "Campaign",
+    "ColumnMapping",
+    "ComparisonResult",
+    "Diagnoser",
+    "DiagnosisResult",
+    "DiscoveryResult",
+    "Effect",
+    "EquationDiscoverer",
+    "IdentificationResult",
+    "InputError",
+    "LinearIdentifier",
+    "Model",
+    "Record",
+    "RigsightError",
+    "SimulationError",
+    "compare_models",
+    "example_campaign",
+    "make_campaign",
+    "make_model",
+    "own_effects",
+    "read_campaign",
+    "read_model",
+    "read_record",
+    "simulate_model",
+]
+
+# Type checkers read the imports above, so that a name that does not exist is a mistake for them too.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        from importlib import import_module
+
+        if name not in _HOMES:
+            raise AttributeError(f"module 'rigsight' has no attribute '{name}'")
+        found = getattr(import_module(_HOMES[name]), name)
+        # The next use finds it without asking.
+        globals()[name] = found
+        return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

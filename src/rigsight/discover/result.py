@@ -140,9 +140,9 @@ class Discovery:
     held_out_error
         Free-run error there in units of the noise floor.
     held_out_nrmse, noise_floor
-        The same error, and the noise floor, relative to the spread of the measured output.
+        The same error, and the noise floor, relative to the spread of the measured output (dimensionless).
     independent
-        Independent samples behind that error.
+        Number of independent samples behind that error (dimensionless, not whole).
     runs
         Free runs of the model, for a picture.
     output, unit

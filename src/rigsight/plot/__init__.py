@@ -1,5 +1,7 @@
 """How figures are drawn that the report, the commands and notebooks share; every function returns a figure of its own."""
 
+from typing import TYPE_CHECKING
+
 from rigsight.plot.amplitude_dependence import AmplitudePanel as AmplitudePanel
 from rigsight.plot.amplitude_dependence import AmplitudePoint as AmplitudePoint
 from rigsight.plot.amplitude_dependence import amplitude_dependence as amplitude_dependence
@@ -31,6 +33,10 @@ from rigsight.plot.model_comparison import model_errors as model_errors
 from rigsight.plot.model_comparison import model_responses as model_responses
 from rigsight.plot.model_comparison import model_steps as model_steps
 from rigsight.plot.model_comparison import model_styles as model_styles
+
+if TYPE_CHECKING:
+    # For rooms that hand figures on and must not know matplotlib.
+    from matplotlib.figure import Figure as Figure
 
 __all__ = [
     "AmplitudePanel",

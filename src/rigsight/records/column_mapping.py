@@ -20,8 +20,10 @@ class ColumnMapping:
     ----------
     name
         Name of the column or channel, or its number, counted from 1.
-    scale, offset
-        Conversion to SI; None for both leaves it to the unit, or takes the values as they stand where there is none.
+    scale
+        SI unit per unit of the column. None here and for `offset` leaves it to the unit, or takes the values as they stand.
+    offset
+        What is added after scaling, in the SI unit.
     unit
         Unit of the column, instead of scale and offset: ``"deg"``.
 
@@ -55,7 +57,13 @@ class ColumnMapping:
         return self.scale is not None or self.offset is not None
 
     def to_si(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the column, shape (n_samples,), in SI units."""
+        """Return a column in SI units, shape (n_samples,).
+
+        Parameters
+        ----------
+        column
+            Numbers as they stand in the file, shape (n_samples,).
+        """
         scale = 1.0 if self.scale is None else self.scale
         offset = 0.0 if self.offset is None else self.offset
         return scale * column + offset

@@ -110,6 +110,13 @@ class Record:
         self.__dict__.update(state)
         self.__post_init__()
 
+    # That of the dataclass would hold every sample.
+    def __repr__(self) -> str:
+        return (
+            f"Record({self.name!r}, {self.n_samples} samples of {', '.join(self.signals)}, dt={self.dt:.6g} s, "
+            f"role={self.role!r}, kind={self.kind!r})"
+        )
+
     @property
     def n_samples(self) -> int:
         """Number of samples."""
@@ -139,12 +146,23 @@ class Record:
         return signal in self.signals
 
     def with_signals(self, **signals: ArrayLike) -> Record:
-        """Return a copy in which `signals`, each of shape (n_samples,), are added or replaced."""
+        """Return a copy in which signals are added or replaced.
+
+        Parameters
+        ----------
+        **signals
+            Signal name -> samples in SI units, each of shape (n_samples,).
+        """
         added = {signal: np.asarray(samples, dtype=np.float64) for signal, samples in signals.items()}
         return replace(self, signals={**self.signals, **added})
 
     def slice(self, start: int | None, stop: int | None) -> Record:
-        """Return samples `start` to `stop` (exclusive), counted as Python slices are.
+        """Return a stretch of the record; its time stamps stay.
+
+        Parameters
+        ----------
+        start, stop
+            First sample and the one behind the last, counted as Python slices are.
 
         Raises
         ------

@@ -137,12 +137,25 @@ def comparison_summary(comparison: Comparison) -> ComparisonSummary:
 
 
 def _views(comparison: Comparison, figures: Sequence[ComparisonFigure]) -> Iterator[View]:
-    yield _view(comparison, None, figures)
+    yield comparison_view(comparison, None, figures)
     for record in comparison.records:
-        yield _view(comparison, record.record.name, figures)
+        yield comparison_view(comparison, record.record.name, figures)
 
 
-def _view(comparison: Comparison, record: str | None, figures: Sequence[ComparisonFigure]) -> View:
+def comparison_view(
+    comparison: Comparison, record: str | None, figures: Sequence[ComparisonFigure] = ()
+) -> View:
+    """Return the table of one record, or of all of them where `record` is None.
+
+    Parameters
+    ----------
+    comparison
+        The result.
+    record
+        Name of the record, or None.
+    figures
+        Figures of the comparison; those of this record go with the table.
+    """
     columns = comparison.columns(record)
     table = comparison.overall() if record is None else comparison.table(record)
     winners = {column: best(table, column) for column in columns}

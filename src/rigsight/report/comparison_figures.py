@@ -47,32 +47,49 @@ def comparison_figures(comparison: Comparison) -> list[ComparisonFigure]:
     comparison
         The result.
     """
-    styles = model_styles([c.name for c in comparison.competitors])
-    found = [_errors(comparison)]
-    for number, record in enumerate(comparison.records, 1):
-        stem = f"{number:02d}_{re.sub(r'[^A-Za-z0-9.-]+', '_', record.record.name)}"
-        if record.measured:
-            names, which = _drawn(comparison, record, tuple(record.measured))
-            panels = [
-                ResponsesPanel(
-                    path.replace("->", "\u2192"),
-                    measured,
-                    {name: own[path] for name in names if path in (own := record.simulated[name])},
-                )
-                for path, measured in record.measured.items()
-            ]
-            caption = f"Frequency responses on '{record.record.name}', measured against simulated, by one estimator.{which}"
-            drawing = model_responses(panels, styles)
-            found.append(ComparisonFigure(f"responses_{stem}.svg", caption, drawing, record.record.name))
-        if record.step is not None and record.moved:
-            names, which = _drawn(comparison, record, tuple(record.moved))
-            caption = f"Step on '{record.record.name}', offsets before it removed.{which}"
-            drawing = model_steps(_step_panels(comparison, record, names), styles)
-            found.append(ComparisonFigure(f"step_{stem}.svg", caption, drawing, record.record.name))
+    found = [overall_figure(comparison)]
+    for number in range(len(comparison.records)):
+        found += record_figures(comparison, number)
     return found
 
 
-def _errors(comparison: Comparison) -> ComparisonFigure:
+def record_figures(comparison: Comparison, index: int) -> list[ComparisonFigure]:
+    """Return the figures of one record: its responses or its step, or none.
+
+    Parameters
+    ----------
+    comparison
+        The result.
+    index
+        Place of the record in it.
+    """
+    record = comparison.records[index]
+    styles = model_styles([c.name for c in comparison.competitors])
+    stem = f"{index + 1:02d}_{re.sub(r'[^A-Za-z0-9.-]+', '_', record.record.name)}"
+    found = []
+    if record.measured:
+        names, which = _drawn(comparison, record, tuple(record.measured))
+        panels = [
+            ResponsesPanel(
+                path.replace("->", "\u2192"),
+                measured,
+                {name: own[path] for name in names if path in (own := record.simulated[name])},
+            )
+            for path, measured in record.measured.items()
+        ]
+        caption = f"Frequency responses on '{record.record.name}', measured against simulated, by one estimator.{which}"
+        drawing = model_responses(panels, styles)
+        found.append(ComparisonFigure(f"responses_{stem}.svg", caption, drawing, record.record.name))
+    if record.step is not None and record.moved:
+        names, which = _drawn(comparison, record, tuple(record.moved))
+        caption = f"Step on '{record.record.name}', offsets before it removed.{which}"
+        drawing = model_steps(_step_panels(comparison, record, names), styles)
+        found.append(ComparisonFigure(f"step_{stem}.svg", caption, drawing, record.record.name))
+    return found
+
+
+def overall_figure(comparison: Comparison) -> ComparisonFigure:
+    """Return the errors of all models over all records."""
     overall = comparison.overall()
     panels = []
     for column in comparison.columns():

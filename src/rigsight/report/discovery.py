@@ -37,7 +37,7 @@ class DiscoverySummary:
         for equation in found.equations:
             yield Padding(text(equation), (0, 0, 0, 2))
         table = Table.grid(padding=(0, 2))
-        for subject, words in _rows(found):
+        for subject, words in discovery_rows(found):
             table.add_row(text(subject, "bold"), text(words))
         yield Padding(table, (0, 0, 0, 2), expand=False)
         for name, alone in found.by_record:
@@ -59,7 +59,8 @@ def discovery_summary(discovery: Discovery) -> DiscoverySummary:
     return DiscoverySummary(discovery)
 
 
-def _rows(found: Discovery) -> Iterator[tuple[str, str]]:
+def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
+    """Yield subject and words: the numbers, the terms, the held-out error, the rivals."""
     for name, c in found.rig_parameters.items():
         yield name, estimate_text(Estimate(c.value, c.std, c.unit))
     for term in found.kept:

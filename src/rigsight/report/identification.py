@@ -42,7 +42,7 @@ class IdentificationSummary:
         yield text("One set for all estimation records", "bold")
         yield text(found.joint.statement)
         table = Table.grid(padding=(0, 2))
-        for subject, words in _joint_rows(found):
+        for subject, words in joint_rows(found):
             table.add_row(text(subject, "bold"), text(words))
         yield Padding(table, (0, 0, 0, 2), expand=False)
         if found.warnings:
@@ -79,21 +79,23 @@ def _amplitude_tables(found: Identification, text: Callable[..., Text], width: i
         for record in part:
             table.add_column(text(record.record.name), justify="right", overflow="fold")
         unit = found.units.get(part[0].motion.source, "")
-        table.add_row(text(f"amplitude{_in_brackets(unit)}"), *(text(f"{r.amplitude:.4g}") for r in part))
+        table.add_row(text(f"amplitude{unit_in_brackets(unit)}"), *(text(f"{r.amplitude:.4g}") for r in part))
         for name in names:
-            head = text(f"{name}{_in_brackets(found.units.get(name, ''))}")
-            table.add_row(head, *(text(_cell(record, name)) for record in part))
+            head = text(f"{name}{unit_in_brackets(found.units.get(name, ''))}")
+            table.add_row(head, *(text(estimate_cell(record, name)) for record in part))
         if any(record.resonance is not None for record in records):
             seen = ("-" if r.resonance is None else f"{r.resonance:.3g}" for r in part)
             table.add_row(text("resonance [rad/s]"), *map(text, seen))
         yield table
 
 
-def _in_brackets(unit: str) -> str:
+def unit_in_brackets(unit: str) -> str:
+    """Return a unit as it stands behind a name, nothing for a dimensionless one."""
     return f" [{unit}]" if unit not in ("", "1") else ""
 
 
-def _cell(record: RecordIdentification, name: str) -> str:
+def estimate_cell(record: RecordIdentification, name: str) -> str:
+    """Return a parameter of one record with its standard error, a dash where the record does not show it."""
     if name not in record.estimates:
         return "-"
     value, std = record.estimates[name]
@@ -104,7 +106,8 @@ def _cell(record: RecordIdentification, name: str) -> str:
     return f"({number.value} +/- {number.std}){power}" if power else f"{number.value} +/- {number.std}"
 
 
-def _joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
+def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
+    """Yield subject and words: the numbers of the joint fit, and how it follows each record."""
     fit = found.joint.fit.fit
     for name in found.joint.names:
         yield (

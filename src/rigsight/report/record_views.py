@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,9 @@ from rigsight.report.response_charts import response_chart
 from rigsight.report.responses import PathResponse
 from rigsight.report.sections import output_label
 from rigsight.report.wording import sentence_case, stage_names, told_unit
+
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
 
 
 @dataclass(frozen=True)
@@ -191,9 +195,7 @@ def _drawings(
     diagnosis: Diagnosis, trace: Trace, output: str, window: slice, detail: Detail, key: str
 ) -> tuple[PageFigure, ...]:
     """Return the static drawings: the whole record and, of steps and of records that were scored, a detail."""
-    names = stage_names(diagnosis)
-    # First and last alone: on paper nothing can be taken away.
-    drawn = {stage: names[stage] for stage in (next(iter(names)), list(names)[-1])}
+    drawn = _stages_drawn(diagnosis)
     has_detail = trace.role == diagnosis.scored_on or plot.step_window(trace, output) is not None
     what = f"{output_label(diagnosis, output)}, record {trace.record}"
     whole = page_figure(
@@ -218,6 +220,17 @@ def _drawings(
         sentence_case(f"{detail.title.removeprefix('Show ')}: {span}."),
     )
     return whole, near
+
+
+def record_drawing(diagnosis: Diagnosis, trace: Trace, output: str) -> Figure:
+    """Return measured and simulated output of a whole record, the first and the last simulation, with the errors below."""
+    return plot.comparison(diagnosis, trace, output, stages=_stages_drawn(diagnosis))
+
+
+def _stages_drawn(diagnosis: Diagnosis) -> dict[Stage, str]:
+    names = stage_names(diagnosis)
+    # First and last alone: on paper nothing can be taken away.
+    return {stage: names[stage] for stage in (next(iter(names)), list(names)[-1])}
 
 
 def _facts(diagnosis: Diagnosis, trace: Trace) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
 from rigsight.diagnose.result import STAGES, Diagnosis, Estimate
@@ -24,6 +24,9 @@ from rigsight.report.wording import (
     stages_told,
 )
 from rigsight.rigs import RIGS
+
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
 
 _TWO_SIDED = 1.96
 """Standard deviations of a 95 % interval."""
@@ -61,24 +64,28 @@ def effect_summaries(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[
     ]
 
 
-def budget_figure(diagnosis: Diagnosis) -> PageFigure:
+def budget_drawing(diagnosis: Diagnosis) -> Figure:
     """Return the gap budget of all outputs as a waterfall."""
     label = (
         f"Adding {effects_label(diagnosis.effects)}" if len(diagnosis.effects) == 1 else "Adding the effects"
     )
-    given = is_given(diagnosis)
+    titles = {output: output_label(diagnosis, output) for output in diagnosis.gap}
+    return plot.gap_budget(diagnosis, label, titles, is_given(diagnosis))
+
+
+def budget_figure(diagnosis: Diagnosis) -> PageFigure:
+    """Return the gap budget with the words that go with it."""
     alt = " ".join(
         f"{output}: {stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
         for output, gap in diagnosis.gap.items()
     )
     meaning = (
         " Re-identified: the same equations with the numbers that fit best."
-        if given
+        if is_given(diagnosis)
         else " No parameters were given: the rig's own equations with the numbers that fit best come first."
     )
-    titles = {output: output_label(diagnosis, output) for output in diagnosis.gap}
     return page_figure(
-        plot.gap_budget(diagnosis, label, titles, given),
+        budget_drawing(diagnosis),
         "figure-budget",
         f"Waterfall of the gap. {alt}",
         f"How the gap shrinks, step by step; the dashed line is what a perfect model would leave.{meaning}",
@@ -107,8 +114,13 @@ def interval_text(limits: tuple[float, float], stage: str) -> str:
     return f"{low} to {high}"
 
 
-def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
+def ranking_drawing(diagnosis: Diagnosis) -> Figure:
     """Return the candidates as bars."""
+    return plot.ranking(diagnosis, [effects_label(candidate.effects) for candidate in diagnosis.candidates])
+
+
+def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
+    """Return the ranking with the words that go with it."""
     names = [effects_label(candidate.effects) for candidate in diagnosis.candidates]
     scored = [
         f"{name} {c.excess:.3g}"
@@ -118,7 +130,7 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
     hatched = " Hatched: cannot be told from it by these records." if diagnosis.ambiguous_with else ""
     named = " Blue: the one named." if diagnosis.effects else ""
     return page_figure(
-        plot.ranking(diagnosis, names),
+        ranking_drawing(diagnosis),
         "figure-ranking",
         f"Bars of what each candidate leaves in units of the noise floor: {', '.join(scored[:16])}.",
         f"What each candidate leaves; shorter is better.{named}{hatched}",

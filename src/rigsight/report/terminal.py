@@ -54,7 +54,7 @@ class Summary:
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:
             yield text(sentence)
         table = Table.grid(padding=(0, 2))
-        for subject, words in _rows(diagnosis):
+        for subject, words in diagnosis_rows(diagnosis):
             table.add_row(text(subject, "bold"), text(words))
         yield Padding(table, (0, 0, 0, 2), expand=False)
         yield text(basis_sentence(diagnosis), "dim")
@@ -78,7 +78,8 @@ def summary(diagnosis: Diagnosis) -> Summary:
     return Summary(diagnosis)
 
 
-def _rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    """Yield subject and words: the gap of each output, the best candidates, the numbers of the effect."""
     for output, gap in diagnosis.gap.items():
         yield (
             f"gap in {output}",

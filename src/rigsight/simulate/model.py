@@ -32,9 +32,24 @@ class Model:
     values: dict[str, float]
     hold: Hold
 
+    # That of the dataclass would hold every symbol of the rig.
+    def __repr__(self) -> str:
+        effects = list(self.structure.effect_names)
+        return f"Model(rig={self.structure.rig.name!r}, effects={effects!r}, hold={self.hold!r})"
+
     @classmethod
     def of(cls, structure: Structure, values: Mapping[str, float], hold: Hold) -> Model:
-        """Make a model of a fitted structure, with numbers that were written into its equations as parameters again."""
+        """Make a model of a fitted structure, with numbers that were written into its equations as parameters again.
+
+        Parameters
+        ----------
+        structure
+            Rig and effects.
+        values
+            Value of each of its parameters, by name [SI].
+        hold
+            How the input behaves between samples.
+        """
         complete = {**values, **dict(structure.fixed)}
         whole = compose(structure.rig, structure.effects)
         return cls(whole, {name: complete[name] for name in whole.names}, hold)

@@ -24,7 +24,6 @@ from typing import Any, TypeVar
 
 from joblib import Parallel, delayed
 
-import rigsight
 from rigsight.errors import InputError, RigsightError
 
 Name = TypeVar("Name", int, str)
@@ -314,7 +313,7 @@ def _run_on_worker(run_one: Callable[[Name], Result], mark: Path | None, wanted:
 @functools.cache
 def source_version() -> str:
     """Return rigsight's version with a short hash of its source, which tells two states of development apart."""
-    package = Path(rigsight.__file__).parent
+    package = Path(__file__).parents[1]
     found = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):
         found.update(file.relative_to(package).as_posix().encode())

@@ -22,14 +22,14 @@ DETERMINES = {"delta_0": "c_y"}
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """A campaign, read and checked.
+    """A campaign, read or made of records, and checked.
 
     Attributes
     ----------
     title
         What a report calls it.
-    path, folder
-        The toml file and the folder that holds it.
+    path
+        The toml file; None for a campaign that was made of records in memory.
     rig
         The declared rig.
     constants
@@ -45,14 +45,28 @@ class Campaign:
     """
 
     title: str
-    path: Path
-    folder: Path
+    path: Path | None
     rig: Rig
     modelled: tuple[Effect, ...]
     constants: dict[str, float]
     parameters: dict[str, float]
     records: tuple[Record, ...]
     notes: tuple[str, ...] = ()
+
+    # That of the dataclass would hold every sample.
+    def __repr__(self) -> str:
+        names = [record.name for record in self.records]
+        return f"Campaign({self.title!r}, rig={self.rig.name!r}, records={names!r})"
+
+    @property
+    def called(self) -> str:
+        """How messages call it: by its file, or by its title."""
+        return self.title if self.path is None else self.path.name
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder that holds its file."""
+        return None if self.path is None else self.path.parent
 
     @property
     def estimation(self) -> tuple[Record, ...]:
@@ -79,24 +93,26 @@ def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> C
     ------
     InputError
         Naming file and key, or file, line and column, of what cannot be used, and the mend.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> rs.read_campaign("measurements/march")
+    Traceback (most recent call last):
+    rigsight.errors.InputError: measurements/march does not exist; name a campaign.toml or the folder that holds one.
     """
     path = locate(Path(campaign))
     table = read_campaign_table(path)
-    if table.rig.model not in RIGS:
-        raise InputError(
-            f"{path.name}: rig.model: is '{table.rig.model}'.{nearest(table.rig.model, RIGS)} Allowed: {', '.join(RIGS)}."
-        )
-    rig = RIGS[table.rig.model]
-    constants = _constants(path, rig, table.rig.constants)
-    modelled = _modelled(path, rig, table.rig.effects, own_effects)
-    parameters = _parameters(path, compose(rig, modelled), table.rig.parameters)
+    given = checked_simulation(
+        path.name, table.rig.model, table.rig.effects, table.rig.constants, table.rig.parameters, own_effects
+    )
     if all(record.role != "estimation" for record in table.records):
         raise InputError(
             f'{path.name}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
         )
     files = [file_inside(path, number, record) for number, record in enumerate(table.records, 1)]
     records = tuple(
-        read_listed_record(path, rig, number, record, file)
+        read_listed_record(path, given.rig, number, record, file)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
     )
     notes = (
@@ -107,69 +123,114 @@ def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> C
     return Campaign(
         title=table.title or path.parent.resolve().name,
         path=path,
-        folder=path.parent,
-        rig=rig,
-        modelled=modelled,
-        constants=constants,
-        parameters=parameters,
+        rig=given.rig,
+        modelled=given.modelled,
+        constants=given.constants,
+        parameters=given.parameters,
         records=_with_distinct_names(table, records),
         notes=notes,
     )
 
 
-def _constants(path: Path, rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
-    checked = _checked(path, "rig.constants", rig, rig.constants, given)
+@dataclass(frozen=True)
+class GivenSimulation:
+    """The rig, and what is known of the simulation in question; see `Campaign`."""
+
+    rig: Rig
+    modelled: tuple[Effect, ...]
+    constants: dict[str, float]
+    parameters: dict[str, float]
+
+
+def checked_simulation(
+    where: str,
+    rig: str,
+    effects: Iterable[str],
+    constants: Mapping[str, float],
+    parameters: Mapping[str, float],
+    own_effects: Iterable[Effect] = (),
+) -> GivenSimulation:
+    """Return a rig and the simulation in question with all defaults filled in.
+
+    Parameters
+    ----------
+    where
+        How messages begin: the file, or the title of a campaign in memory.
+    rig
+        Name of the rig.
+    effects
+        Names of the effects that the simulation has already.
+    constants, parameters
+        Known numbers by name [SI].
+    own_effects
+        Effects that may be named beside those of the catalogue.
+
+    Raises
+    ------
+    InputError
+        Naming the key of what is unknown, missing or out of range, and what is allowed.
+    """
+    if rig not in RIGS:
+        raise InputError(f"{where}: rig.model: is '{rig}'.{nearest(rig, RIGS)} Allowed: {', '.join(RIGS)}.")
+    found = RIGS[rig]
+    known = _constants(where, found, constants)
+    modelled = _modelled(where, found, effects, own_effects)
+    return GivenSimulation(found, modelled, known, _parameters(where, compose(found, modelled), parameters))
+
+
+def _constants(where: str, rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
+    checked = _checked(where, "rig.constants", rig, rig.constants, given)
     for constant in rig.constants:
         if constant.name in checked:
             continue
         if constant.default is None:
             raise InputError(
-                f"{path.name}: rig.constants.{constant.name}: is missing; {rig.name} needs it "
+                f"{where}: rig.constants.{constant.name}: is missing; {rig.name} needs it "
                 f"({constant.description} [{constant.unit}])."
             )
         checked[constant.name] = constant.default
     return {constant.name: checked[constant.name] for constant in rig.constants}
 
 
-def _modelled(path: Path, rig: Rig, names: Iterable[str], own: Iterable[Effect]) -> tuple[Effect, ...]:
+def _modelled(where: str, rig: Rig, names: Iterable[str], own: Iterable[Effect]) -> tuple[Effect, ...]:
     known = {effect.name: effect for effect in (*CATALOGUE, *own)}
     for name in names:
         if name not in known:
             raise InputError(
-                f"{path.name}: rig.effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
+                f"{where}: rig.effects: '{name}' is unknown.{nearest(name, known)} Known: {', '.join(known)}."
             )
     modelled = tuple(known[name] for name in names)
     try:
         compose(rig, modelled)
     except InputError as error:
-        raise InputError(f"{path.name}: rig.effects: {error}") from None
+        raise InputError(f"{where}: rig.effects: {error}") from None
     return modelled
 
 
-def _parameters(path: Path, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
+def _parameters(where: str, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
     rig = structure.rig
     constants = {constant.name for constant in rig.constants}
     own = [parameter for parameter in structure.parameters if parameter.name not in constants]
-    checked = _checked(path, "rig.parameters", rig, (*own, *rig.alternative_parameters), given)
+    checked = _checked(where, "rig.parameters", rig, (*own, *rig.alternative_parameters), given)
     for parameter in own:
         if parameter not in rig.parameters and parameter.name not in checked:
             if parameter.default is None:
                 raise InputError(
-                    f"{path.name}: rig.parameters.{parameter.name}: is missing; the simulation is said to have an effect that "
+                    f"{where}: rig.parameters.{parameter.name}: is missing; the simulation is said to have an effect that "
                     f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
                 )
             checked[parameter.name] = parameter.default
     for alternative, determined in DETERMINES.items():
         if alternative in checked and determined in checked:
             raise InputError(
-                f"{path.name}: rig.parameters.{alternative}: stands beside {determined}, which it determines; "
+                f"{where}: rig.parameters.{alternative}: stands beside {determined}, which it determines; "
                 "give one of the two."
             )
     return checked
 
 
 def _checked(
-    path: Path, key: str, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
+    where: str, key: str, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
 ) -> dict[str, float]:
     known = {parameter.name: parameter for parameter in allowed}
     checked = {}
@@ -177,12 +238,12 @@ def _checked(
         if name not in known:
             listed = ", ".join(known) or "none"
             raise InputError(
-                f"{path.name}: {key}.{name}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}."
+                f"{where}: {key}.{name}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}."
             )
         try:
             checked[name] = known[name].check(value)
         except InputError as error:
-            raise InputError(f"{path.name}: {key}.{name}: {error}") from None
+            raise InputError(f"{where}: {key}.{name}: {error}") from None
     return checked
 
 

@@ -17,6 +17,7 @@ from rigsight.errors import InputError, check_option
 from rigsight.identify.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
+from rigsight.simulate.model import Model
 from rigsight.workflow.campaign import Campaign, read_campaign
 from rigsight.workflow.compare_files import comparison_csv, comparison_json
 from rigsight.workflow.diagnose import versions
@@ -67,24 +68,13 @@ def run_compare(
         If the campaign or a model cannot be used, a model is of another rig, no model can be simulated on any record, or the
         results cannot be written; nothing is written then.
     """
-    check_option("The method", method, METHODS)
-    if not (math.isfinite(step_seconds) and step_seconds > 0.0):
-        raise InputError(f"The step window must last a positive number of seconds, got {step_seconds!r}.")
-    if not models:
-        raise InputError(
-            f"Name at least one model: a {MODEL_FILE}, a folder that holds one, or a published set."
-        )
+    _check_wishes(models, method, step_seconds)
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
     read = read_campaign(campaign)
-    competitors = _competitors(models, read)
-    structures = {c.model.structure.effect_names: c.model.structure for c in competitors}
-    prepare_kernels(list(structures.values()), jobs, listener)
-    comparison = compare_campaign(read, competitors, cast("Method", method), step_seconds, jobs, listener)
-    if not comparison.scores:
-        reasons = "\n".join(f"- {f.model} on '{f.record}': {f.reason}" for f in comparison.failures[:10])
-        raise InputError(f"No model can be compared on any record of {read.path}.\n{reasons}")
+    competitors = named_competitors(models, read)
+    comparison = compare_campaign(read, competitors, method, step_seconds, jobs, listener)
     if out is not None:
         quoted = shlex.join(["rigsight", "compare", str(campaign), *map(str, models)])
         write_comparison(comparison, Path(out), command or quoted)
@@ -94,12 +84,12 @@ def run_compare(
 def compare_campaign(
     campaign: Campaign,
     competitors: Sequence[Competitor],
-    method: Method = "local_rational",
+    method: str = "local_rational",
     step_seconds: float = 4.0,
     n_jobs: int = 1,
     listener: Listener = silent,
 ) -> Comparison:
-    """Score models on all records of a campaign that was read.
+    """Score models on all records of a campaign that was read or made of records.
 
     Parameters
     ----------
@@ -109,15 +99,24 @@ def compare_campaign(
         Models of its rig.
     method, step_seconds, n_jobs, listener
         As in `run_compare`.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown, the step window is no positive number, or no model can be simulated on any record.
     """
+    _check_wishes(competitors, method, step_seconds)
+    chosen = cast("Method", method)
     rig = campaign.rig
+    structures = {c.model.structure.effect_names: c.model.structure for c in competitors}
+    prepare_kernels(list(structures.values()), n_jobs, listener)
     # One model without a spring, and all are run in windows: the same yardstick for everyone.
     drifts = any(c.model.values.get("k", math.inf) == 0.0 for c in competitors) and rig.is_driven
     floors = tuple(
         Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound)
         for floor in noise_floors(rig, campaign.records, drifts)
     )
-    yardstick = Yardstick(rig, floors, method, step_seconds)
+    yardstick = Yardstick(rig, floors, chosen, step_seconds)
     length = window_length(rig, campaign.records) if drifts else None
     stage = Stage(COMPARING, len(campaign.records), listener)
     found = []
@@ -129,10 +128,10 @@ def compare_campaign(
     ):
         found.append(record)
         stage.finished(record.record.name)
-    return Comparison(
+    comparison = Comparison(
         title=campaign.title,
         rig=rig.name,
-        method=method,
+        method=chosen,
         step_seconds=step_seconds,
         window_length=length,
         competitors=tuple(competitors),
@@ -140,6 +139,20 @@ def compare_campaign(
         floors=floors,
         notes=tuple(_notes(campaign, competitors)),
     )
+    if not comparison.scores:
+        reasons = "\n".join(f"- {f.model} on '{f.record}': {f.reason}" for f in comparison.failures[:10])
+        raise InputError(f"No model can be compared on any record of {campaign.called}.\n{reasons}")
+    return comparison
+
+
+def _check_wishes(models: Sequence[object], method: str, step_seconds: float) -> None:
+    check_option("The method", method, METHODS)
+    if not (math.isfinite(step_seconds) and step_seconds > 0.0):
+        raise InputError(f"The step window must last a positive number of seconds, got {step_seconds!r}.")
+    if not models:
+        raise InputError(
+            f"Name at least one model: a {MODEL_FILE}, a folder that holds one, or a published set."
+        )
 
 
 def write_comparison(comparison: Comparison, out: Path, command: str) -> tuple[Path, ...]:
@@ -162,18 +175,43 @@ def write_comparison(comparison: Comparison, out: Path, command: str) -> tuple[P
     )
 
 
-def _competitors(models: Sequence[str | Path], campaign: Campaign) -> list[Competitor]:
+def named_competitors(models: Sequence[str | Path], campaign: Campaign) -> list[Competitor]:
+    """Return models with names of their own.
+
+    Parameters
+    ----------
+    models
+        As in `run_compare`.
+    campaign
+        The campaign on which they are to be compared.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read or is of another rig.
+    """
     found: list[Competitor] = []
     for text in map(str, models):
         name, source = _name_and_source(text)
-        model = named_model(source)
-        if model.structure.rig.name != campaign.rig.name:
-            raise InputError(
-                f"Model '{text}' is of the rig '{model.structure.rig.name}', the records of {campaign.path.name} are of the rig "
-                f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
-            )
+        model = of_this_rig(text, named_model(source), campaign)
         found.append(Competitor(_distinct(name, [c.name for c in found]), model, source))
     return found
+
+
+def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
+    """Return a model that can be compared on the records of a campaign.
+
+    Raises
+    ------
+    InputError
+        If it is of another rig.
+    """
+    if model.structure.rig.name != campaign.rig.name:
+        raise InputError(
+            f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
+            f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
+        )
+    return model
 
 
 def _name_and_source(text: str) -> tuple[str, str]:

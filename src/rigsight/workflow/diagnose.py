@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import platform
 import shlex
 from collections.abc import Iterable, Sequence
@@ -73,24 +74,7 @@ def run_diagnose(
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    read = read_campaign(campaign, own_effects)
-    candidates = [effect for effect in effects if read.rig.offers(effect) and effect not in read.modelled]
-    prepare_kernels(structures_to_try(read.rig, candidates, read.modelled), jobs, listener)
-    stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
-    # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
-    with (
-        threadpool_limits(limits=1, user_api="blas"),
-        FitJournal(Path(campaign), lambda count: _tell_going_on(count, listener)) as journal,
-    ):
-        diagnosis = diagnose(
-            task_of(read),
-            candidates,
-            seed=seed,
-            n_jobs=jobs,
-            progress=stage.finished,
-            prepare=lambda structures: prepare_kernels(structures, jobs, listener, for_looks=True),
-            memory=journal,
-        )
+    diagnosis = diagnose_campaign(read_campaign(campaign, own_effects), effects, seed, jobs, listener)
     if out is not None:
         write_diagnosis(
             diagnosis,
@@ -100,6 +84,50 @@ def run_diagnose(
             (*effects, *own_effects),
         )
     return diagnosis
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    effects: Sequence[Effect] = CATALOGUE,
+    seed: int = 0,
+    n_jobs: int = 1,
+    listener: Listener = silent,
+) -> Diagnosis:
+    """Diagnose the gap between the simulation that a campaign gives and its records.
+
+    Parameters
+    ----------
+    campaign
+        A campaign that was read or made of records; only one with a file is taken up again after an interruption.
+    effects
+        Candidates; those that the rig does not offer or the simulation has already are passed over.
+    seed, n_jobs, listener
+        As in `run_diagnose`.
+
+    Raises
+    ------
+    SimulationError
+        If the given simulation cannot be run.
+    """
+    candidates = [e for e in effects if campaign.rig.offers(e) and e not in campaign.modelled]
+    prepare_kernels(structures_to_try(campaign.rig, candidates, campaign.modelled), n_jobs, listener)
+    stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
+    journal = (
+        contextlib.nullcontext()
+        if campaign.path is None
+        else FitJournal(campaign.path, lambda count: _tell_going_on(count, listener))
+    )
+    # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"), journal as memory:
+        return diagnose(
+            task_of(campaign),
+            candidates,
+            seed=seed,
+            n_jobs=n_jobs,
+            progress=stage.finished,
+            prepare=lambda structures: prepare_kernels(structures, n_jobs, listener, for_looks=True),
+            memory=memory,
+        )
 
 
 def _tell_going_on(count: int, listener: Listener) -> None:
@@ -118,7 +146,7 @@ def task_of(campaign: Campaign) -> Task:
 
 
 def write_diagnosis(
-    diagnosis: Diagnosis, out: Path, command: str, seed: int, effects: Iterable[Effect] = CATALOGUE
+    diagnosis: Diagnosis, out: Path, command: str, seed: int | None, effects: Iterable[Effect] = CATALOGUE
 ) -> tuple[Path, ...]:
     """Write the three results of a diagnosis into a folder, all or none; the report shows the equations of these effects.
 

@@ -73,20 +73,56 @@ def run_discover(
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    read = read_campaign(campaign)
-    task = discovery_task(read)
-    stage = Stage(DISCOVERING, _STEPS, listener)
-    chosen = cast("Method", method)
-    found = discover(task, chosen, pointwise, seed, stage.finished)
-    notes = (*read.notes, *(note for record in read.records for note in record.notes))
-    found = replace(found, warnings=(*found.warnings, *notes))
-    if one_by_one:
-        found = replace(
-            found, by_record=_one_by_one(read, task, chosen, pointwise, seed, jobs, stage.finished)
-        )
+    found = discover_campaign(
+        read_campaign(campaign),
+        method,
+        pointwise=pointwise,
+        one_by_one=one_by_one,
+        seed=seed,
+        n_jobs=jobs,
+        listener=listener,
+    )
     if out is not None:
         write_discovery(found, Path(out))
     return found
+
+
+def discover_campaign(
+    campaign: Campaign,
+    method: str = "discrepancy",
+    *,
+    pointwise: bool = False,
+    one_by_one: bool = False,
+    seed: int = 0,
+    n_jobs: int = 1,
+    listener: Listener = silent,
+) -> Discovery:
+    """Discover the governing equations behind the records of a campaign that was read or made of records.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    method, pointwise, one_by_one, seed, n_jobs, listener
+        As in `run_discover`.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown or the records cannot be used.
+    SimulationError
+        If the rig's own equations cannot be simulated near the records.
+    """
+    chosen = cast("Method", check_option("The method", method, METHODS))
+    task = discovery_task(campaign)
+    stage = Stage(DISCOVERING, _STEPS, listener)
+    found = discover(task, chosen, pointwise, seed, stage.finished)
+    notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
+    found = replace(found, warnings=(*found.warnings, *notes))
+    if not one_by_one:
+        return found
+    alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
+    return replace(found, by_record=alone)
 
 
 def discovery_task(campaign: Campaign) -> Task:

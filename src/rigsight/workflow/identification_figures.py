@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from rigsight.plot import (
     overlaid_responses,
     svg_text,
 )
+
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
 
 AMPLITUDES_FILE = "amplitudes.svg"
 RESPONSES_FILE = "responses.svg"
@@ -36,21 +40,38 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
     """
     found: dict[str, tuple[str, str]] = {}
     for record in identification.records:
-        panels = _panels(record, identification)
-        if panels:
+        drawing = bode_figure(record, identification)
+        if drawing is not None:
             file = _free_name(f"bode_{_plain(record.record.name)}", found)
             what = f"Bode plot of record '{record.record.name}', measured against fitted, 95 % bands"
-            found[file] = (what, svg_text(bode(panels), file))
-    columns = _columns(identification)
-    if columns:
+            found[file] = (what, svg_text(drawing, file))
+    drawing = responses_figure(identification)
+    if drawing is not None:
         what = "Magnitudes of all records over each other, measured and fitted (as the thesis's Figures 5.6 and 5.7)"
-        found[RESPONSES_FILE] = (what, svg_text(overlaid_responses(columns), RESPONSES_FILE))
-    parameters = _parameters(identification)
-    if parameters:
+        found[RESPONSES_FILE] = (what, svg_text(drawing, RESPONSES_FILE))
+    drawing = amplitudes_figure(identification)
+    if drawing is not None:
         what = "Parameters of each record over its amplitude, with 95 % intervals (as the thesis's Figures 5.8 and 5.9)"
-        figure = amplitude_dependence(parameters, _amplitude_label(identification))
-        found[AMPLITUDES_FILE] = (what, svg_text(figure, AMPLITUDES_FILE))
+        found[AMPLITUDES_FILE] = (what, svg_text(drawing, AMPLITUDES_FILE))
     return found
+
+
+def bode_figure(record: RecordIdentification, identification: Identification) -> Figure | None:
+    """Return the Bode plot of one record, measured against fitted; None where it has no frequency response."""
+    panels = _panels(record, identification)
+    return bode(panels) if panels else None
+
+
+def responses_figure(identification: Identification) -> Figure | None:
+    """Return the magnitudes of all records over each other; None where there are none."""
+    columns = _columns(identification)
+    return overlaid_responses(columns) if columns else None
+
+
+def amplitudes_figure(identification: Identification) -> Figure | None:
+    """Return the parameters of each record over its amplitude; None where no record gave any."""
+    parameters = _parameters(identification)
+    return amplitude_dependence(parameters, _amplitude_label(identification)) if parameters else None
 
 
 def _plain(name: str) -> str:

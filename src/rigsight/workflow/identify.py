@@ -69,18 +69,33 @@ def run_identify(
         If the campaign cannot be used, a record is too short for the resolution wished for, no record shows the motion, or the
         results cannot be written; nothing is written then.
     """
-    check_option("The method", method, METHODS)
-    if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
-        raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
+    wishes = checked_wishes(method, resolution)
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    read = read_campaign(campaign)
-    prepare_kernels([compose(read.rig)], jobs, listener)
-    identification = identify_campaign(read, Wishes(cast("Method", method), resolution), jobs, listener)
+    identification = identify_campaign(read_campaign(campaign), wishes, jobs, listener)
     if out is not None:
         write_identification(identification, Path(out))
     return identification
+
+
+def checked_wishes(method: str, resolution: float | None) -> Wishes:
+    """Return how records are to be read.
+
+    Parameters
+    ----------
+    method, resolution
+        As in `run_identify`.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown or the resolution is no positive number.
+    """
+    check_option("The method", method, METHODS)
+    if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
+        raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
+    return Wishes(cast("Method", method), resolution)
 
 
 def identify_campaign(
@@ -91,7 +106,7 @@ def identify_campaign(
     Parameters
     ----------
     campaign
-        A campaign that was read.
+        A campaign that was read or made of records.
     wishes
         How its records are to be read.
     n_jobs
@@ -105,6 +120,7 @@ def identify_campaign(
         If a record is too short for the resolution wished for, or no record shows the motion.
     """
     no_spring = campaign.parameters.get("k") == 0.0
+    prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
     # Threads: the work is linear algebra, which lets others run.
     found = []

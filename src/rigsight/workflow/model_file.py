@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -54,9 +54,38 @@ def read_model(model: str | Path, own_effects: Iterable[Effect] = ()) -> Model:
     ------
     InputError
         Naming file and key, or line and column, of what cannot be used, and the mend.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> rs.read_model("diagnosis")
+    Traceback (most recent call last):
+    rigsight.errors.InputError: diagnosis does not exist; name a model.json or the folder that holds one.
     """
     path = _locate(Path(model))
-    table = _checked_table(path, json_object(path, "model", _MEND))
+    return _model(path, json_object(path, "model", _MEND), own_effects)
+
+
+def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> Model:
+    """Return the model that a result holds.
+
+    Parameters
+    ----------
+    content
+        What ``model.json`` would hold.
+    own_effects
+        Effects that the model may name beside those known to everybody.
+
+    Raises
+    ------
+    InputError
+        Naming the key of what cannot be used.
+    """
+    return _model(Path(MODEL_FILE), dict(content), own_effects)
+
+
+def _model(path: Path, content: dict[str, Any], own_effects: Iterable[Effect]) -> Model:
+    table = _checked_table(path, content)
     structure = _structure(path, table, own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 

@@ -81,17 +81,59 @@ def run_simulate(
         require_outputs=estimated,
         hold=read.hold,
     )
-    state = None
-    if estimated:
-        state = _estimated_state(read, driven)
-    elif isinstance(initial_state, Mapping) and initial_state:
-        state = _initial_state(read, driven, initial_state)
-    simulated = simulate(read.structure, read.values, driven, state)
+    simulated = simulate_model(read, driven, initial_state)
     if out is not None:
         names = [signal.name for signal in (*rig.inputs, *rig.outputs)]
         file = Path(out)
         write_together(file.parent, {file.name: _csv_text(simulated, names)})
     return simulated
+
+
+def simulate_model(
+    model: Model,
+    record: Record,
+    initial_state: Mapping[str, float] | Literal["estimated"] | None = None,
+) -> Record:
+    """Simulate a model for the input of a record.
+
+    Parameters
+    ----------
+    model
+        The model.
+    record
+        Its input is simulated with its hold; its outputs are read only where initial states are estimated.
+    initial_state
+        States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
+        input sample; ``"estimated"`` fits all of them to the outputs measured in the record, and nothing else.
+
+    Returns
+    -------
+    A copy of the record with the outputs that the model predicts, shape (n_samples,) each.
+
+    Raises
+    ------
+    InputError
+        If the record lacks the input, an initial state is unknown, or states cannot be estimated from the record.
+    SimulationError
+        If the motion leaves the range of numbers or the model is too stiff.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rigsight as rs
+    >>> given = {"m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+    >>> model = rs.make_model("axis", {"gain": 1.0, **given})
+    >>> push = rs.Record("push", dt=0.01, signals={"u": np.repeat([0.0, 4.0], [10, 1000])}, units={"u": "N"})
+    >>> moved = rs.simulate_model(model, push)
+    >>> print(f"{1e3 * moved['x'][-1]:.2f} mm at rest")
+    5.00 mm at rest
+    """
+    state = None
+    if initial_state == "estimated":
+        state = _estimated_state(model, record)
+    elif isinstance(initial_state, Mapping) and initial_state:
+        state = _initial_state(model, record, initial_state)
+    return simulate(model.structure, model.values, record, state)
 
 
 def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> NDArray[np.float64]:

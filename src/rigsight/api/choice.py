@@ -1,0 +1,32 @@
+"""Which of several things by name does a caller mean? The first where none is named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from rigsight.errors import InputError, check_option
+
+T = TypeVar("T")
+
+
+def named(what: str, name: str | None, known: Mapping[str, T]) -> T:
+    """Return the thing of this name, the first one for None.
+
+    Parameters
+    ----------
+    what
+        What kind of thing, for messages.
+    name
+        Its name, or None.
+    known
+        All there are, by name.
+
+    Raises
+    ------
+    InputError
+        If there is none, or none of this name.
+    """
+    if not known:
+        raise InputError(f"The result holds no {what} to be shown.")
+    return next(iter(known.values())) if name is None else known[check_option(f"The {what}", name, known)]

@@ -1,0 +1,109 @@
+"""Which equation do the records propose by themselves? The discovery as an estimator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+from rigsight.api.discovery_result import DiscoveryResult
+from rigsight.api.estimator import CampaignEstimator, campaign_of
+from rigsight.workflow.campaign import Campaign
+from rigsight.workflow.discover import discover_campaign
+from rigsight.workflow.kernels import checked_jobs
+from rigsight.workflow.model_file import model_of
+from rigsight.workflow.progress_display import listening
+
+
+class EquationDiscoverer(CampaignEstimator):
+    """Discover the governing equations by sparse regression, polished in free run and chosen by held-out records.
+
+    What ``rigsight discover`` does.
+
+    Parameters
+    ----------
+    method
+        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. ``"full"``: the whole acceleration is.
+    pointwise
+        Regress sample by sample instead of in the weak form.
+    one_by_one
+        Discover on each estimation record alone as well.
+    seed
+        Seed of the ensembles.
+    n_jobs
+        Records discovered on at the same time; None for one per processor.
+    verbose
+        Show progress on stderr.
+
+    Attributes
+    ----------
+    discovery_
+        What was found: equations, coefficients with standard errors, inclusion probabilities.
+    model_
+        The simulation with the equations found.
+
+    References
+    ----------
+    D. A. Messenger and D. M. Bortz, "Weak SINDy", Multiscale Model. Simul. 19 (2021) 1474. L. Boninsegna, F. Nueske and C.
+    Clementi, J. Chem. Phys. 148 (2018) 241723, for stepwise sparse regression. U. Fasel et al., Proc. R. Soc. A 478 (2022)
+    20210904, for inclusion probabilities.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> discoverer = rs.EquationDiscoverer(n_jobs=1).fit(rs.example_campaign())
+    >>> [term.name for term in discoverer.discovery_.kept]
+    ['cubic_stiffness']
+    """
+
+    discovery_: DiscoveryResult
+
+    def __init__(
+        self,
+        method: str = "discrepancy",
+        pointwise: bool = False,
+        one_by_one: bool = False,
+        seed: int = 0,
+        n_jobs: int | None = None,
+        verbose: bool = False,
+    ) -> None:
+        self.method = method
+        self.pointwise = pointwise
+        self.one_by_one = one_by_one
+        self.seed = seed
+        self.n_jobs = n_jobs
+        self.verbose = verbose
+
+    def fit(self, campaign: Campaign | str | Path) -> Self:
+        """Discover the equations behind the records of a campaign.
+
+        Parameters
+        ----------
+        campaign
+            A campaign, or the toml file or the folder that holds one.
+
+        Returns
+        -------
+        The estimator itself.
+
+        Raises
+        ------
+        InputError
+            If the campaign cannot be used or the method is unknown.
+        SimulationError
+            If the rig's own equations cannot be simulated near the records.
+        """
+        jobs = checked_jobs(self.n_jobs)
+        read = campaign_of(campaign)
+        with listening(quiet=not self.verbose) as listener:
+            found = discover_campaign(
+                read,
+                self.method,
+                pointwise=self.pointwise,
+                one_by_one=self.one_by_one,
+                seed=self.seed,
+                n_jobs=jobs,
+                listener=listener,
+            )
+        self.discovery_ = DiscoveryResult.of(found)
+        self.model_ = model_of(found.model)
+        return self

@@ -1,0 +1,93 @@
+"""Which numbers has the linear rig behind the records? The identification as an estimator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Self
+
+from rigsight.api.estimator import CampaignEstimator, campaign_of
+from rigsight.api.identification_result import IdentificationResult
+from rigsight.workflow.campaign import Campaign
+from rigsight.workflow.identify import checked_wishes, identify_campaign
+from rigsight.workflow.kernels import checked_jobs
+from rigsight.workflow.model_file import model_of
+from rigsight.workflow.progress_display import listening
+
+
+class LinearIdentifier(CampaignEstimator):
+    """Identify the parameters of the linear rig, from each record alone and from all of them together.
+
+    Frequency responses of sweeps and multisines are estimated and fitted, steps are fitted over time, and one set of numbers
+    is fitted to all estimation records by output error. What ``rigsight identify`` does.
+
+    Parameters
+    ----------
+    method
+        Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
+    resolution
+        Width in frequency wished for [rad/s]; None takes what each record gives.
+    n_jobs
+        Records identified at the same time; None for one per processor.
+    verbose
+        Show progress on stderr.
+
+    Attributes
+    ----------
+    identification_
+        What was found: numbers of each record and of all together, with standard errors.
+    model_
+        The linear simulation with the numbers of all records together.
+
+    References
+    ----------
+    R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 7 and 9. T.
+    McKelvey and G. Guerin, 16th IFAC Symposium on System Identification (2012), for the local rational method.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> identifier = rs.LinearIdentifier(n_jobs=1).fit(rs.example_campaign())
+    >>> [record.record.name for record in identifier.identification_.records]
+    ['fit']
+    """
+
+    identification_: IdentificationResult
+
+    def __init__(
+        self,
+        method: str = "local_rational",
+        resolution: float | None = None,
+        n_jobs: int | None = None,
+        verbose: bool = False,
+    ) -> None:
+        self.method = method
+        self.resolution = resolution
+        self.n_jobs = n_jobs
+        self.verbose = verbose
+
+    def fit(self, campaign: Campaign | str | Path) -> Self:
+        """Identify the estimation records of a campaign; its validation records are only scored.
+
+        Parameters
+        ----------
+        campaign
+            A campaign, or the toml file or the folder that holds one.
+
+        Returns
+        -------
+        The estimator itself.
+
+        Raises
+        ------
+        InputError
+            If the campaign cannot be used, the method is unknown, a record is too short for the resolution wished for, or no
+            record shows the motion.
+        """
+        wishes = checked_wishes(self.method, self.resolution)
+        jobs = checked_jobs(self.n_jobs)
+        read = campaign_of(campaign)
+        with listening(quiet=not self.verbose) as listener:
+            found = identify_campaign(read, wishes, jobs, listener)
+        self.identification_ = IdentificationResult.of(found)
+        self.model_ = model_of(found.model)
+        return self

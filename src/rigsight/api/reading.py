@@ -1,0 +1,96 @@
+"""How is a single measured file read from Python? With the signals of a rig that is named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rigsight.errors import check_option
+from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
+from rigsight.records import read_record as read_file
+from rigsight.rigs import RIGS
+
+
+def read_record(
+    path: str | Path,
+    rig: str,
+    *,
+    columns: Mapping[str, ColumnMapping] | None = None,
+    require_outputs: bool = True,
+    name: str | None = None,
+    role: Role = "estimation",
+    kind: Kind = "operation",
+    amplitude: float | None = None,
+    hold: Hold = "foh",
+    dt: float | None = None,
+    resample: float | None = None,
+) -> Record:
+    r"""Read, check and repair one record.
+
+    Parameters
+    ----------
+    path
+        Delimited text, or a measurement file of a format that ``rigsight inspect`` reads.
+    rig
+        Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x) or ``"element"`` (t, x, force).
+    columns
+        Where signals and time ``t`` stand, and how they become SI units; by default in columns of their own names.
+    require_outputs
+        False to simulate the record: its time and inputs suffice.
+    name
+        How results call the record, by default the file's name without its ending.
+    role
+        ``"estimation"`` may be fitted, ``"validation"`` is only ever scored.
+    kind
+        What drove the rig: ``"sweep"``, ``"step"``, ``"multisine"`` or ``"operation"``.
+    amplitude
+        Amplitude of the input, in its unit.
+    hold
+        The input between samples: ``"zoh"``, ``"foh"`` or ``"band_limited"``.
+    dt
+        Sample time [s] of a file without time.
+    resample
+        Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
+
+    Returns
+    -------
+    Signals of shape (n_samples,) in SI units, with notes on what was repaired.
+
+    Raises
+    ------
+    InputError
+        Naming file, line or column, and the mend, for whatever makes the record unusable.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import rigsight as rs
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "push.csv"
+    ...     rows = [f"{0.01 * i:.2f},{i % 7},{3 + i % 5}" for i in range(50)]
+    ...     _ = file.write_text("time,current,travel\n" + "\n".join(rows))
+    ...     columns = {
+    ...         "t": rs.ColumnMapping("time"),
+    ...         "u": rs.ColumnMapping("current"),
+    ...         "x": rs.ColumnMapping("travel", scale=1e-3),
+    ...     }
+    ...     record = rs.read_record(file, "axis", columns=columns)
+    >>> record.name, record.n_samples, round(record.dt, 6), float(record["x"][0])
+    ('push', 50, 0.01, 0.003)
+    """
+    found = RIGS[check_option("The rig", rig, RIGS)]
+    return read_file(
+        Path(path),
+        found.inputs,
+        found.outputs,
+        columns=columns,
+        require_outputs=require_outputs,
+        name=name,
+        role=role,
+        kind=kind,
+        amplitude=amplitude,
+        hold=hold,
+        dt=dt,
+        resample=resample,
+    )

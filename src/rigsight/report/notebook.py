@@ -1,0 +1,120 @@
+"""How does a result look in a notebook? What the terminal says, as a small piece of HTML that needs nothing beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from rigsight.compare import Comparison
+from rigsight.diagnose.result import Diagnosis
+from rigsight.discover import Discovery
+from rigsight.identify.identification import Identification
+from rigsight.report.comparison import comparison_view
+from rigsight.report.discovery import discovery_rows
+from rigsight.report.identification import estimate_cell, joint_rows, unit_in_brackets
+from rigsight.report.render import environment
+from rigsight.report.terminal import diagnosis_rows
+from rigsight.report.wording import (
+    advice_sentences,
+    ambiguity_sentence,
+    basis_sentence,
+    verdict_name,
+    verdict_sentence,
+)
+
+
+@dataclass(frozen=True)
+class NotebookTable:
+    """A table of texts; `heads` may be empty, the first cell of a row says what the row is of."""
+
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def diagnosis_html(diagnosis: Diagnosis) -> str:
+    """Return verdict, gap, ranking and the numbers of the effect.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    """
+    lacking = diagnosis.missing_force
+    sentences = [
+        verdict_sentence(diagnosis),
+        "" if lacking is None else lacking.sentence,
+        ambiguity_sentence(diagnosis),
+        *advice_sentences(diagnosis),
+        basis_sentence(diagnosis),
+    ]
+    rows = NotebookTable((), list(diagnosis_rows(diagnosis)))
+    return _html(f"{verdict_name(diagnosis)}: {diagnosis.title}", sentences, [rows])
+
+
+def identification_html(identification: Identification) -> str:
+    """Return the parameters of each record in the order of amplitudes, and those of all records together.
+
+    Parameters
+    ----------
+    identification
+        The result.
+    """
+    records = sorted(identification.records, key=lambda record: record.amplitude)
+    names = dict.fromkeys(name for record in records for name in record.estimates)
+    unit = identification.units.get(records[0].motion.source, "")
+    alone = NotebookTable(
+        ("record", *(record.record.name for record in records)),
+        [
+            (f"amplitude{unit_in_brackets(unit)}", *(f"{record.amplitude:.4g}" for record in records)),
+            *(
+                (
+                    f"{name}{unit_in_brackets(identification.units.get(name, ''))}",
+                    *(estimate_cell(record, name) for record in records),
+                )
+                for name in names
+            ),
+        ],
+    )
+    together = NotebookTable(("all records", ""), list(joint_rows(identification)))
+    sentences = [identification.amplitude_statement, identification.joint.statement]
+    return _html(f"Identified: {identification.title}", sentences, [alone, together], identification.warnings)
+
+
+def discovery_html(discovery: Discovery) -> str:
+    """Return the equations, their numbers and terms, and the error on the held-out records.
+
+    Parameters
+    ----------
+    discovery
+        The result.
+    """
+    rows = NotebookTable((), list(discovery_rows(discovery)))
+    return _html(f"Discovered: {discovery.title}", discovery.equations, [rows], discovery.warnings)
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Return the errors of all models over all records, the smallest of each column marked with a star.
+
+    Parameters
+    ----------
+    comparison
+        The result.
+    """
+    overall = comparison_view(comparison, None)
+    rows = [
+        (name, *(f"{cell.text}{' *' if cell.is_best else ''}" for cell in cells))
+        for name, cells in overall.rows.items()
+    ]
+    table = NotebookTable(("model", *overall.heads), [*rows, ("noise floor", *overall.floor)])
+    sentence = f"Errors over {overall.title}; * smallest of its column."
+    return _html(f"Compared: {comparison.title}", [sentence], [table], comparison.notes)
+
+
+def _html(
+    title: str, sentences: Iterable[str], tables: Sequence[NotebookTable], warnings: Sequence[str] = ()
+) -> str:
+    return (
+        environment()
+        .get_template("notebook.html.jinja")
+        .render(title=title, sentences=[s for s in sentences if s], tables=tables, warnings=warnings)
+    )
