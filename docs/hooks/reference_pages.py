@@ -26,6 +26,7 @@ PACKAGES = (
     "plot",
     "report",
     "export",
+    "api",
 )
 """From what is measured to what is shown, as the rooms of the house lie above each other."""
 COMMANDS = (
