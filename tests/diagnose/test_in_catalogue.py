@@ -52,8 +52,24 @@ def test_more_left_above_the_floor_is_less_sure(stated) -> None:
     )
 
 
-def test_two_effects_that_are_one_force_are_never_more_than_half_sure(stated) -> None:
-    assert stated(("quadratic_damping", "stribeck_friction"), 1.0, 50.0, single=20.0) <= 0.5
+@pytest.mark.parametrize(
+    "pair",
+    [
+        ("quadratic_damping", "stribeck_friction"),
+        ("bouc_wen_hysteresis", "gravity_pendulum"),
+        ("free_play", "end_stop"),
+        ("cubic_stiffness", "backlash"),
+    ],
+)
+def test_two_effects_that_are_one_force_are_never_more_than_half_sure(stated, pair) -> None:
+    assert stated(pair, 1.0, 50.0, single=20.0) <= 0.5
+
+
+@pytest.mark.parametrize(
+    "pair", [("bouc_wen_hysteresis", "quadratic_damping"), ("cubic_stiffness", "flexible_mode")]
+)
+def test_two_effects_of_different_parts_may_be_sure(stated, pair) -> None:
+    assert stated(pair, 1.0, 50.0, single=20.0) > 0.9
 
 
 def test_unknown_leaves_little_for_all_candidates_and_no_gap_none(stated) -> None:

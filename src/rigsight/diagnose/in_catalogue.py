@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.verdict import AT_FLOOR, Judgement
 from rigsight.effects import Effect
+from rigsight.effects import symbols as canonical
 
 _ONE_FORCE = 0.5
 """Most that is given to two effects that are one force together: another form of that force would look the same."""
@@ -71,12 +72,22 @@ def _chance_of_a_relative(left: float, gap: float) -> float:
 
 
 def _one_force(effects: Sequence[Effect]) -> bool:
-    """Return True for two effects that are both forces without memory of the same signals: their sum is one more such force."""
-    if len(effects) < 2 or any(effect.torque is None or effect.states for effect in effects):
+    """Return True for two effects of the spring or two forces without memory of the same signals: their sum is one more such."""
+    if len(effects) < 2:
         return False
-    read = [
-        {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
-        for effect in effects
-        if effect.torque is not None
-    ]
-    return all(signals == read[0] for signals in read)
+    if all(_is_of_the_spring(effect) for effect in effects):
+        return True
+    return all(effect.torque is not None and not effect.states for effect in effects) and all(
+        _read(effect) == _read(effects[0]) for effect in effects
+    )
+
+
+def _is_of_the_spring(effect: Effect) -> bool:
+    of_displacement = effect.torque is not None and not effect.states and _read(effect) == {canonical.x.name}
+    return effect.spring is not None or effect.deflection is not None or of_displacement
+
+
+def _read(effect: Effect) -> set[str]:
+    """Return the names of the signals that a force depends on."""
+    assert effect.torque is not None
+    return {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
