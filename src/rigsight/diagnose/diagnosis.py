@@ -39,8 +39,8 @@ from rigsight.simulate.model import Model
 _REFUTES = 0.7
 """Held-out error, in units of a noise floor measured at rest, below which what the rig does at rest was no noise.
 
-A loose rig wanders in its play where nothing drives it. An assumption: true models of blind trials left 0.82 and more, the
-relative of a play that did wander 0.52.
+A loose rig wanders in its play where nothing drives it, and what pulsates goes on. An assumption: true models of blind trials
+left 0.82 and more where neither was so; the relative of a play that did wander 0.52, pulsations 0.44 and 0.53.
 """
 _WITHOUT_EFFECT = 0.95
 """Probability given to the equations without an effect where they reach the noise floor."""
@@ -99,7 +99,7 @@ def diagnose(
     if any(floor.method == AT_REST for floor in floors) and _least_left(found) < _REFUTES:
         notes.append(
             f"A model leaves {_least_left(found):.2g} of what the rig does while its input rests, so that was motion and no "
-            "noise (a loose rig wanders): the noise floor is taken from the top of the spectrum instead."
+            "noise (a loose rig wanders, what pulsates goes on): the noise floor is taken from the top of the spectrum instead."
         )
         floors = noise_floors(task.rig, task.records, drifts=not task.has_spring, at_rest=False)
         found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
