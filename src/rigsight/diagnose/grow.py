@@ -40,9 +40,11 @@ _MOST_FINISHED = 2
 _MOST_PRUNED = 2
 _MOST_STEPS = 4
 """Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
-_FINEST_STEPS = 8
+_FINEST_STEPS = 4
 """Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
 and each of its partners would take as fine steps. An assumption, made for the time that it saves."""
+_NOTHING_LEFT = 1.03
+"""Held-out error in units of the noise floor from which on another parent is asked too: floors are known to a few percent."""
 _IN_ITS_PLACE = 1.5
 """Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5
@@ -99,7 +101,8 @@ def grown(
     alone = {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []
     for parent in beam:
-        pairs += _grown_from(bench, parent, effects, pairs, usable, n_jobs, prepare)
+        if min((pair.excess for pair in pairs), default=np.inf) > _NOTHING_LEFT:
+            pairs += _grown_from(bench, parent, effects, pairs, usable, n_jobs, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
         # What came second may be right and the first only its relative: another as good alone may do better in its place.

@@ -7,6 +7,7 @@ a gain error that grows with frequency.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -57,7 +58,13 @@ def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput
         ``"zoh"`` (constant until the next sample), ``"foh"`` (linear) or ``"band_limited"`` (sampled analog signal: windowed
         sinc interpolation; beyond the ends the signal is continued by its point reflection).
     """
-    samples = np.asarray(samples, dtype=np.float64)
+    return _held(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), dt, hold)
+
+
+# A diagnosis fits hundreds of models to the same few records and their pieces.
+@lru_cache(maxsize=256)
+def _held(content: bytes, dt: float, hold: Hold) -> HeldInput:
+    samples = np.frombuffer(content, dtype=np.float64)
     if hold == "band_limited":
         nodes, slopes = _band_limited_nodes(samples, dt)
         per_sample = BAND_LIMITED_INTERVALS

@@ -96,6 +96,7 @@ def run_kernel(structure: Structure, function: str, *arguments: Any) -> Any:
 
 
 _sources_by_identity: dict[int, tuple[Structure, str]] = {}
+_listings: dict[Path, tuple[int, dict[str, list[str]]]] = {}
 
 
 def compiled(structure: Structure, functions: Sequence[str] = ENTRY_POINTS) -> bool:
@@ -104,11 +105,31 @@ def compiled(structure: Structure, functions: Sequence[str] = ENTRY_POINTS) -> b
     A hint: code of another processor or numba version is only found out, and compiled anew, when it is called.
     """
     path = Path(str(kernels(structure).__file__))
-    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    version = f".py{sys.version_info.major}{sys.version_info.minor}"
+    names = _machine_code(path.parent / "__pycache__")
     return all(
-        any((path.parent / "__pycache__").glob(f"{path.stem}.{function}-*.{version}*.nbi"))
+        any(
+            name.startswith(f"{path.stem}.{function}-") and version in name
+            for name in names.get(path.stem, ())
+        )
         for function in functions
     )
+
+
+def _machine_code(folder: Path) -> dict[str, list[str]]:
+    """Return the names of the index files of machine code by module; a folder that has not changed is listed once."""
+    try:
+        changed = folder.stat().st_mtime_ns
+    except OSError:
+        return {}
+    known = _listings.get(folder)
+    if known is None or known[0] != changed:
+        found: dict[str, list[str]] = {}
+        for file in folder.iterdir():
+            if file.suffix == ".nbi":
+                found.setdefault(file.name.partition(".")[0], []).append(file.name)
+        known = _listings[folder] = (changed, found)
+    return known[1]
 
 
 def _written(name: str, text: str) -> Path:
