@@ -23,7 +23,7 @@ demo: $(INSTALLED)  ## run the whole chain on the built-in virtual rig; results 
 	@$(BIN)/rigsight demo --out demo
 
 test: $(INSTALLED)  ## run all tests
-	@$(BIN)/python -m pytest -n $(WORKERS)
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 check: $(INSTALLED)  ## format, lint, types, layers
 	$(BIN)/ruff format --check .

@@ -27,11 +27,17 @@ def cubic() -> Trial:
     )
 
 
-def test_a_trial_drawn_twice_is_the_same(cubic: Trial) -> None:
-    again = draw_trial("small", SEED, cubic.key["trial"])
-    assert again.key == cubic.key
-    assert again.given == cubic.given
-    for one, other in zip((*cubic.records, *cubic.withheld), (*again.records, *again.withheld), strict=True):
+@pytest.fixture(scope="module")
+def nothing() -> Trial:
+    return draw_trial("small", SEED, first_trial(lambda s: s.kind == "none"))
+
+
+def test_a_trial_drawn_twice_is_the_same(nothing: Trial) -> None:
+    again = draw_trial("small", SEED, nothing.key["trial"])
+    assert again.key == nothing.key
+    assert again.given == nothing.given
+    first, second = (*nothing.records, *nothing.withheld), (*again.records, *again.withheld)
+    for one, other in zip(first, second, strict=True):
         assert all(np.array_equal(one[name], other[name]) for name in one.signals)
 
 
@@ -55,12 +61,11 @@ def test_the_given_simulation_fits_the_one_sweep_it_was_identified_from_and_no_o
     assert min(errors) < 0.3 * max(errors)
 
 
-def test_without_an_effect_nothing_but_noise_is_left() -> None:
-    trial = draw_trial("small", SEED, first_trial(lambda s: s.kind == "none"))
-    assert trial.key["gap"] == pytest.approx(1.0, abs=0.05)
+def test_without_an_effect_nothing_but_noise_is_left(nothing: Trial) -> None:
+    assert nothing.key["gap"] == pytest.approx(1.0, abs=0.05)
     for name in ("J_z", "k_c", "k_d", "m", "d", "k"):
-        if name in trial.given:
-            assert trial.given[name] == pytest.approx(trial.key["values"][name], rel=0.01)
+        if name in nothing.given:
+            assert nothing.given[name] == pytest.approx(nothing.key["values"][name], rel=0.01)
 
 
 def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
@@ -74,9 +79,8 @@ def test_wrong_parameters_are_off_by_what_a_data_sheet_is(cubic: Trial) -> None:
     assert all(0.049 < error < 0.201 for error in off)
 
 
-def test_records_look_alike_whatever_is_hidden(cubic: Trial) -> None:
-    other = draw_trial("small", SEED, first_trial(lambda s: s.kind == "none"))
-    for one, two in zip(cubic.records, other.records, strict=True):
+def test_records_look_alike_whatever_is_hidden(cubic: Trial, nothing: Trial) -> None:
+    for one, two in zip(cubic.records, nothing.records, strict=True):
         assert (one.name, one.role, one.kind, one.hold, one.n_samples, one.dt) == (
             two.name, two.role, two.kind, two.hold, two.n_samples, two.dt,
         )  # fmt: skip
