@@ -70,6 +70,14 @@ def test_fewer_effects_win_at_equal_numbers_of_parameters(scored, white) -> None
     assert ranked(pair, single).order[0] is single
 
 
+def test_far_above_the_floor_a_small_difference_is_no_hint(scored, white) -> None:
+    plainer = scored(("cubic_stiffness",), 3.03 * white, n_free=5)
+    likened = scored(("gravity_pendulum",), 3.0 * white, n_free=5)
+    ranking = ranked(plainer, likened)
+    assert ranking.order[0] is plainer
+    assert ranking.tied == (likened,)
+
+
 def test_a_small_difference_does_not_speak_for_a_second_effect(scored, white) -> None:
     pair = scored(("cubic_stiffness", "asymmetric_stiffness"), white, n_free=6)
     single = scored(("end_stop",), 1.005 * white, n_free=6)

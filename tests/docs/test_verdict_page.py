@@ -26,6 +26,8 @@ STATED = {
     "windows._CYCLES": (4, "windows of four cycles"),
     "grow.MOST_EFFECTS": (2, "names two effects at most"),
     "grow._BEAM": (1.3, "within 1.3 times the best error"),
+    "grow._NOTHING_LEFT": (1.03, "leaves more than 1.03 of the floor"),
+    "grow._FINEST_STEPS": (4, "more than 4 integration steps per sample"),
     "grow._HALF": (0.5, "at least half of what the best single effect leaves"),
     "examination._SIGNIFICANT": (3.0, "three standard errors from zero"),
     "rank._TIE": (0.01, "1 % of the error"),

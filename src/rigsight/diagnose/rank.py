@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.block_means import RESAMPLES, block_means
+from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored
 from rigsight.effects.effect import Place
 
@@ -17,7 +18,7 @@ _TIE = 0.01
 _FINE = 1e-3
 """The same between models with as many numbers and effects, where parsimony is silent and a small difference is still a hint."""
 _HINT = 0.9
-"""Share of the win that such a difference decides, if it is there all along the records.
+"""Share of the win that such a difference decides, if it is there all along the records; an assumption.
 
 Of 12 blind trials in which a rival differed by 1e-3 to 3e-2, the truth was the lower one in all; of 18 with less, it was lower or
 level in 16.
@@ -84,6 +85,8 @@ def rank(
     best = float(np.min(errors))
     inexact = (_MODEL_ERROR * max(best - 1.0, 0.0) + _INEXACT * gap) / best
     tolerance = np.hypot(_TIE, inexact)
+    # Far above the floor no form is exact, and a small difference is no hint of the true one.
+    fine = _FINE + _MODEL_ERROR * max(best - AT_FLOOR, 0.0) / best
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])
@@ -99,7 +102,7 @@ def rank(
     plainest = np.min(np.where(tie, n_effects, np.iinfo(np.int64).max), axis=1, keepdims=True)
     plain = tie & (n_effects == plainest)
     lowest = np.min(np.where(plain, resampled, np.inf), axis=1, keepdims=True)
-    ahead = plain & (resampled <= lowest * (1.0 + _FINE))
+    ahead = plain & (resampled <= lowest * (1.0 + fine))
     wins = np.mean((1.0 - _HINT) * _shared(tie, prior) + _HINT * _shared(ahead, prior), axis=0)
     likelihood = wins + 1e-3 * np.exp(-20.0 * (errors / best - 1.0))
     probabilities = likelihood / np.sum(likelihood)

@@ -20,6 +20,8 @@ BAND_LIMITED_INTERVALS = 2
 """Cubic pieces per sample of a band-limited input."""
 _OVERSAMPLING = 16
 _HALF_LENGTH = 48
+_LONGEST_KEPT = 50_000
+"""Samples up to which an input is kept for the next model; all that is kept stays below half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +60,19 @@ def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput
         ``"zoh"`` (constant until the next sample), ``"foh"`` (linear) or ``"band_limited"`` (sampled analog signal: windowed
         sinc interpolation; beyond the ends the signal is continued by its point reflection).
     """
-    return _held(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), dt, hold)
+    samples = np.ascontiguousarray(samples, dtype=np.float64)
+    if samples.size > _LONGEST_KEPT:
+        return _between(samples, dt, hold)
+    return _kept(samples.tobytes(), dt, hold)
 
 
 # A diagnosis fits hundreds of models to the same few records and their pieces.
-@lru_cache(maxsize=256)
-def _held(content: bytes, dt: float, hold: Hold) -> HeldInput:
-    samples = np.frombuffer(content, dtype=np.float64)
+@lru_cache(maxsize=128)
+def _kept(content: bytes, dt: float, hold: Hold) -> HeldInput:
+    return _between(np.frombuffer(content, dtype=np.float64), dt, hold)
+
+
+def _between(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
     if hold == "band_limited":
         nodes, slopes = _band_limited_nodes(samples, dt)
         per_sample = BAND_LIMITED_INTERVALS
