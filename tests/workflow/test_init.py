@@ -54,6 +54,24 @@ def test_the_kind_of_rig_is_guessed_from_the_channels(tmp_path: Path) -> None:
         assert run_init(tmp_path / folder).model == folder
 
 
+def test_the_only_channel_of_a_unit_is_taken_whatever_it_is_called(tmp_path: Path) -> None:
+    write_text(
+        tmp_path / "a.csv", {"t": T, "Kraft [N]": SWEEP, "Abstand [mm]": 1e3 * ANSWER, "Temp [°C]": T}, {}
+    )
+    run_init(tmp_path, model="axis")
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["u"], SWEEP, rtol=1e-12)
+    np.testing.assert_allclose(record["x"], ANSWER, rtol=1e-12)
+
+
+def test_two_channels_of_a_unit_are_not_chosen_between(tmp_path: Path) -> None:
+    forces = {"Kraft 1 [N]": SWEEP, "Kraft 2 [N]": 2.0 * SWEEP}
+    write_text(tmp_path / "a.csv", {"t": T, **forces, "Weg [mm]": 1e3 * ANSWER}, {})
+    run_init(tmp_path, model="axis")
+    with pytest.raises(InputError, match="FILL IN"):
+        read_campaign(tmp_path)
+
+
 def test_blanks_are_refused_by_name_and_accepted_once_filled(tmp_path: Path) -> None:
     write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "psi": ANSWER}, {})
     draft = run_init(tmp_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rigsight.records.channel import Channel
 from rigsight.records.channel_names import closeness, split_unit
@@ -15,6 +15,7 @@ MODELS = ("running_gear", "axis", "element")
 """In the order in which they are tried: a yaw angle is telling, a displacement belongs to two."""
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
+_DRIVES = ("A", "V", "N", "N m")
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,34 @@ def guess_file(channels: Sequence[Channel], is_text: bool, model: str | None = N
     """
     guesses = [_guess_rig(RIGS[name], channels, is_text) for name in ([model] if model else MODELS)]
     # Python keeps the first of equals.
-    return min(guesses, key=lambda guess: (guess.open_questions, -guess.score))
+    found = min(guesses, key=lambda guess: (guess.open_questions, -guess.score))
+    return replace(found, signals=_completed_by_unit(found, channels, is_text))
+
+
+def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: bool) -> tuple[Guess, ...]:
+    """Return the guesses; a signal without any takes the one channel left that has its unit, in whatever language it is named."""
+    guesses = list(found.signals)
+    for i, guess in enumerate(guesses):
+        if guess.is_clear or guess.candidates:
+            continue
+        taken = [found.time.channel, *(own.channel for own in guesses)]
+        # A drive has the unit of its amplifier.
+        units = [guess.si] if has_si(guess.si) else _DRIVES
+        fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
+        rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
+        if len(fitting) == len(rivals) == 1:
+            guesses[i] = _of_channel(guess, fitting[0], is_text)
+    return tuple(guesses)
+
+
+def _of_channel(guess: Guess, channel: Channel, is_text: bool) -> Guess:
+    # A row of units in delimited text is not applied by a reading, so that it does not count as stated.
+    is_stated = channel.unit is not None and not is_text
+    return Guess(guess.signal, guess.si, channel, _unit_of(channel), is_stated)
+
+
+def _unit_of(channel: Channel) -> str | None:
+    return channel.unit or split_unit(channel.name)[1]
 
 
 def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGuess:
@@ -102,7 +130,7 @@ def _guess(
     for channel in channels:
         score = 0.0 if channel in taken else closeness(channel.name, signal)
         if score > 0.0:
-            unit = channel.unit or split_unit(channel.name)[1]
+            unit = _unit_of(channel)
             if unit is not None and has_si(si):
                 score += _FITTING_UNIT if is_a(unit, si) else -_FITTING_UNIT
             scores.append((score, channel))
@@ -116,6 +144,4 @@ def _guess(
     channel = closest[0]
     if best < _CLEAR - _FITTING_UNIT:
         return Guess(signal, si, candidates=(channel.name,)), 0.0
-    stated = None if is_text else channel.unit
-    unit = channel.unit or split_unit(channel.name)[1]
-    return Guess(signal, si, channel, unit, stated is not None), best
+    return _of_channel(Guess(signal, si), channel, is_text), best
