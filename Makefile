@@ -44,7 +44,7 @@ docs: $(INSTALLED) $(DOCS_INSTALLED)  ## build the documentation site in build/s
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
 
-blind: $(INSTALLED)  ## the standard blind bench, 300 rigs; writes docs/blind.md
+blind: $(INSTALLED)  ## the standard blind bench, 244 rigs; hours, goes on where it was stopped; writes docs/blind.md
 	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
 clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)

@@ -21,7 +21,7 @@ TIERS: dict[Tier, tuple[float, float]] = {"faint": (1.5, 5.0), "clear": (5.0, 20
 NOISES: tuple[Noise, ...] = ("low", "high")
 _COUNTS: dict[Design, dict[str, int]] = {
     "small": {"pair": 24, "none": 8, "parameters": 8, "outside": 3},
-    "standard": {"pair": 60, "none": 24, "parameters": 24, "outside": 6},
+    "standard": {"pair": 40, "none": 16, "parameters": 16, "outside": 4},
 }
 """Trials of each kind besides three strengths at two noise levels of each single effect; outside: of each effect."""
 _HYSTERESES = frozenset({"bouc_wen_hysteresis", "iwan_hysteresis"})
