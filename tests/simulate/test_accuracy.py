@@ -7,9 +7,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rigsight.effects import effect_named
 from rigsight.errors import SimulationError
+from rigsight.excitation import log_sweep
+from rigsight.rigs import AXIS
 from rigsight.simulate import (
     choose_substeps,
+    compose,
     parameter_vector,
     record_input,
     rest_state,
@@ -64,6 +68,22 @@ def test_accuracy_wish_is_met(accuracy, hysteretic, hysteresis_sets, sweep, trut
     for name in SETS:
         simulated = simulate(hysteretic, hysteresis_sets[name], make_record(sweep), accuracy=accuracy)
         assert error_of(simulated["psi"], truths[name]) <= accuracy
+
+
+@pytest.mark.parametrize(
+    ("effect", "own"),
+    [
+        ("stribeck_friction", {"T_c": 5.7, "T_s": 8.3, "w_s": 0.12}),
+        ("bouc_wen_hysteresis", {"A": 1.0, "a": 0.05, "beta": 900.0, "gamma": -100.0, "n": 1.0}),
+        ("end_stop", {"k_s": 5e3, "s": 0.2}),
+    ],
+)
+def test_the_default_holds_where_friction_stops_and_loops_are_wide(effect, own, make_record, error_of):
+    structure = compose(AXIS, [effect_named(effect)])
+    values = {"gain": 140.0, "m": 2.14, "d": 12.3, "k": 364.0, "x_off": -0.02, "force_off": 0.0, **own}
+    record = make_record(log_sweep(DT * np.arange(8000), 1.0, 1.0, 80.0))
+    accurate = simulate(structure, values, record, accuracy=1e-10)
+    assert error_of(simulate(structure, values, record)["x"], accurate["x"]) <= 1e-6
 
 
 def prepared(structure, values, record):
