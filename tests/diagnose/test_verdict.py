@@ -30,6 +30,12 @@ def test_a_small_gap_that_new_numbers_close_is_parameters_from_a_tenth_on(verdic
     assert verdict(1.1 * 1.05 * BELOW, 1.05, 1.0).verdict == "none"
 
 
+def test_a_simulation_that_suits_the_held_out_records_by_chance_is_not_complete(verdict) -> None:
+    """Fitted to one sweep it predicts another; no numbers suit all sweeps, with the effect they do."""
+    assert verdict(1.05, 1.3, 1.0).verdict == "effect"
+    assert verdict(1.05, 1.3, 1.3 / 1.1 * ABOVE).verdict == "none"
+
+
 def test_parameters_when_the_same_equations_reach_the_floor(verdict) -> None:
     found = verdict(5.0, AT_FLOOR, AT_FLOOR)
     assert (found.verdict, found.model.effects) == ("parameters", ())
@@ -56,9 +62,11 @@ def test_above_a_measured_floor_the_nearest_relative_is_not_the_cause(verdict) -
     assert "1.6 times the noise floor" in found.reason
 
 
-@pytest.mark.parametrize(("gap", "allowed"), [(2.0, 1.3), (7.0, 1.3), (9.0, 1.4), (13.0, 1.6), (100.0, 1.6)])
+@pytest.mark.parametrize(
+    ("gap", "allowed"), [(2.0, 1.15), (4.0, 1.15), (9.0, 1.4), (13.0, 1.6), (100.0, 1.6)]
+)
 def test_of_a_larger_gap_a_cause_may_leave_more(verdict, gap: float, allowed: float) -> None:
-    """A twentieth of the gap, between 1.3 and 1.6 times the floor."""
+    """A twentieth of the gap, between 1.15 and 1.6 times the floor."""
     assert most_left(gap) == pytest.approx(allowed)
     assert verdict(gap, gap, allowed * BELOW).verdict == "effect"
     assert verdict(gap, gap, allowed * ABOVE).verdict == "unknown"

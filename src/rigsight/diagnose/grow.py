@@ -111,6 +111,9 @@ def grown(
                 (name,) = set(best_pair.names) - set(second.names)
                 instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
                 pairs += _grown_from(bench, second, instead, pairs, usable, n_jobs, prepare)
+    best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
+    if best_pair is not None and _NOTHING_LEFT < best_pair.excess <= allowed:
+        pairs += _more_general(bench, best_pair, usable, effects, pairs, n_jobs, prepare)
     pairs.sort(key=lambda pair: pair.excess)
     pairs = [*(finished(bench, pair) for pair in pairs[:_MOST_FINISHED]), *pairs[_MOST_FINISHED:]]
     return [
@@ -169,6 +172,44 @@ def _grown_from(
         if effect not in parent.effects and not _known_pair(known, parent, effect)
     ]
     return _pairs(bench, parent, partners, singles, n_jobs, prepare)
+
+
+def _more_general(
+    bench: Workbench,
+    pair: Scored,
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    known: Sequence[Scored],
+    n_jobs: int,
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return the pairs in which an effect that contains one of the pair's stands in its place, fitted from there.
+
+    Beside another effect a simpler relative may lead at a first look, as it has fewer numbers to find.
+    """
+    alone = {model.names[0]: model for model in singles}
+    swaps = []
+    for member, other in (pair.effects, pair.effects[::-1]):
+        if other.name in alone:
+            swaps += [
+                (other, child, member)
+                for child in bench.offered(effects)
+                if member.name in child.parents
+                and child != other
+                and not _known_pair(known, alone[other.name], child)
+            ]
+    if prepare is not None:
+        prepare([_structure(bench, (other, child)) for other, child, _ in swaps])
+
+    def one(swap: tuple[Effect, Effect, Effect]) -> Scored:
+        other, child, member = swap
+        look = look_at(
+            bench, (other, child), alone[other.name].fit, {member.name: pair.fit}, substeps=pair.fit.substeps
+        )
+        (wide,) = widened(bench, [look], substeps=pair.fit.substeps)
+        return followed(bench, wide, promising=wide.cost <= pair.fit.cost, finish=False)
+
+    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(swap) for swap in swaps))
 
 
 def _alike(one: Scored, other: Scored) -> bool:

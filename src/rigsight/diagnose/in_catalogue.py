@@ -10,13 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import sympy as sp
+
 from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.verdict import AT_FLOOR, Judgement
-from rigsight.effects import Effect
+from rigsight.diagnose.workbench import Scored
+from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 
-_ONE_FORCE = 0.5
-"""Most that is given to two effects that are one force together: another form of that force would look the same."""
+_ONE_LAW = 0.5
+"""Most that is given to two effects that are one law together: another form of that law would look the same."""
 _MOST = 0.99
 _ODDS_OUTSIDE_ONE = 0.25
 """Odds of a cause outside the catalogue against one effect of it, before any record is seen; an assumption."""
@@ -61,7 +64,8 @@ def probability_in_catalogue(judgement: Judgement, ranking: Ranking, gap: float)
     # Above the floor something is left that is not the cause's, if its form is right at all: one half far above.
     form = 0.5 + (_MOST - 0.5) / (1.0 + above)
     share = form / (1.0 + odds * chance)
-    return min(share, _ONE_FORCE) if _one_force(model.effects) else share
+    one_law = _one_force(model.effects) or _one_linear_system(model)
+    return min(share, _ONE_LAW) if one_law else share
 
 
 def _chance_of_a_relative(left: float, gap: float) -> float:
@@ -80,6 +84,46 @@ def _one_force(effects: Sequence[Effect]) -> bool:
     return all(effect.torque is not None and not effect.states for effect in effects) and all(
         _read(effect) == _read(effects[0]) for effect in effects
     )
+
+
+def _one_linear_system(model: Scored) -> bool:
+    """Return True for two linear effects between the same signals: many another linear system has their frequency response."""
+    if len(model.effects) < 2:
+        return False
+    one_output = len(model.fit.structure.rig.outputs) == 1
+    return all(
+        is_linear(effect) and effect.lateral is None and (one_output or effect.place is not Place.SENSOR)
+        for effect in model.effects
+    )
+
+
+def is_linear(effect: Effect) -> bool:
+    """Return True if an effect leaves a linear rig linear.
+
+    Parameters
+    ----------
+    effect
+        Of the catalogue or from elsewhere.
+    """
+    signals = [canonical.x, canonical.v, canonical.u, canonical.reading, canonical.spring_torque]
+    signals += [
+        canonical.creepage,
+        canonical.lateral_displacement,
+        canonical.deflection,
+        canonical.deflection_rate,
+    ]
+    signals += [state.symbol for state in effect.states]
+    laws = [effect.torque, effect.spring, effect.deflection, effect.drive, effect.lateral, effect.measured]
+    laws += [state.rate for state in effect.states]
+    return all(_is_linear_in(law, signals) for law in laws if law is not None) and all(
+        state.limit is None for state in effect.states
+    )
+
+
+def _is_linear_in(law: sp.Expr, signals: Sequence[sp.Symbol]) -> bool:
+    own = [symbol for symbol in signals if symbol in law.free_symbols]
+    slopes = [sp.diff(law, symbol) for symbol in own]
+    return not any(slope.free_symbols & {*own, canonical.t} for slope in slopes)
 
 
 def _is_of_the_spring(effect: Effect) -> bool:
