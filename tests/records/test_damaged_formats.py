@@ -149,7 +149,7 @@ def test_a_matlab_file_that_unpacks_to_too_much_is_refused(
 ) -> None:
     monkeypatch.setattr("rigsight.records.matlab_elements._LARGEST_VARIABLE", 10_000)
     path = tmp_path / "run.mat"
-    path.write_bytes(HEADER + element(15, zlib.compress(bytes(1_000_000))))
+    path.write_bytes(HEADER + element(15, zlib.compress(element(14, bytes(1_000_000)))))
     with pytest.raises(InputError, match="unpacks to more than"):
         read(path)
 

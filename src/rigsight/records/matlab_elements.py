@@ -26,6 +26,7 @@ _HEADER = 128
 _DEEPEST = 16
 # A variable that needs more once unpacked holds more samples than are read.
 _LARGEST_VARIABLE = 16 * MOST_SAMPLES
+_MOST_UNPACKED = 4 * _LARGEST_VARIABLE
 
 
 class DamagedError(ValueError):
@@ -65,7 +66,7 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
         If a variable is larger than what is read.
     """
     order = "<" if data[126:128] == b"IM" else ">"
-    position, count = _HEADER, 0
+    position, count, unpacked = _HEADER, 0, 0
     while position < len(data):
         kind, start, end, position = _element(data, position, len(data), order)
         count += 1
@@ -73,12 +74,12 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
         if kind == _COMPRESSED:
             # Compressed variables are not padded to whole words.
             position = end
-            unpacker = zlib.decompressobj()
-            inside = unpacker.decompress(data[start:end], _LARGEST_VARIABLE)
-            if unpacker.unconsumed_tail:
+            inside = _unpacked(memoryview(data)[start:end], order, file)
+            unpacked += len(inside)
+            if unpacked > _MOST_UNPACKED:
                 raise InputError(
-                    f"{file}: a variable unpacks to more than {_LARGEST_VARIABLE / 1e6:g} MB, the most that is read. "
-                    "Split the record, or reduce the sample rate."
+                    f"{file}: its variables unpack to more than {_MOST_UNPACKED / 1e6:g} MB together, the most that is read. "
+                    "Split the record, or save only the variables that are needed."
                 )
             kind, start, end, _ = _element(inside, 0, len(inside), order)
         else:
@@ -86,6 +87,26 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
         if kind != _MATRIX:
             raise DamagedError(f"an element of type {kind} stands where a variable should")
         yield _matrix(inside, start, end, order, 0)
+
+
+def _unpacked(packed: memoryview, order: str, file: str) -> bytes:
+    """Return the one element inside a compressed one; no more is unpacked than it says it has."""
+    unpacker = zlib.decompressobj()
+    head = unpacker.decompress(packed, 8)
+    if len(head) < 8:
+        raise DamagedError("a compressed variable is cut short")
+    first, size = struct.unpack(order + "II", head)
+    size = 0 if first >> 16 else size
+    if size > _LARGEST_VARIABLE:
+        raise InputError(
+            f"{file}: a variable unpacks to more than {_LARGEST_VARIABLE / 1e6:g} MB, the most that is read. "
+            "Split the record, or reduce the sample rate."
+        )
+    # A few bytes to spare, which tell whether there is more; a limit of 0 would mean none.
+    inside = head + unpacker.decompress(unpacker.unconsumed_tail, size + 8)
+    if len(inside) > 8 + size + 7:
+        raise DamagedError("a compressed variable holds more than it says")
+    return inside
 
 
 def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, int, int, int]:

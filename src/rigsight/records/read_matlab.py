@@ -27,6 +27,8 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
     def load(variable: str, field: str | None) -> Load:
         def numbers() -> NDArray[Any]:
             if variable not in read:
+                # One at a time: packed variables together may be larger than any memory.
+                read.clear()
                 read[variable] = _read(data, variable)
             content = read[variable]
             numbers: NDArray[Any] = content if field is None else content[field].item()
