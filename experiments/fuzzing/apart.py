@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 from oracle import Oracle
-from targets import TARGETS
+from targets import TARGETS, inspected
 
-MOST = 60
+MOST = 25
 """Inputs; each starts processes."""
 
 
@@ -20,7 +20,7 @@ def main(name: str, folder: Path) -> None:
     drawn = random.Random(5).sample(kept, min(len(kept), max(MOST - len(crashed), 10)))
     judge = Oracle(folder / "apart", longest=400.0)
     for file in [*crashed, *drawn]:
-        judge.judge(file.read_bytes(), TARGETS[name].try_it)
+        judge.judge(file.read_bytes(), inspected(TARGETS[name].suffix))
     judge.save(at_once=True)
 
 

@@ -90,7 +90,7 @@ class Oracle:
             message.encode()
         except UnicodeEncodeError:
             self.found(data, "message cannot be printed", ascii(message[:300]))
-        if any(ord(sign) < 32 and sign != "\n" for sign in message):
+        if any(ord(sign) < 32 and sign not in "\n\t" for sign in message):
             self.found(data, "message steers the terminal", ascii(message[:600]))
 
     def found(self, data: bytes, kind: str, told: str) -> None:

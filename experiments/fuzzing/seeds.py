@@ -103,6 +103,8 @@ def write_samples(format_name: str, folder: Path) -> list[Path]:
         path = folder / "text.uff"
         module.write_uff(path, record, UNITS, binary=0)
         found.append(path)
+    if format_name in ("MATLAB 5", "MATLAB 7"):
+        found.append(_matlab(folder, record, packed=format_name == "MATLAB 7"))
     if format_name == "HDF5":
         found += _hdf5(folder, record)
     return found
@@ -126,6 +128,19 @@ def _texts(folder: Path) -> list[Path]:
 
 def _lines(table: np.ndarray, separator: str) -> str:
     return "".join(separator.join(f"{value:.6g}" for value in row) + "\n" for row in table)
+
+
+def _matlab(folder: Path, record: dict[str, np.ndarray], packed: bool) -> Path:
+    from scipy.io import savemat
+    from scipy.sparse import csc_array
+
+    others = {
+        "cell": np.array([np.arange(3.0), "text", {"a": 1.0}], dtype=object), "text": "bench", "empty": np.zeros((0, 0)),
+        "wave": np.exp(1j * record["t"]), "is_on": record["t"] > 0.3, "sparse": csc_array(np.eye(4)),
+        "deep": {"inner": {"u": record["u"]}, "u": record["u"]}, "table": np.column_stack(list(record.values())),
+    }  # fmt: skip
+    savemat(folder / "others.mat", record | others, do_compression=packed)
+    return folder / "others.mat"
 
 
 def _hdf5(folder: Path, record: dict[str, np.ndarray]) -> list[Path]:

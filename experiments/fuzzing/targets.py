@@ -69,6 +69,17 @@ def _folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="fuzz-", dir=memory if memory.is_dir() else None))
 
 
+def inspected(suffix: str) -> Callable[[bytes], object]:
+    """Return what `rigsight inspect` does with the bytes of a file."""
+
+    def try_it(data: bytes) -> object:
+        path = _folder() / f"run{suffix}"
+        path.write_bytes(data)
+        return run_inspect(path)
+
+    return try_it
+
+
 def _measurement(suffix: str) -> Callable[[bytes], object]:
     rig = RIGS["running_gear"]
     unmapped = (None, {"t": 1, "u": 2, "psi": 3})

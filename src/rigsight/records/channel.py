@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -18,6 +19,8 @@ MOST_SAMPLES = 50_000_000
 MOST_CHANNELS = 20_000
 MOST_SAMPLES_IN_ALL = 1_000_000_000
 """Of all channels of a file: more than an unpacked file of the largest size holds, and a packed one may claim anything."""
+MOST_IN_TABLE = 4 * MOST_SAMPLES
+"""Of one table in a file, which is read as a whole: 1.6 GB."""
 MOST_COLUMNS = 64
 """Of one table in a file; a wider one is a matrix, not signals side by side."""
 # Line ends and control signs, of which lists and files of plain text cannot hold any, and halves of signs.
@@ -215,10 +218,28 @@ def columns_of(
     if len(long) > 2 or min(long) > MOST_COLUMNS:
         return Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")
 
+    if math.prod(long) > MOST_IN_TABLE:
+        return Refused(
+            name,
+            f"is a table of {math.prod(long)} numbers, more than the {MOST_IN_TABLE} that are read of one",
+        )
+
     def column(index: int) -> Load:
         return lambda: _upright(read())[:, index]
 
     return [Channel(f"{name}(:,{i + 1})", max(long), column(i), unit) for i in range(min(long))]
+
+
+def kept_last(kept: dict[str, NDArray[Any]], name: str, read: Load) -> Load:
+    """Return how an array is read once for all its columns; `kept` holds the array that was read last, and no other."""
+
+    def samples() -> NDArray[Any]:
+        if name not in kept:
+            kept.clear()
+            kept[name] = read()
+        return kept[name]
+
+    return samples
 
 
 def _upright(table: NDArray[Any]) -> NDArray[Any]:

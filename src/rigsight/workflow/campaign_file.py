@@ -114,6 +114,8 @@ def read_campaign_table(path: Path) -> CampaignTable:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    except InputError:
+        raise
     except RecursionError:
         raise InputError(f"{path.name} is nested deeper than a campaign ever is.") from None
     except ValueError:
@@ -164,6 +166,9 @@ def _messages(
 
 def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
+    if not location:
+        # Only a key with half a sign in it belongs to no place.
+        return f"{path.name}: a key is no text: {shown(problem['input'])}. Use plain letters."
     key = key_text(location, data)
     kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
     if kind == "extra_forbidden":
