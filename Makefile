@@ -2,6 +2,8 @@
 PYTHON ?= python3
 # Test processes side by side.
 WORKERS ?= 2
+# For each target of the fuzzer.
+SECONDS_EACH ?= 60
 # Seed of the blind benches; those from 1000 on are kept for the last word and never looked at before.
 SEED ?= 1
 
@@ -9,12 +11,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEPENDENCIES := $(VENV)/.dependencies-installed
 INSTALLED := $(VENV)/.rigsight-installed
+FUZZER_INSTALLED := $(VENV)/.fuzzer-installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench docs blind blind-small clean
+.PHONY: help demo test check bench docs fuzz blind blind-small clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
@@ -40,6 +43,9 @@ docs: $(INSTALLED) $(DOCS_INSTALLED)  ## build the documentation site in build/s
 	@# Not --quiet: what is not told does not count as a warning, and would not end a strict build.
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "The site is in build/site; open build/site/index.html."
+
+fuzz: $(INSTALLED) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, a minute each; writes experiments/fuzzing/results.md
+	@$(BIN)/python experiments/fuzzing/run.py --seconds $(SECONDS_EACH)
 
 blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
@@ -70,4 +76,9 @@ $(INSTALLED): pyproject.toml $(DEPENDENCIES)
 $(DOCS_INSTALLED): docs/requirements.lock $(DEPENDENCIES)
 	@echo "Installing what builds the site into $(VENV) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r docs/requirements.lock
+	@touch $@
+
+# For Linux and Python 3.11 or 3.12 there are wheels; no part of the lock, because nothing but the fuzzer needs it.
+$(FUZZER_INSTALLED): $(DEPENDENCIES)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "atheris==3.0.0"
 	@touch $@

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
+LONGEST_MESSAGE = 4000
+"""In characters; messages quote what files hold, and a file may hold names of any length."""
+_LONGEST_VALUE = 300
+# Would move the cursor or color the terminal, or could not be printed at all.
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+
 
 class RigsightError(Exception):
     """Root of all errors that are told to the user as one message, without a traceback."""
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        if len(text) > LONGEST_MESSAGE:
+            half = LONGEST_MESSAGE // 2
+            text = f"{text[:half]} ... {text[-half:]}"
+        return _UNPRINTABLE.sub(lambda sign: ascii(sign[0])[1:-1], text)
 
 
 class InputError(RigsightError, ValueError):
@@ -17,6 +31,16 @@ class InputError(RigsightError, ValueError):
 
 class SimulationError(RigsightError, ArithmeticError):
     """A simulation left the range of numbers, or could not reach the accuracy asked for."""
+
+
+def shown(value: object) -> str:
+    """Return a value as messages quote it, cut where it is long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        # Python writes out neither whole numbers of thousands of digits nor the deepest nests.
+        text = f"a {type(value).__name__} that is too large to be shown"
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
 
 
 def nearest(name: str, allowed: Iterable[str]) -> str:

@@ -131,6 +131,27 @@ BOMBS = {
 }
 
 
+def flagged(flags: int, rest: bytes) -> bytes:
+    head = element(6, struct.pack("<II", DOUBLE | flags, 0)) + element(5, struct.pack("<2i", 1, 60))
+    return element(14, head + element(1, b"u") + rest)
+
+
+@pytest.mark.parametrize(
+    ("flags", "n_parts", "is_sound"),
+    [(0, 1, True), (0, 0, False), (0, 2, False), (0x800, 2, True), (0x800, 1, False)],
+)
+def test_a_matlab_variable_without_its_parts_is_refused(
+    tmp_path: Path, flags: int, n_parts: int, is_sound: bool
+) -> None:
+    """Found by fuzzing: scipy took the variable behind it for the missing part, and crashed."""
+    path = tmp_path / "run.mat"
+    behind = matrix(DOUBLE, (1, 60), element(9, bytes(480)), b"psi")
+    path.write_bytes(HEADER + flagged(flags, n_parts * element(9, bytes(480))) + behind)
+    message = told(path)
+    assert message is not None
+    assert ("has not the parts" in message) == (not is_sound)
+
+
 @pytest.mark.parametrize("bomb", BOMBS)
 def test_a_matlab_file_that_declares_more_than_it_holds_is_refused_unread(
     tmp_path: Path, bomb: str, monkeypatch: pytest.MonkeyPatch
@@ -149,7 +170,7 @@ def test_a_matlab_file_that_unpacks_to_too_much_is_refused(
 ) -> None:
     monkeypatch.setattr("rigsight.records.matlab_elements._LARGEST_VARIABLE", 10_000)
     path = tmp_path / "run.mat"
-    path.write_bytes(HEADER + element(15, zlib.compress(bytes(1_000_000))))
+    path.write_bytes(HEADER + element(15, zlib.compress(element(14, bytes(1_000_000)))))
     with pytest.raises(InputError, match="unpacks to more than"):
         read(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -16,8 +17,14 @@ from rigsight.errors import InputError
 MOST_SAMPLES = 50_000_000
 """Of one channel: 400 MB once read."""
 MOST_CHANNELS = 20_000
+MOST_SAMPLES_IN_ALL = 1_000_000_000
+"""Of all channels of a file: more than an unpacked file of the largest size holds, and a packed one may claim anything."""
+MOST_IN_TABLE = 4 * MOST_SAMPLES
+"""Of one table in a file, which is read as a whole: 1.6 GB."""
 MOST_COLUMNS = 64
 """Of one table in a file; a wider one is a matrix, not signals side by side."""
+# Line ends and control signs, of which lists and files of plain text cannot hold any, and halves of signs.
+_UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 _NO_UNIT = {"", "-", "--", "none", "null", "n/a", "unknown", "unit"}
 
 Load = Callable[[], NDArray[Any]]
@@ -95,6 +102,10 @@ class Refused:
     name: str
     reason: str
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
+        object.__setattr__(self, "reason", printable(self.reason))
+
 
 @dataclass(frozen=True, eq=False)
 class ChannelFile:
@@ -144,6 +155,21 @@ def check_count(file: str, n_channels: int) -> None:
         )
 
 
+def check_total(file: str, n_samples: int) -> None:
+    """Refuse a file whose channels together are too long, before any is read.
+
+    Raises
+    ------
+    InputError
+        Naming the file, its samples and the limit.
+    """
+    if n_samples > MOST_SAMPLES_IN_ALL:
+        raise InputError(
+            f"{file}: its channels have {n_samples} samples together, more than the {MOST_SAMPLES_IN_ALL} that are read. "
+            "Split the record, or export only the channels that are needed."
+        )
+
+
 def as_floats(samples: object) -> NDArray[np.float64]:
     """Return stored numbers as floats, shape (n_samples,)."""
     return np.ascontiguousarray(np.asarray(samples).reshape(-1), dtype=np.float64)
@@ -158,6 +184,11 @@ def as_stamps(samples: object) -> NDArray[np.float64]:
     if array.dtype == np.float32:
         return np.array([float(str(stamp)) for stamp in array], dtype=np.float64)
     return as_floats(array)
+
+
+def printable(text: str) -> str:
+    """Return a text from a file with a replacement character for every sign that no name or unit has."""
+    return _UNPRINTABLE.sub("\ufffd", text)
 
 
 def columns_of(
@@ -187,10 +218,28 @@ def columns_of(
     if len(long) > 2 or min(long) > MOST_COLUMNS:
         return Refused(name, f"is an array of shape {shape}, neither a vector nor a table of columns")
 
+    if math.prod(long) > MOST_IN_TABLE:
+        return Refused(
+            name,
+            f"is a table of {math.prod(long)} numbers, more than the {MOST_IN_TABLE} that are read of one",
+        )
+
     def column(index: int) -> Load:
         return lambda: _upright(read())[:, index]
 
     return [Channel(f"{name}(:,{i + 1})", max(long), column(i), unit) for i in range(min(long))]
+
+
+def kept_last(kept: dict[str, NDArray[Any]], name: str, read: Load) -> Load:
+    """Return how an array is read once for all its columns; `kept` holds the array that was read last, and no other."""
+
+    def samples() -> NDArray[Any]:
+        if name not in kept:
+            kept.clear()
+            kept[name] = read()
+        return kept[name]
+
+    return samples
 
 
 def _upright(table: NDArray[Any]) -> NDArray[Any]:
@@ -206,13 +255,13 @@ def stated_unit(text: object) -> str | None:
         return stated_unit(text.reshape(-1)[0])
     if not isinstance(text, str):
         return None
-    text = re.sub(r"^\[(.*)\]$", r"\1", text.replace("\x00", "").strip()).strip()
+    text = printable(re.sub(r"^\[(.*)\]$", r"\1", text.replace("\x00", "").strip()).strip())
     return None if text.lower() in _NO_UNIT else text
 
 
 def with_distinct_names(channels: Iterable[Channel]) -> tuple[Channel, ...]:
-    """Return the channels with a number behind the name of each that is not the first of its name."""
-    channels = tuple(channels)
+    """Return the channels with printable names, with a number behind each that is not the first of its name."""
+    channels = tuple(replace(channel, name=printable(channel.name)) for channel in channels)
     taken, used, named = {channel.name for channel in channels}, Counter[str](), []
     for channel in channels:
         used[channel.name] += 1

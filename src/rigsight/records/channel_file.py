@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.records.channel import Channel, ChannelFile, Load, check_count, check_size
+from rigsight.records.channel import Channel, ChannelFile, Load, check_count, check_size, check_total
 from rigsight.records.isolated_reader import PACKAGES, open_isolated
+from rigsight.records.ordinary_file import file_size
 
 LARGEST_FILE = 2_000_000_000
 MEND = "Export it again, or as CSV."
@@ -55,13 +56,10 @@ def file_format(path: Path) -> str | None:
     InputError
         If the file cannot be read, or its name promises a format that its content is not.
     """
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; name the file in it.")
+    file_size(path)
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; check the path.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     found = _by_content(head)
@@ -116,7 +114,7 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     if kind is None:
         raise InputError(f"{path.name} is no measurement file of a known format.")
     name = _NAMES[kind]
-    size = path.stat().st_size
+    size = file_size(path)
     if size > LARGEST_FILE:
         raise InputError(
             f"{path.name} has {size / 1e9:.1f} GB, more than the {LARGEST_FILE / 1e9:g} GB that are read; "
@@ -127,6 +125,7 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
         with _told(path, name):
             file = stack.enter_context(_reader(kind)(path))
             check_count(path.name, len(file.channels))
+            check_total(path.name, sum(channel.n_samples for channel in file.channels))
         channels = tuple(_guarded(path, name, channel) for channel in file.channels)
         yield replace(file, channels=channels)
 

@@ -12,6 +12,9 @@ from rigsight.errors import InputError
 from rigsight.records.record import Hold
 
 FEWEST_SAMPLES = 50
+# Beyond, squares and quotients of what was read leave the range of numbers; bytes of another type look like this.
+LARGEST_NUMBER = 1e100
+SHORTEST_TIME = 1e-100
 # Of the sample time: above the first a record is refused; below the second interpolation adds more error than it mends.
 LARGEST_JITTER = 0.01
 NEGLIGIBLE_JITTER = 1e-4
@@ -80,6 +83,12 @@ def time_base(
     if stamps.size < FEWEST_SAMPLES:
         raise InputError(
             f"{file} has {stamps.size} samples; at least {FEWEST_SAMPLES} are needed for a record."
+        )
+    span = abs(stamps[-1] - stamps[0])
+    if not (span == 0.0 or span >= SHORTEST_TIME) or not np.max(np.abs(stamps)) <= LARGEST_NUMBER:
+        raise InputError(
+            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}, which nobody measures. Check the column "
+            "that time is read from, and its type."
         )
     index = np.arange(stamps.size, dtype=np.float64)
     slope, start = np.polyfit(index, stamps - stamps[0], 1)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.channel import Channel, ChannelFile, Refused, stated_unit, with_distinct_names
 from rigsight.records.channel_file import file_format, open_channels
-from rigsight.records.read_csv import Layout, find_layout, kept_lines, read_text
+from rigsight.records.read_csv import Layout, find_layout, kept_lines
+from rigsight.records.text_file import read_text
 
 
 def open_measurement(path: Path) -> AbstractContextManager[ChannelFile]:
@@ -38,6 +39,12 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
     rows = [lines[number - 1] for number in kept[layout.n_above :]]
     if not rows:
         raise InputError(f"{path.name} has a header but no rows of numbers.")
+    n_signs = sum(map(len, rows)) + len(rows)
+    if len(rows) * len(layout.names) > n_signs:
+        raise InputError(
+            f"{path.name}: most of its {len(rows)} rows are shorter than the {len(layout.names)} columns of its header. "
+            "Mend it, or cut the record there."
+        )
     table = _numbers(rows, layout)
     channels: list[Channel] = []
     refused: list[Refused] = []

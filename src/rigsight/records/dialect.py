@@ -6,11 +6,13 @@ import csv
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 COMMENT_SIGNS = ("#", "%", "//")
 # Earlier wins a tie: a comma may also be a decimal sign, and white space surrounds other separators.
 SEPARATORS = (";", "\t", "|", ",", " ")
 LINES_LOOKED_AT = 60
+SIGNS_LOOKED_AT = 400_000
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,9 @@ class Dialect:
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line, without quotes and surrounding blanks."""
         if self.separator == " ":
-            parts = (
-                line.split() if '"' not in line else next(csv.reader([" ".join(line.split())], delimiter=" "))
-            )
+            parts = line.split() if '"' not in line else _quoted(" ".join(line.split()), " ")
         elif '"' in line:
-            parts = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True))
+            parts = _quoted(line, self.separator)
         else:
             parts = line.split(self.separator)
         return [part.strip().strip("\"'").strip() for part in parts]
@@ -56,6 +56,14 @@ class Dialect:
         return all(Dialect(self.separator, sign).number(cell) is None for sign in (".", ","))
 
 
+def _quoted(line: str, separator: str) -> list[str]:
+    """Return the cells of a line with quotes; where these make no sense, as if they were none."""
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=separator != " "))
+    except csv.Error:
+        return line.split(separator)
+
+
 def is_comment(line: str, comment: str | None) -> bool:
     """Return True for a comment line; `comment` is the sign in use, None for any usual one."""
     return line.lstrip().startswith(comment or COMMENT_SIGNS)
@@ -71,7 +79,8 @@ def sniff(lines: Sequence[str], separator: str | None, decimal: str | None) -> D
     separator, decimal
         What is already known, else None.
     """
-    sample = lines[:LINES_LOOKED_AT]
+    signs = list(accumulate(map(len, lines[:LINES_LOOKED_AT])))
+    sample = lines[: max(sum(count <= SIGNS_LOOKED_AT for count in signs), 2)]
     candidates = [
         Dialect(candidate, sign)
         for candidate in (SEPARATORS if separator is None else (separator,))

@@ -22,10 +22,12 @@ _BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
 _TEXT = (1, 2, 4, 16, 17, 18)
 _CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse", *NUMERIC, "function", "opaque"), 1))
 _COMPLEX, _LOGICAL = 0x0800, 0x0200
-_HEADER = 128
+HEADER = 128
 _DEEPEST = 16
 # A variable that needs more once unpacked holds more samples than are read.
 _LARGEST_VARIABLE = 16 * MOST_SAMPLES
+# As many bytes as the largest file may have that is not packed.
+_MOST_UNPACKED = 2_000_000_000
 
 
 class DamagedError(ValueError):
@@ -64,8 +66,8 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
     InputError
         If a variable is larger than what is read.
     """
-    order = "<" if data[126:128] == b"IM" else ">"
-    position, count = _HEADER, 0
+    order = _order(data)
+    position, count, unpacked = HEADER, 0, 0
     while position < len(data):
         kind, start, end, position = _element(data, position, len(data), order)
         count += 1
@@ -73,12 +75,12 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
         if kind == _COMPRESSED:
             # Compressed variables are not padded to whole words.
             position = end
-            unpacker = zlib.decompressobj()
-            inside = unpacker.decompress(data[start:end], _LARGEST_VARIABLE)
-            if unpacker.unconsumed_tail:
+            inside = _unpacked(memoryview(data)[start:end], order, file)
+            unpacked += len(inside)
+            if unpacked > _MOST_UNPACKED:
                 raise InputError(
-                    f"{file}: a variable unpacks to more than {_LARGEST_VARIABLE / 1e6:g} MB, the most that is read. "
-                    "Split the record, or reduce the sample rate."
+                    f"{file}: its variables unpack to more than {_MOST_UNPACKED / 1e6:g} MB together, the most that is read. "
+                    "Split the record, or save only the variables that are needed."
                 )
             kind, start, end, _ = _element(inside, 0, len(inside), order)
         else:
@@ -86,6 +88,35 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
         if kind != _MATRIX:
             raise DamagedError(f"an element of type {kind} stands where a variable should")
         yield _matrix(inside, start, end, order, 0)
+
+
+def begins_with_variable(head: bytes) -> bool:
+    """Return whether the first element, of which the head of a file holds type and size, is a variable."""
+    return struct.unpack_from(_order(head) + "I", head, HEADER)[0] in (_MATRIX, _COMPRESSED)
+
+
+def _order(data: bytes) -> str:
+    return "<" if data[126:128] == b"IM" else ">"
+
+
+def _unpacked(packed: memoryview, order: str, file: str) -> bytes:
+    """Return the one element inside a compressed one; no more is unpacked than it says it has."""
+    unpacker = zlib.decompressobj()
+    head = unpacker.decompress(packed, 8)
+    if len(head) < 8:
+        raise DamagedError("a compressed variable is cut short")
+    first, size = struct.unpack(order + "II", head)
+    size = 0 if first >> 16 else size
+    if size > _LARGEST_VARIABLE:
+        raise InputError(
+            f"{file}: a variable unpacks to more than {_LARGEST_VARIABLE / 1e6:g} MB, the most that is read. "
+            "Split the record, or reduce the sample rate."
+        )
+    # A few bytes to spare, which tell whether there is more; a limit of 0 would mean none.
+    inside = head + unpacker.decompress(unpacker.unconsumed_tail, size + 8)
+    if len(inside) > 8 + size + 7:
+        raise DamagedError("a compressed variable holds more than it says")
+    return inside
 
 
 def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, int, int, int]:
@@ -143,20 +174,30 @@ def _matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> Va
     if kind in ("opaque", "function"):
         _check_object(data, position, stop, order, depth)
         return Variable(name, kind, shape)
-    _check_data(data, position, stop, order, kind, None if kind in ("char", "sparse") else size)
+    is_complex = bool(flags & _COMPLEX)
+    _check_data(data, position, stop, order, kind, is_complex, None if kind in ("char", "sparse") else size)
     if kind != "char":
-        kind = "complex" if flags & _COMPLEX else "logical" if flags & _LOGICAL else kind
+        kind = "complex" if is_complex else "logical" if flags & _LOGICAL else kind
     return Variable(name, kind, shape)
 
 
-def _check_data(data: bytes, position: int, stop: int, order: str, kind: str, size: int | None) -> None:
-    """Check the elements that hold the numbers of a variable: real, perhaps imaginary, of a sparse one the indices."""
+def _check_data(
+    data: bytes, position: int, stop: int, order: str, kind: str, is_complex: bool, size: int | None
+) -> None:
+    """Check the elements that hold the numbers of a variable: real, perhaps imaginary, of a sparse one the indices.
+
+    For one that is missing scipy would take what stands behind the variable.
+    """
+    missing = (3 if kind == "sparse" else 1) + (is_complex and kind != "char")
     while position < stop:
+        missing -= 1
         stored, start, end, position = _element(data, position, stop, order)
         if stored not in (_TEXT if kind == "char" else _BYTES):
             raise DamagedError(f"data is of type {stored}, which does not exist")
         if size is not None and end - start != size * _BYTES[stored]:
             raise DamagedError(f"{size} numbers are declared, and {end - start} bytes are there")
+    if missing:
+        raise DamagedError(f"a variable of class {kind} has not the parts that it says")
 
 
 def _check_object(data: bytes, position: int, stop: int, order: str, depth: int) -> None:

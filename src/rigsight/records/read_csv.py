@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
+from rigsight.records.channel import check_count, printable
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.dialect import Dialect, is_comment, looks_like_names, sniff
-
-# The text and its lines are held in memory together, about five times the file.
-LARGEST_FILE = 2_000_000_000
+from rigsight.records.text_file import read_text
 
 
 @dataclass(frozen=True)
@@ -74,6 +73,10 @@ def read_csv(
         Naming file, line and column, and the mend: the file cannot be read or is too large, a column is missing,
         a row has another width, a cell is not a finite number.
     """
+    if separator is not None and (len(separator) != 1 or separator in '"\r\n'):
+        raise InputError(
+            f"{path.name}: separator is {separator!r}; name one character, neither a quote nor a line end."
+        )
     if separator is not None and separator == decimal:
         raise InputError(
             f"{path.name}: separator and decimal sign are both '{decimal}'; name two different ones."
@@ -107,40 +110,6 @@ def read_csv(
     return Columns(values, labels, np.array(rows, dtype=np.int64), layout.notes)
 
 
-def read_text(path: Path) -> str:
-    """Return the text of a file with line feeds only.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is too large, or is no text.
-    """
-    try:
-        if path.is_dir():
-            raise InputError(f"{path} is a folder; name the file in it.")
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise InputError(
-                f"{path.name} has {size / 1e9:.1f} GB, more than the {LARGEST_FILE / 1e9:g} GB that are read; "
-                "split it into several records or reduce the sample rate."
-            )
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; check the path.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        text = data.decode("utf-16", errors="replace")
-    elif b"\x00" in data[:65536] or data.startswith(b"PK\x03\x04"):
-        raise InputError(f"{path.name} is not a text file; export the record as CSV.")
-    else:
-        try:
-            text = data.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            text = data.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
 def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:
     """Return the numbers, from 1, of the lines that are neither blank nor comments."""
     return [
@@ -161,7 +130,8 @@ def find_layout(
 ) -> Layout:
     """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out."""
     dialect = sniff([lines[number - 1] for number in kept[:100]], separator, decimal)
-    first = dialect.cells(lines[kept[0] - 1])
+    first = [printable(cell) for cell in dialect.cells(lines[kept[0] - 1])]
+    check_count(path.name, len(first))
     if header is None:
         header = looks_like_names(dialect, first)
     if not header:
@@ -172,7 +142,7 @@ def find_layout(
     units: tuple[str, ...] = ()
     n_above = 1
     if len(kept) > 1:
-        second = dialect.cells(lines[kept[1] - 1])
+        second = [printable(cell) for cell in dialect.cells(lines[kept[1] - 1])]
         if any(second) and all(dialect.is_text(cell) for cell in second):
             n_above = 2
             units = tuple(second)
@@ -190,7 +160,10 @@ def _names_in_comment(
     if first_row < 2 or not is_comment(lines[first_row - 2], comment):
         return None
     above = lines[first_row - 2].strip()
-    names = dialect.cells(above.removeprefix(comment) if comment else above.lstrip("#%/"))
+    names = [
+        printable(name)
+        for name in dialect.cells(above.removeprefix(comment) if comment else above.lstrip("#%/"))
+    ]
     names = [name for name in names if name] if dialect.separator == " " else names
     return tuple(names) if len(names) == width and looks_like_names(dialect, names) else None
 

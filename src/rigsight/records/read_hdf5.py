@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from rigsight.records.channel import (
     Channel,
     ChannelFile,
     Refused,
     check_count,
     columns_of,
+    kept_last,
     stated_unit,
     with_distinct_names,
 )
@@ -30,6 +33,7 @@ def open_hdf5(path: Path) -> Iterator[ChannelFile]:
     with h5py.File(path, "r") as file:
         channels: list[Channel] = []
         refused: list[Refused] = []
+        kept: dict[str, NDArray[Any]] = {}
 
         def visit(stored: str | bytes, item: Any) -> None:
             # A name that is no UTF-8 comes as bytes.
@@ -37,7 +41,8 @@ def open_hdf5(path: Path) -> Iterator[ChannelFile]:
             check_count(path.name, len(channels) + len(refused))
             if not isinstance(item, h5py.Dataset):
                 return
-            found = columns_of(name, item.shape or (), lambda: item[()], _unit(item))
+            read = kept_last(kept, name, lambda: item[()])
+            found = columns_of(name, item.shape or (), read, _unit(item))
             reason = _refusal(item)
             if reason is not None:
                 refused.append(Refused(name, reason))

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.channel import Channel, ChannelFile, Load, Refused, columns_of, with_distinct_names
-from rigsight.records.matlab_elements import Variable, declared_variables
+from rigsight.records.matlab_elements import (
+    HEADER,
+    DamagedError,
+    Variable,
+    begins_with_variable,
+    declared_variables,
+)
 from rigsight.records.matlab_names import DEEPER, NUMERIC, why_no_signal
 
 
@@ -21,12 +27,15 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
 
     MATLAB files state no units. Tables and timetables are objects that only MATLAB reads; they are refused by name.
     """
+    _check_first(path)
     data = path.read_bytes()
     read: dict[str, Any] = {}
 
     def load(variable: str, field: str | None) -> Load:
         def numbers() -> NDArray[Any]:
             if variable not in read:
+                # One at a time: packed variables together may be larger than any memory.
+                read.clear()
                 read[variable] = _read(data, variable)
             content = read[variable]
             numbers: NDArray[Any] = content if field is None else content[field].item()
@@ -53,6 +62,14 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
             else:
                 channels.extend(found)
     yield ChannelFile("MATLAB", with_distinct_names(channels), tuple(refused))
+
+
+def _check_first(path: Path) -> None:
+    """Refuse a file that begins with no variable before all of it is read."""
+    with path.open("rb") as stream:
+        head = stream.read(HEADER + 8)
+    if len(head) == HEADER + 8 and not begins_with_variable(head):
+        raise DamagedError("it does not begin with a variable")
 
 
 def _channels(name: str, declared: Variable, load: Load) -> list[Channel] | Refused:

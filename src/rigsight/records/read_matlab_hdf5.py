@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from rigsight.records.channel import (
     Channel,
     ChannelFile,
     Refused,
     check_count,
     columns_of,
+    kept_last,
     with_distinct_names,
 )
 from rigsight.records.matlab_names import DEEPER, NUMERIC, why_no_signal
@@ -26,10 +29,11 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
     with h5py.File(path, "r") as file:
         channels: list[Channel] = []
         refused: list[Refused] = []
+        kept: dict[str, NDArray[Any]] = {}
 
         def take(name: str, item: Any) -> None:
             check_count(path.name, len(channels) + len(refused))
-            found = _channels(name, item)
+            found = _channels(name, item, kept)
             if isinstance(found, Refused):
                 refused.append(found)
             else:
@@ -52,7 +56,7 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
         yield ChannelFile("MATLAB 7.3", with_distinct_names(channels), tuple(refused))
 
 
-def _channels(name: str, dataset: Any) -> list[Channel] | Refused:
+def _channels(name: str, dataset: Any, kept: dict[str, NDArray[Any]]) -> list[Channel] | Refused:
     kind = dataset.attrs.get("MATLAB_class", b"double")
     kind = kind.decode("ascii", errors="replace") if isinstance(kind, bytes) else str(kind)
     if "MATLAB_empty" in dataset.attrs:
@@ -61,4 +65,4 @@ def _channels(name: str, dataset: Any) -> list[Channel] | Refused:
         return Refused(name, why_no_signal(kind if kind not in NUMERIC else "complex"))
     if dataset.is_virtual or dataset.external:
         return Refused(name, "keeps its data in another file, which is not followed")
-    return columns_of(name, dataset.shape, lambda: dataset[()])
+    return columns_of(name, dataset.shape, kept_last(kept, name, lambda: dataset[()]))

@@ -15,7 +15,7 @@ from rigsight.records.channel_file import file_format
 from rigsight.records.channel_table import read_channels
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns
-from rigsight.records.conditioning import TimeBase, time_base
+from rigsight.records.conditioning import LARGEST_NUMBER, TimeBase, time_base
 from rigsight.records.plausibility import clipping, is_constant
 from rigsight.records.read_csv import read_csv
 from rigsight.records.record import Hold, Kind, Record, Role
@@ -122,6 +122,7 @@ def read_record(
         unit_notes += notes
     bases = _bases(path, table)
     raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
+    _refuse_what_nobody_measures(path, raw, table)
     found: list[str] = []
     if require_outputs:
         raw, found = _moving(path, raw, table, inputs, outputs, role)
@@ -143,6 +144,16 @@ def read_record(
         source=path,
         notes=(*table.notes, *unit_notes, *on_axis.notes, *found),
     )
+
+
+def _refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
+    for signal, samples in raw.items():
+        largest = float(np.max(np.abs(samples)))
+        if largest > LARGEST_NUMBER:
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': {signal} is as large as {largest:.3g}, which nobody measures "
+                f"(up to {LARGEST_NUMBER:g} is read). Check the column and its type."
+            )
 
 
 def _refuse_dialect(path: Path, **dialect: object) -> None:

@@ -51,7 +51,7 @@ class Record:
     Raises
     ------
     InputError
-        If the signals differ in length, are not one-dimensional and finite, or `dt` is not a positive number.
+        If the signals differ in length, are not one-dimensional and finite, `dt` is not a positive number, or `t0` not finite.
     """
 
     name: str
@@ -71,6 +71,8 @@ class Record:
             raise InputError(
                 f"Record '{self.name}': dt must be a positive number of seconds, got {self.dt!r}."
             )
+        if not math.isfinite(self.t0):
+            raise InputError(f"Record '{self.name}': t0 must be a finite number of seconds, got {self.t0!r}.")
         if not self.signals:
             raise InputError(f"Record '{self.name}' has no signals: give at least one.")
         check_option(f"Record '{self.name}': role", self.role, get_args(Role))

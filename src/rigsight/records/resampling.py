@@ -98,15 +98,16 @@ def resampled(
             )
     start = max(base.t0 for base in bases.values())
     stop = min(base.t0 + base.dt * (samples[signal].size - 1) for signal, base in bases.items())
-    n_samples = int(np.floor((stop - start) / step + _ON_GRID)) + 1
+    asked = (stop - start) / step
+    if not asked <= MOST_SAMPLES:
+        raise InputError(
+            f"{file}: resample = {step:g} makes {asked:.3g} samples, more than the {MOST_SAMPLES} that are held."
+        )
+    n_samples = int(np.floor(asked + _ON_GRID)) + 1
     if n_samples < FEWEST_SAMPLES:
         raise InputError(
             f"{file}: the signals have {max(n_samples, 0)} samples of {step:g} s in common (from {start:.6g} s to {stop:.6g} s); "
             f"at least {FEWEST_SAMPLES} are needed for a record. Do their clocks start together?"
-        )
-    if n_samples > MOST_SAMPLES:
-        raise InputError(
-            f"{file}: resample = {step:g} makes {n_samples} samples, more than the {MOST_SAMPLES} that are held."
         )
     on_axis, how = {}, []
     for signal, base in bases.items():

@@ -189,7 +189,7 @@ def read_json(file: Path) -> dict[str, Any]:
     """
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{file} cannot be read: {error}. Remove it, and the bench makes it anew.") from None
     if not isinstance(content, dict):
         raise InputError(f"{file} holds no JSON object. Remove it, and the bench makes it anew.")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, shown
 from rigsight.parameters import Parameter
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
@@ -267,13 +267,16 @@ def file_inside(path: Path, number: int, record: RecordTable) -> Path:
     key = f"{path.name}: record {number}: file"
     folder = path.parent.resolve()
     asked = Path(record.file)
-    if "\x00" in record.file:
-        raise InputError(f"{key}: is no file name.")
-    if asked.is_absolute() or ".." in asked.parts or not (folder / asked).resolve().is_relative_to(folder):
+    try:
+        inside, exists = (folder / asked).resolve().is_relative_to(folder), (folder / asked).is_file()
+    except (OSError, ValueError, RuntimeError):
+        # Longer than names may be, with a null or half a sign in it, or a link to itself.
+        raise InputError(f"{key}: is no file name that can be looked up: {shown(record.file)}.") from None
+    if asked.is_absolute() or ".." in asked.parts or not inside:
         raise InputError(
             f"{key}: '{record.file}' leaves the campaign's folder; put the file beside {path.name}."
         )
-    if not (folder / asked).is_file():
+    if not exists:
         files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
         raise InputError(
             f"{key}: '{record.file}' does not exist in {path.parent}.{nearest(record.file, files)} Check the name."

@@ -8,8 +8,9 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold, Kind, Role
+from rigsight.records.ordinary_file import file_size
 
 MOST_RECORDS = 1000
 LARGEST_FILE = 10_000_000
@@ -102,7 +103,7 @@ def read_campaign_table(path: Path) -> CampaignTable:
         Naming the file with line and column for a syntax error, or with the key for anything else.
     """
     try:
-        if path.stat().st_size > LARGEST_FILE:
+        if file_size(path, "the campaign.toml") > LARGEST_FILE:
             raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no campaign.toml.")
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
@@ -113,6 +114,13 @@ def read_campaign_table(path: Path) -> CampaignTable:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    except InputError:
+        raise
+    except RecursionError:
+        raise InputError(f"{path.name} is nested deeper than a campaign ever is.") from None
+    except ValueError:
+        # The only thing that is valid TOML and yet fails is a whole number of thousands of digits.
+        raise InputError(f"{path.name} holds a whole number with more digits than are read.") from None
     return checked_file(path, data, CampaignTable)
 
 
@@ -158,6 +166,9 @@ def _messages(
 
 def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
+    if not location:
+        # Only a key with half a sign in it belongs to no place.
+        return f"{path.name}: a key is no text: {shown(problem['input'])}. Use plain letters."
     key = key_text(location, data)
     kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
     if kind == "extra_forbidden":
@@ -172,24 +183,26 @@ def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dic
             if isinstance(got, str)
             else ""
         )
-        return f"{path.name}: {key}: is {got!r}.{hint} Allowed: {allowed}."
+        return f"{path.name}: {key}: is {shown(got)}.{hint} Allowed: {allowed}."
     if kind == "finite_number":
-        return f"{path.name}: {key}: must be a finite number, got {got}."
+        return f"{path.name}: {key}: must be a finite number, got {shown(got)}."
     if kind == "float_type":
-        return f"{path.name}: {key}: must be a number, got {got!r}. Write numbers without quotes and units."
+        return (
+            f"{path.name}: {key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
+        )
     if location == ("records",) and kind in ("too_short", "too_long"):
         count = len(got)
         return f"{path.name}: records: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
     if location[-1] == "decimal":
-        return f'{path.name}: {key}: must be "." or ",", got {got!r}.'
+        return f'{path.name}: {key}: must be "." or ",", got {shown(got)}.'
     if location[-1] == "separator":
-        return f"{path.name}: {key}: must be one character, got {got!r}; a blank stands for any white space."
+        return f"{path.name}: {key}: must be one character, got {shown(got)}; a blank stands for any white space."
     if "columns" in location[:-1]:
         return (
-            f"{path.name}: {key}: got {got!r}. Write the column's name, its number counted from 1, "
+            f"{path.name}: {key}: got {shown(got)}. Write the column's name, its number counted from 1, "
             'or { name = "...", scale = 1.0, offset = 0.0 }, or { name = "...", unit = "mm" }.'
         )
-    return f"{path.name}: {key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {got!r}.{_how_to_write(location)}"
+    return f"{path.name}: {key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {shown(got)}.{_how_to_write(location)}"
 
 
 def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:

@@ -5,19 +5,21 @@ What is checked here needs no simulation; `rigsight.workflow.effect_promises` ho
 
 from __future__ import annotations
 
+import keyword
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
 import sympy as sp
 from sympy.core.function import Application
 
-from rigsight.effects import Effect, Energy, Place, Signature, State
+from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.errors import nearest
 from rigsight.parameters import Parameter
 from rigsight.rigs import RIGS
 from rigsight.simulate import compose
 from rigsight.units import parse_dimension
+from rigsight.workflow.effect_types import type_faults
 
 _MOTION = ("x", "v", "t", "k", "m")
 _MAY_READ: Mapping[str, tuple[str, ...]] = {
@@ -52,7 +54,7 @@ _SMOOTH = (
 
 def declaration_faults(effect: Effect) -> tuple[str, ...]:
     """Return what is wrong with a declaration, one sentence each; nothing where it is in order."""
-    wrong_types = tuple(_type_faults(effect))
+    wrong_types = tuple(type_faults(effect))
     if wrong_types:
         # Nothing else can be looked at where a field does not hold what it should.
         return wrong_types
@@ -68,35 +70,12 @@ def equations(effect: Effect) -> dict[str, sp.Expr]:
     return {field: expression for field, expression in found.items() if expression is not None}
 
 
-def _type_faults(effect: Effect) -> Iterator[str]:
-    for field, wanted in (("name", str), ("summary", str), ("place", Place), ("energy", Energy)):
-        if not isinstance(getattr(effect, field), wanted):
-            yield f"{field} is {getattr(effect, field)!r}; give a {wanted.__name__}{_options(wanted)}."
-    signature: object = effect.signature
-    if not isinstance(signature, Signature):
-        yield f"signature is {signature!r}; give a Signature, for instance Signature(GainTrend.FALLS)."
-    for field in ("parameters", "states", "starts", "searched_as"):
-        if not isinstance(getattr(effect, field), tuple):
-            yield f"{field} is a {type(getattr(effect, field)).__name__}; give a tuple (with a comma behind a single one)."
-            return
-    for field, member_type in (("parameters", Parameter), ("states", State)):
-        for member in getattr(effect, field):
-            if not isinstance(member, member_type):
-                yield f"{field} holds {member!r}; give a {member_type.__name__}."
-    for field, expression in equations(effect).items():
-        if not isinstance(expression, sp.Expr):
-            yield f"{field} is {expression!r}; give an expression of sympy symbols."
-
-
-def _options(wanted: type) -> str:
-    return (
-        f" ({', '.join(f'{wanted.__name__}.{o.name}' for o in wanted)})" if wanted in (Place, Energy) else ""
-    )
-
-
 def _name_faults(effect: Effect) -> Iterator[str]:
     if not effect.name.isidentifier() or not effect.name.isascii() or effect.name != effect.name.lower():
         yield f"the name '{effect.name}' must consist of lower-case letters, digits and underscores."
+    for symbol in (*(p.name for p in effect.parameters), *(state.symbol.name for state in effect.states)):
+        if not symbol.isidentifier() or not symbol.isascii() or keyword.iskeyword(symbol):
+            yield f"the symbol '{symbol}' must consist of letters, digits and underscores, and not be a word of Python."
     if not effect.summary.strip():
         yield "the summary is empty; say in one sentence what the effect does."
 

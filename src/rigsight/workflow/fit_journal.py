@@ -51,7 +51,7 @@ class FitJournal:
             try:
                 entry = json.loads(line)
                 self._known[entry["key"]] = _checked(entry)
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError):
                 continue
         return self
 

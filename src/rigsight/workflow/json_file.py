@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
+from rigsight.records.ordinary_file import file_size
 
 LARGEST_FILE = 10_000_000
 
@@ -29,7 +30,7 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
         Naming the file, and line and column of what is no JSON; also for repeated keys and NaN, which Python would read.
     """
     try:
-        if path.stat().st_size > LARGEST_FILE:
+        if file_size(path) > LARGEST_FILE:
             raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no {what}.")
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -42,7 +43,9 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
         raise InputError(
             f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. {mend}"
         ) from None
-    except (_MeaninglessError, ValueError, RecursionError) as error:
+    except RecursionError:
+        raise InputError(f"{path.name}: is nested deeper than a {what} ever is. {mend}") from None
+    except (_MeaninglessError, ValueError) as error:
         raise InputError(f"{path.name}: {error}") from None
     if not isinstance(data, dict):
         raise InputError(f"{path.name}: must hold one object in braces, got a {type(data).__name__}. {mend}")

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rigsight.discover.monomials import known_terms
 from rigsight.effects import Effect, effect_named
-from rigsight.errors import InputError, nearest
+from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
 from rigsight.rigs import RIGS
 from rigsight.rigs.published import published_sets
@@ -147,18 +147,16 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
     if kind == "missing":
         return f"{start}is missing."
     if key == "schema_version":
-        return (
-            f"{start}is {got!r}, this version reads {SCHEMA_VERSION}. Use the rigsight that wrote the model."
-        )
+        return f"{start}is {shown(got)}, this version reads {SCHEMA_VERSION}. Use the rigsight that wrote the model."
     if kind == "literal_error":
         options = str(problem["ctx"]["expected"]).replace(" or ", ", ")
-        return f"{start}is {got!r}. Allowed: {options}."
+        return f"{start}is {shown(got)}. Allowed: {options}."
     if kind == "float_type":
-        return f"{start}must be a number, got {got!r}."
+        return f"{start}must be a number, got {shown(got)}."
     if kind == "finite_number":
-        return f"{start}must be a finite number, got {got}."
+        return f"{start}must be a finite number, got {shown(got)}."
     message = str(problem["msg"])
-    return f"{start}{message[0].lower()}{message[1:]}, got {got!r}."
+    return f"{start}{message[0].lower()}{message[1:]}, got {shown(got)}."
 
 
 def _structure(path: Path, table: ModelTable, own_effects: Iterable[Effect]) -> Structure:

@@ -17,6 +17,7 @@ from types import ModuleType
 from rigsight.discover.monomials import known_terms
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, RigsightError, check_option
+from rigsight.records.ordinary_file import file_size
 from rigsight.workflow.effect_declaration import declaration_faults, equations
 from rigsight.workflow.effect_promises import broken_promises
 from rigsight.workflow.progress import Listener, Stage, silent
@@ -141,6 +142,8 @@ def _loaded(path: Path) -> list[OwnEffect]:
         raise InputError(f"{path.name}, line {error.lineno}: is not valid Python: {error.msg}.") from None
     except ValueError as error:
         raise InputError(f"{path.name}: is not valid Python: {error}.") from None
+    except (RecursionError, MemoryError):
+        raise InputError(f"{path.name}: is nested deeper than Python reads.") from None
     module = ModuleType(f"rigsight_own_effects_{path.stem}")
     module.__file__ = str(path)
     try:
@@ -164,13 +167,9 @@ def _loaded(path: Path) -> list[OwnEffect]:
 
 
 def _source(path: Path) -> str:
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; name the Python file with the effects.")
+    if path.exists() and file_size(path, "the Python file with the effects") > _LARGEST_FILE:
+        raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB: it is no file of effects.")
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(
-                f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB: it is no file of effects."
-            )
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}).") from None

@@ -1,0 +1,39 @@
+"""Is it an ordinary file, so that reading it comes to an end?"""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from rigsight.errors import InputError
+
+
+def file_size(path: Path, what: str = "the file") -> int:
+    """Return the size of a file in bytes.
+
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        What a folder is said to hold: ``"the file"``.
+
+    Raises
+    ------
+    InputError
+        If it does not exist, cannot be looked at, or is a folder, a device or a pipe: those have no size, and no end.
+    """
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; check the path.") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "this is no file name"
+        raise InputError(f"{path} cannot be read: {reason}.") from None
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError(f"{path} is a folder; name {what} in it.")
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(
+            f"{path} is no ordinary file but a device or a pipe; save its contents as a file first."
+        )
+    return found.st_size
