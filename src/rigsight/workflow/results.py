@@ -7,7 +7,6 @@ import errno
 import json
 import os
 import secrets
-import shutil
 import signal
 import tempfile
 import threading
@@ -187,21 +186,6 @@ def signals_held() -> Iterator[Sequence[int]]:
             signal.signal(number, old)
         for number in held[:1]:
             signal.raise_signal(number)
-
-
-@contextlib.contextmanager
-def removed_on_failure(folder: Path) -> Iterator[None]:
-    """Remove a folder, with the folders above it, that was made inside this context if the work in it fails."""
-    new = [path for path in (folder, *folder.parents) if not path.exists()]
-    try:
-        yield
-    except BaseException:
-        if folder in new:
-            shutil.rmtree(folder, ignore_errors=True)
-        for path in new[1:]:
-            if path.is_dir() and not any(path.iterdir()):
-                path.rmdir()
-        raise
 
 
 def _made(folder: Path) -> list[Path]:
