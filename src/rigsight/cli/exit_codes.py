@@ -58,7 +58,9 @@ def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
     except OSError as error:
         if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
             _leave_defect(error)
-        # Results have messages of their own; what is left is what lies between.
+        # Results have messages of their own; what is left is what is read, and what lies between.
+        if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
+            leave(f"{error.filename} may not be read or written. Change its permissions; {left}.", BAD_INPUT)
         place = f" ({error.filename})" if error.filename else ""
         leave(
             f"a temporary file or the output cannot be written{place}: {error.strerror}. Make room there, or set TMPDIR to a "
@@ -115,7 +117,10 @@ def output_told() -> Iterator[None]:
         if "--debug" in sys.argv:
             raise
         _forget_output()
-        leave(f"the output cannot be written: {error.strerror}. Results in files are complete.", BAD_INPUT)
+        leave(
+            f"the output cannot be written: {error.strerror}. Files that the command writes are complete.",
+            BAD_INPUT,
+        )
 
 
 def _leave_unread() -> NoReturn:

@@ -25,6 +25,7 @@ from typing import Any, TypeVar
 from joblib import Parallel, delayed
 
 from rigsight.errors import InputError, RigsightError
+from rigsight.workflow.parent_watch import end_with_parent
 
 Name = TypeVar("Name", int, str)
 Result = TypeVar("Result")
@@ -88,7 +89,9 @@ def _on_this_machine(
     run_one: Callable[[Name], Result], trials: Sequence[Name], n_jobs: int
 ) -> Iterator[Result]:
     processes = min(n_jobs, max(1, len(trials)))
-    parallel = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
+    # Killed outright, this process could not end the others.
+    own: dict[str, Any] = {"backend": "loky", "initializer": end_with_parent} if processes > 1 else {}
+    parallel = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1, **own)
     try:
         yield from parallel(delayed(run_one)(trial) for trial in trials)
     except BrokenProcessPool:

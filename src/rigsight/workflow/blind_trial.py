@@ -31,7 +31,7 @@ _KEPT_VARIABLES = (
 )
 """What a diagnosing process needs of its surroundings; nothing else of them reaches it."""
 _START = (
-    "from rigsight.workflow.parent_watch import end_with_parent; end_with_parent(); "
+    "import os; from rigsight.workflow.parent_watch import end_with_parent; end_with_parent(os.getcwd()); "
     "from rigsight.cli import main; main()"
 )
 _FAILURES = (1, 2)
