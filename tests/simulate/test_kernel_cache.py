@@ -119,6 +119,16 @@ def test_a_full_disk_leaves_no_part_of_a_kernel(fresh_cache, monkeypatch):
     assert [path for path in fresh_cache.rglob("*") if path.is_file()] == []
 
 
+def test_kernels_of_somebody_else_that_may_only_be_read_are_told(fresh_cache, monkeypatch):
+    def unwritable(self: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    # Every place that numba would take is asked like this whether it can be written.
+    monkeypatch.setattr("numba.core.caching._CacheLocator.ensure_cache_path", unwritable)
+    with pytest.raises(InputError, match=r"cannot be written.*Set RIGSIGHT_CACHE_DIR"):
+        kernel_cache.kernels(compose(AXIS, [effect_named("cubic_stiffness")]))
+
+
 def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
     def homeless() -> Path:
         raise RuntimeError("Could not determine home directory.")

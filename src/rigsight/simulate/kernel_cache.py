@@ -175,5 +175,15 @@ def _load(name: str, path: Path) -> ModuleType:
     assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
-    specification.loader.exec_module(module)
+    try:
+        specification.loader.exec_module(module)
+    except RuntimeError as error:
+        # numba's word for a folder in which it may not put machine code.
+        if "cannot cache" not in str(error):
+            raise
+        del sys.modules[name]
+        raise InputError(
+            f"Cannot keep compiled kernels in {path.parent} (it cannot be written). "
+            f"Set {CACHE_VARIABLE} to a folder that can be written."
+        ) from error
     return module
