@@ -1,8 +1,11 @@
-"""A defect and an interruption end in one message and an exit code, and leave nothing behind."""
+"""A defect, an interruption and output that nobody takes end in one message and an exit code, and leave nothing behind."""
 
 from __future__ import annotations
 
+import errno
+import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from rigsight.workflow.progress import Stage
+from rigsight.workflow.progress_display import listening
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")
 Run = Callable[..., tuple[int, str, str]]
@@ -73,3 +79,114 @@ def test_an_interrupted_diagnosis_leaves_nothing(stage: str, axis_campaign: Path
     assert "Traceback" not in stderr
     assert stderr.strip().endswith("interrupted; nothing was written; the same command goes on from there.")
     assert not out.parent.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
+@pytest.mark.parametrize(
+    ("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
+)
+def test_requests_to_end_end_like_ctrl_c(
+    number: signal.Signals,
+    expected: int,
+    axis_campaign: Path,
+    tmp_path: Path,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("rigsight.workflow.diagnose.diagnose", lambda *_, **__: signal.raise_signal(number))
+    monkeypatch.setattr("rigsight.workflow.diagnose.prepare_kernels", lambda *_, **__: None)
+    before = signal.getsignal(number)
+    code, stdout, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
+    assert (code, stdout) == (expected, "")
+    assert stderr == "rigsight: interrupted; nothing was written; the same command goes on from there.\n"
+    assert not (tmp_path / "out").exists()
+    assert signal.getsignal(number) == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
+def test_who_does_not_want_to_be_ended_by_a_terminal_is_not(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def listed(*_: object, **__: object) -> tuple[()]:
+        signal.raise_signal(signal.SIGHUP)
+        return ()
+
+    monkeypatch.setattr("rigsight.workflow.own_effects.own_effects", listed)
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert run("effects")[0] == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes differ there")
+def test_output_that_nobody_reads_ends_without_a_word() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    shown = subprocess.run([RIGSIGHT, "effects"], stdout=writer, stderr=subprocess.PIPE, check=False)
+    os.close(writer)
+    assert (shown.returncode, shown.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device here that is always full")
+def test_output_that_finds_no_room_is_told(axis_campaign: Path) -> None:
+    record = axis_campaign / "fit.csv"
+    with Path("/dev/full").open("wb") as full:
+        shown = subprocess.run(
+            [RIGSIGHT, "inspect", record], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert shown.returncode == 2
+    assert shown.stderr.startswith("rigsight: the output cannot be written: No space left on device.")
+    assert shown.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "set TMPDIR"),
+        (FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']"), "set TMPDIR"),
+        (PermissionError(errno.EACCES, "Permission denied", "/there"), "/there may not be read or written"),
+    ],
+)
+def test_a_disk_that_takes_or_gives_nothing_is_no_defect(
+    error: OSError, expected: str, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("rigsight.workflow.own_effects.own_effects", fails)
+    code, stdout, stderr = run("effects")
+    assert (code, stdout, stderr.count("\n")) == (2, "", 1)
+    assert expected in stderr
+
+
+def test_a_log_that_is_full_stops_no_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Full(io.StringIO):
+        def write(self, _: str) -> int:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(sys, "stderr", Full())
+    with listening(quiet=False) as listener:
+        Stage("Diagnosing", 2, listener).finished("one")
+
+
+def test_a_process_without_stderr_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", None)
+    with listening(quiet=False) as listener:
+        Stage("Diagnosing", 2, listener).finished("one")
+
+
+def test_a_terminal_shows_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    shown = Terminal()
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    with listening(quiet=False) as listener:
+        stage = Stage("Diagnosing", 4, listener)
+        for name in ("one", "two", "three"):
+            stage.finished(name)
+    assert re.search(r"3/4.*\d:\d\d:\d\d.* left .*\d:\d\d:\d\d.*three", shown.getvalue())

@@ -49,6 +49,9 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, make_t
         assert abs(coefficient.value - values[name]) < Z_MAX * coefficient.std, name
         if noise <= 2e-5 and values[name] != 0.0:
             assert coefficient.value == pytest.approx(values[name], rel=tolerance), name
+    # Terms that are equally improbable stand in an order that does not change from run to run.
+    left_out = [(-term.inclusion, term.name) for term in found.terms if not term.kept]
+    assert left_out == sorted(left_out)
     for term in found.terms:
         if not term.kept:
             assert term.inclusion < 0.5, term.name

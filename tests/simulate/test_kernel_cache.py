@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -106,6 +107,37 @@ def test_cache_that_cannot_be_written_is_explained(tmp_path, monkeypatch):
     monkeypatch.setattr(kernel_cache, "_modules", {})
     with pytest.raises(InputError, match=kernel_cache.CACHE_VARIABLE):
         kernel_cache.kernels(compose(AXIS))
+
+
+def test_a_full_disk_leaves_no_part_of_a_kernel(fresh_cache, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(InputError, match=r"No space left.*RIGSIGHT_CACHE_DIR"):
+        kernel_cache.kernels(compose(AXIS, [effect_named("cubic_stiffness")]))
+    assert [path for path in fresh_cache.rglob("*") if path.is_file()] == []
+
+
+def test_kernels_of_somebody_else_that_may_only_be_read_are_told(fresh_cache, monkeypatch):
+    def unwritable(self: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    # Every place that numba would take is asked like this whether it can be written.
+    monkeypatch.setattr("numba.core.caching._CacheLocator.ensure_cache_path", unwritable)
+    with pytest.raises(InputError, match=r"cannot be written.*Set RIGSIGHT_CACHE_DIR"):
+        kernel_cache.kernels(compose(AXIS, [effect_named("cubic_stiffness")]))
+
+
+def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("RIGSIGHT_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    with pytest.raises(InputError, match="Set RIGSIGHT_CACHE_DIR"):
+        kernel_cache.cache_folder()
 
 
 def test_damaged_machine_code_is_replaced(tmp_path):

@@ -14,7 +14,8 @@ from rigsight.workflow.campaign import read_campaign
 @pytest.fixture
 def campaign_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The campaign of the demo, without its diagnosis."""
-    monkeypatch.setattr(demo, "run_diagnose", lambda *_, **__: None)
+    monkeypatch.setattr(demo, "diagnose_campaign", lambda *_, **__: None)
+    monkeypatch.setattr(demo, "result_files", lambda *_, **__: {})
     monkeypatch.setattr(demo, "prepare_kernels", lambda *_, **__: None)
     demo.run_demo(tmp_path / "demo", seed=1)
     return tmp_path / "demo" / "campaign"
@@ -49,17 +50,19 @@ def test_the_campaign_does_not_tell_what_is_hidden(campaign_only: Path) -> None:
     assert demo.HIDDEN_EFFECT not in table["rig"]["effects"]
 
 
-def test_a_failed_diagnosis_leaves_no_campaign_behind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_failed_diagnosis_leaves_no_campaign_behind_and_an_earlier_one_alone(
+    campaign_only: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(demo, "run_diagnose", interrupted)
-    monkeypatch.setattr(demo, "prepare_kernels", lambda *_, **__: None)
-    with pytest.raises(KeyboardInterrupt):
-        demo.run_demo(tmp_path / "demo")
-    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(demo, "diagnose_campaign", interrupted)
+    earlier = {path: path.read_bytes() for path in campaign_only.iterdir()}
+    for name in ("demo", "new"):
+        with pytest.raises(KeyboardInterrupt):
+            demo.run_demo(tmp_path / name, seed=2)
+    assert [path.name for path in tmp_path.iterdir()] == ["demo"]
+    assert {path: path.read_bytes() for path in campaign_only.iterdir()} == earlier
 
 
 @pytest.mark.slow

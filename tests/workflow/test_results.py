@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,9 +14,9 @@ from rigsight.workflow.results import (
     check_target,
     check_writable,
     json_text,
-    removed_on_failure,
     write_together,
 )
+from rigsight.workflow.unfinished_files import hidden, write_locked
 
 CONTENTS = {"a.json": "{}\n", "b.html": "<p>ä</p>\n"}
 
@@ -105,19 +108,101 @@ def test_numbers_that_json_cannot_hold_are_refused() -> None:
         json_text({"value": float("nan")})
 
 
-@pytest.mark.parametrize("existed", [True, False])
-def test_a_folder_is_removed_with_a_failure_only_if_it_is_new(existed: bool, tmp_path: Path) -> None:
-    folder = tmp_path / "out" / "campaign"
-    if existed:
-        folder.mkdir(parents=True)
+@pytest.mark.parametrize("error", [PermissionError(errno.EACCES, "open elsewhere"), KeyboardInterrupt()])
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_that_cannot_get_its_name_brings_the_old_ones_back(
+    error: BaseException, links: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.json").write_text("old")
+    original = Path.replace
 
-    def fail() -> None:
-        with removed_on_failure(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / "record.csv").write_text("t,u\n")
-            raise KeyboardInterrupt
+    def failing(part: Path, target: Path) -> Path:
+        if part.suffix == ".part" and target.name == "b.html":
+            raise error
+        return original(part, target)
 
-    with pytest.raises(KeyboardInterrupt):
-        fail()
-    assert folder.exists() == existed
-    assert (tmp_path / "out").exists() == existed
+    def unknown(*_: object) -> None:
+        raise OSError(errno.EPERM, "this file system has no links")
+
+    monkeypatch.setattr(Path, "replace", failing)
+    if not links:
+        monkeypatch.setattr(Path, "hardlink_to", unknown)
+    with pytest.raises((InputError, KeyboardInterrupt)):
+        write_together(tmp_path, {"a.json": "new", "c.csv": "new", "b.html": "new"})
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.json": "old"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_files_get_their_names_waits_and_leaves_the_old_ones(
+    number: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.json").write_text("old")
+    original = Path.replace
+    ends = []
+
+    def interrupted(part: Path, target: Path) -> Path:
+        signal.raise_signal(number)
+        return original(part, target)
+
+    def end(*_: object) -> None:
+        ends.append({path.name: path.read_text() for path in tmp_path.iterdir()})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    before = signal.signal(number, end)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            write_together(tmp_path, CONTENTS)
+    finally:
+        signal.signal(number, before)
+    assert ends[0].items() >= {"a.json": "old"}.items()
+    assert "b.html" not in ends[0]
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.json": "old"}
+
+
+def test_what_a_killed_run_left_is_removed_but_no_file_of_a_run_at_work(tmp_path: Path) -> None:
+    pytest.importorskip("fcntl", reason="nothing tells there whether a writer lives")
+    left = [hidden(tmp_path / name, "0a1b2c3d", ending) for name in CONTENTS for ending in ("part", "old")]
+    for path in left:
+        path.write_text("left")
+    mine = tmp_path / ".a.json.draft.part"
+    mine.write_text("mine")
+    with write_locked(hidden(tmp_path / "a.json", "ffffffff", "part"), b"at work") as at_work:
+        write_together(tmp_path, CONTENTS)
+        names = sorted(path.name for path in tmp_path.iterdir())
+        assert names == sorted([mine.name, Path(at_work.name).name, *CONTENTS])
+
+
+def test_files_in_folders_inside_are_written_with_the_others(tmp_path: Path) -> None:
+    write_together(tmp_path / "out", {"campaign/a.csv": "a", "b.json": "b"})
+    assert (tmp_path / "out/campaign/a.csv").read_text() == "a"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="limits of a process are set between fork and exec")
+@pytest.mark.parametrize("bytes_left", [1_000, 30_000])
+def test_a_disk_that_is_full_for_real_leaves_the_old_files(bytes_left: int, tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    for name in ("a", "b"):
+        (tmp_path / name).write_text("old")
+    code = (
+        "import sys; from pathlib import Path; from rigsight.errors import InputError\n"
+        "from rigsight.workflow.results import write_together\n"
+        "try: write_together(Path(sys.argv[1]), {'a': 'x' * 20_000, 'b': 'x' * 40_000})\n"
+        "except InputError as error: sys.exit(str(error))"
+    )
+
+    def limit() -> None:
+        # What a file may grow to: the same failure of a write as on a full disk, without one.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, bytes_left))
+
+    run = subprocess.run(
+        [sys.executable, "-B", "-c", code, tmp_path],
+        preexec_fn=limit,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 1
+    assert "Cannot write results" in run.stderr
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "old", "b": "old"}

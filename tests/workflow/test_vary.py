@@ -80,13 +80,18 @@ def test_the_command_writes_pictures_and_numbers(tmp_path: Path) -> None:
     assert "break [rad/s]" in result.output
 
 
-def test_one_parameter_has_a_picture_of_the_plain_name_and_progress_is_told(tmp_path: Path) -> None:
+def test_one_parameter_has_a_picture_of_the_plain_name_and_progress_and_the_same_again_is_the_same(
+    tmp_path: Path,
+) -> None:
     steps: list[Step] = []
-    (variation,) = run_vary("identified", ["k_c"], tmp_path, steps=2, listener=steps.append)
-    assert {path.name for path in tmp_path.iterdir()} == {"vary.json", "vary.svg", "vary.png"}
+    (variation,) = run_vary("identified", ["k_c"], tmp_path / "one", steps=2, listener=steps.append)
+    files = {path.name: path.read_bytes() for path in (tmp_path / "one").iterdir()}
+    assert files.keys() == {"vary.json", "vary.svg", "vary.png"}
     sweeping = [step for step in steps if step.stage == "Sweeping"]
     assert (sweeping[-1].done, sweeping[-1].total) == (2, 2)
     assert "k_c [N m/rad]" in table_text(variation)
+    run_vary("identified", ["k_c"], tmp_path / "again", steps=2)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()} == files
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,12 @@ from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
-from rigsight.cli.exit_codes import INTERRUPTED, leave
+from rigsight.cli.exit_codes import output_told
 from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
+from rigsight.cli.signals import ended_by_signals
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
 
@@ -53,10 +54,8 @@ def main() -> None:
     """Run the command line."""
     # Candidates are fitted side by side; matrix products that spread over the same processors only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    try:
+    with output_told(), ended_by_signals():
         app()
-    except KeyboardInterrupt:
-        leave("interrupted; nothing was written.", INTERRUPTED)
 
 
 def _version(asked: bool) -> None:

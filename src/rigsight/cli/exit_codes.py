@@ -1,20 +1,26 @@
 """How does an error become one message on stderr and an exit code?
 
-Exit codes: 0 success, 1 a defect of rigsight, 2 input that cannot be used, 130 interrupted.
+Exit codes: 0 success, 1 a defect of rigsight, 2 input that cannot be used or a disk that does not take results, 130 Ctrl-C, 143
+and 129 ended by kill and by a terminal that went away, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
+import sys
 import warnings
 from collections.abc import Iterator
 from typing import NoReturn
 
 import typer
 
+from rigsight.cli.signals import exit_code
 from rigsight.errors import RigsightError
 
-DEFECT, BAD_INPUT, INTERRUPTED = 1, 2, 130
+DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
 GOES_ON = "nothing was written; the same command goes on from there"
 """What an interrupted diagnosis leaves: no file, but the fits that it has done."""
 
@@ -45,19 +51,87 @@ def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
             yield
     except RigsightError as error:
         leave(str(error), BAD_INPUT)
-    except KeyboardInterrupt:
-        leave(f"interrupted; {left}.", INTERRUPTED)
+    except KeyboardInterrupt as error:
+        leave(f"interrupted; {left}.", exit_code(error))
     except BrokenPipeError:
         raise
+    except OSError as error:
+        if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
+            _leave_defect(error)
+        # Results have messages of their own; what is left is what is read, and what lies between.
+        if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
+            leave(f"{error.filename} may not be read or written. Change its permissions; {left}.", BAD_INPUT)
+        place = f" ({error.filename})" if error.filename else ""
+        leave(
+            f"a temporary file or the output cannot be written{place}: {error.strerror}. Make room there, or set TMPDIR to a "
+            f"folder that can be written; {left}.",
+            BAD_INPUT,
+        )
     except MemoryError:
         leave("this needs more memory than there is. Shorten the records, or lower --jobs.", BAD_INPUT)
     except Exception as error:
-        text = " ".join(str(error).split())[:300]
+        _leave_defect(error)
+
+
+class Left(SystemExit):
+    """The process ends, and has said why."""
+
+
+def _leave_defect(error: Exception) -> NoReturn:
+    text = " ".join(str(error).split())[:300]
+    leave(
+        f"a defect of rigsight, not of your data: {type(error).__name__}: {text}. "
+        "Please report it with the output of the same command with --debug added.",
+        DEFECT,
+    )
+
+
+@contextlib.contextmanager
+def output_told() -> Iterator[None]:
+    """Map what happens outside `told`, while a finished command shows its results, to a message and an exit code.
+
+    Raises
+    ------
+    SystemExit
+        After an error.
+    """
+    try:
+        yield
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except Left:
+        raise
+    except SystemExit as leaving:
+        # The parser says 130 for everything that reads as Ctrl-C, and 1 where nobody reads; the signal stands behind it.
+        behind = leaving.__context__.__cause__ if leaving.__context__ is not None else None
+        if isinstance(behind, KeyboardInterrupt):
+            leave("interrupted.", exit_code(behind))
+        if isinstance(leaving.__context__, BrokenPipeError):
+            _leave_unread()
+        raise
+    except KeyboardInterrupt as error:
+        leave("interrupted.", exit_code(error))
+    except BrokenPipeError:
+        _leave_unread()
+    except OSError as error:
+        if "--debug" in sys.argv:
+            raise
+        _forget_output()
         leave(
-            f"a defect of rigsight, not of your data: {type(error).__name__}: {text}. "
-            "Please report it with the output of the same command with --debug added.",
-            DEFECT,
+            f"the output cannot be written: {error.strerror}. Files that the command writes are complete.",
+            BAD_INPUT,
         )
+
+
+def _leave_unread() -> NoReturn:
+    _forget_output()
+    raise Left(UNREAD)
+
+
+def _forget_output() -> None:
+    """Let what nobody takes go nowhere, so that the interpreter does not complain at its end."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def leave(message: str, code: int) -> NoReturn:
@@ -68,5 +142,6 @@ def leave(message: str, code: int) -> NoReturn:
     SystemExit
         Always, with the exit code.
     """
-    typer.echo(f"rigsight: {message}", err=True)
-    raise SystemExit(code)
+    with contextlib.suppress(OSError):
+        typer.echo(f"rigsight: {message}", err=True)
+    raise Left(code)

@@ -108,7 +108,7 @@ def _terms(bench: Bench, found: Found, coefficients: Mapping[str, Coefficient]) 
                 doubts(effect, own, found.inclusion.get(effect.name, 0.0), found.same.get(effect.name, [])),
             )
         )  # fmt: skip
-    rest = sorted(set(found.inclusion) - kept - set(bench.own_terms), key=lambda n: -found.inclusion[n])
+    rest = sorted(set(found.inclusion) - kept - set(bench.own_terms), key=lambda n: (-found.inclusion[n], n))
     terms += [Term(n, bench.candidates[n].effect.summary, False, found.inclusion[n], {}) for n in rest]
     return tuple(terms)
 

@@ -93,10 +93,14 @@ def picture_files(figure: Figure) -> dict[str, bytes]:
     """Return the picture as ``svg`` and ``png``, by ending."""
     import io
 
+    import matplotlib as mpl
+
     from rigsight.plot.drawing import style
 
     files = {}
     with style():
+        # Names inside the drawing are random otherwise.
+        mpl.rcParams["svg.hashsalt"] = "vary"
         for ending, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 150})):
             file = io.BytesIO()
             figure.savefig(file, format=ending, **options)

@@ -30,17 +30,30 @@ _lock = threading.RLock()
 
 
 def cache_folder() -> Path:
-    """Return where compiled kernels live: $RIGSIGHT_CACHE_DIR, else the platform's place for a user's caches."""
+    """Return where compiled kernels live: $RIGSIGHT_CACHE_DIR, else the platform's place for a user's caches.
+
+    Raises
+    ------
+    InputError
+        If the variable is not set and nobody knows a home folder.
+    """
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return base / "rigsight" / "kernels"
+    name = {"win32": "LOCALAPPDATA", "darwin": ""}.get(sys.platform, "XDG_CACHE_HOME")
+    base = os.environ.get(name)
+    return (Path(base) if base else _caches_at_home()) / "rigsight" / "kernels"
+
+
+def _caches_at_home() -> Path:
+    inside = {"win32": "AppData/Local", "darwin": "Library/Caches"}.get(sys.platform, ".cache")
+    try:
+        return Path.home() / inside
+    except RuntimeError:
+        # A container that runs under a number without a name.
+        raise InputError(
+            f"There is no home folder to keep compiled kernels in. Set {CACHE_VARIABLE} to a folder that can be written."
+        ) from None
 
 
 def kernels(structure: Structure) -> Any:
@@ -140,11 +153,14 @@ def _written(name: str, text: str) -> Path:
         if path.is_file() and path.read_text("utf-8") == text:
             return path
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            "w", dir=folder, suffix=".tmp", delete=False, encoding="utf-8"
-        ) as file:
-            file.write(text)
-        Path(file.name).replace(path)
+        handle, part = tempfile.mkstemp(dir=folder, suffix=".tmp")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+            Path(part).replace(path)
+        except BaseException:
+            Path(part).unlink(missing_ok=True)
+            raise
     except OSError as error:
         raise InputError(
             f"Cannot keep compiled kernels in {folder} ({error.strerror}). "
@@ -159,5 +175,15 @@ def _load(name: str, path: Path) -> ModuleType:
     assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[name] = module
-    specification.loader.exec_module(module)
+    try:
+        specification.loader.exec_module(module)
+    except RuntimeError as error:
+        # numba's word for a folder in which it may not put machine code.
+        if "cannot cache" not in str(error):
+            raise
+        del sys.modules[name]
+        raise InputError(
+            f"Cannot keep compiled kernels in {path.parent} (it cannot be written). "
+            f"Set {CACHE_VARIABLE} to a folder that can be written."
+        ) from error
     return module

@@ -13,6 +13,7 @@ import logging
 import queue
 import secrets
 import socket
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
@@ -25,6 +26,7 @@ from typing import Any, TypeVar
 from joblib import Parallel, delayed
 
 from rigsight.errors import InputError, RigsightError
+from rigsight.workflow.parent_watch import end_with_parent
 
 Name = TypeVar("Name", int, str)
 Result = TypeVar("Result")
@@ -88,14 +90,25 @@ def _on_this_machine(
     run_one: Callable[[Name], Result], trials: Sequence[Name], n_jobs: int
 ) -> Iterator[Result]:
     processes = min(n_jobs, max(1, len(trials)))
-    parallel = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
-    try:
-        yield from parallel(delayed(run_one)(trial) for trial in trials)
-    except BrokenProcessPool:
-        raise RigsightError(
-            "A process that ran a blind trial was killed from outside, most often because memory ran out. "
-            "The same command takes the bench up again; --jobs says how many trials run side by side."
-        ) from None
+    # Interrupted, joblib kills the other processes, which then remove nothing themselves.
+    with tempfile.TemporaryDirectory(prefix="rigsight-", ignore_cleanup_errors=True) as place:
+        own: dict[str, Any] = {}
+        if processes > 1:
+            own = {"backend": "loky", "initializer": _begin, "initargs": (place,)}
+        parallel = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1, **own)
+        try:
+            yield from parallel(delayed(run_one)(trial) for trial in trials)
+        except BrokenProcessPool:
+            raise RigsightError(
+                "A process that ran a blind trial was killed from outside, most often because memory ran out. "
+                "The same command takes the bench up again; --jobs says how many trials run side by side."
+            ) from None
+
+
+def _begin(place: str) -> None:
+    """Let a process of this machine end with the one that started it, and keep its temporary files where that removes them."""
+    end_with_parent()
+    tempfile.tempdir = place
 
 
 def _on_cluster(

@@ -30,7 +30,10 @@ _KEPT_VARIABLES = (
     "RIGSIGHT_CACHE_DIR",
 )
 """What a diagnosing process needs of its surroundings; nothing else of them reaches it."""
-_START = "from rigsight.cli import main; main()"
+_START = (
+    "import os; from rigsight.workflow.parent_watch import end_with_parent; end_with_parent(os.getcwd()); "
+    "from rigsight.cli import main; main()"
+)
 _FAILURES = (1, 2)
 """Exit codes of a diagnosis that ended by itself; any other end says nothing about the trial."""
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,11 @@ from rigsight.records import Hold, Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure
-from rigsight.workflow.diagnose import run_diagnose
+from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.diagnose import diagnose_campaign, result_files
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.results import check_writable, removed_on_failure, write_together
+from rigsight.workflow.results import check_writable, write_together
 from rigsight.workflow.virtual_rig import VirtualRig
 
 CAMPAIGN_FOLDER = "campaign"
@@ -97,12 +99,19 @@ def run_demo(
     out = Path(out)
     jobs = checked_jobs(n_jobs)
     check_writable(out)
-    folder = out / CAMPAIGN_FOLDER
+    folder = (out / CAMPAIGN_FOLDER).absolute()
     prepare_kernels(_structures(), jobs, listener)
     files = _campaign(np.random.default_rng(seed), listener)
-    with removed_on_failure(folder):
-        write_together(folder, files)
-        return run_diagnose(folder, out, seed=seed, n_jobs=jobs, listener=listener, command=command)
+    with tempfile.TemporaryDirectory(prefix="rigsight-") as place:
+        for name, text in files.items():
+            Path(place, name).write_text(text, encoding="utf-8")
+        # The path names the fits from which an interrupted demo goes on.
+        campaign = replace(read_campaign(place), path=folder / "campaign.toml")
+    diagnosis = diagnose_campaign(campaign, CATALOGUE, seed, jobs, listener)
+    # A campaign beside results of another one would be worse than none.
+    inside = {f"{CAMPAIGN_FOLDER}/{name}": text for name, text in files.items()}
+    write_together(out, inside | result_files(diagnosis, command, seed))
+    return diagnosis
 
 
 def _structures() -> list[Structure]:

@@ -155,16 +155,20 @@ def write_diagnosis(
     InputError
         If they cannot be written.
     """
-    return write_together(
-        out,
-        {
-            DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
-            MODEL_FILE: json_text(diagnosis.model),
-            REPORT_FILE: render_report(
-                diagnosis, command=command, versions=versions(), seed=seed, own_effects=effects
-            ),
-        },
-    )
+    return write_together(out, result_files(diagnosis, command, seed, effects))
+
+
+def result_files(
+    diagnosis: Diagnosis, command: str, seed: int | None, effects: Iterable[Effect] = CATALOGUE
+) -> dict[str, str]:
+    """Return the three results of a diagnosis by file name."""
+    return {
+        DIAGNOSIS_FILE: json_text(diagnosis.to_json()),
+        MODEL_FILE: json_text(diagnosis.model),
+        REPORT_FILE: render_report(
+            diagnosis, command=command, versions=versions(), seed=seed, own_effects=effects
+        ),
+    }
 
 
 def versions() -> dict[str, str]:

@@ -89,7 +89,7 @@ def run_init(folder: str | Path, *, model: str | None = None) -> Draft:
         )
     rig = proposals[0].guess.rig
     text, n_blanks = _text(folder, rig, proposals, left_out, is_guessed=model is None)
-    write_together(folder, {CAMPAIGN_FILE: text})
+    write_together(folder, {CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
     return Draft(path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks)
 
 

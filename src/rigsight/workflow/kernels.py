@@ -15,6 +15,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.kernel_cache import ENTRY_POINTS
 from rigsight.simulate.precompile import compile_kernels, compiled
+from rigsight.workflow.parent_watch import end_with_parent
 from rigsight.workflow.progress import Listener, Stage, silent
 
 COMPILING = "Compiling kernels (first run on this machine only)"
@@ -86,7 +87,7 @@ def prepare_kernels(
         backend="loky",
         return_as="generator_unordered",
         batch_size=1,
-        initializer=_ignore_interrupts,
+        initializer=_left_to_parent,
     )
     try:
         for name in parallel(delayed(_compile)(structure, for_looks) for structure in missing):
@@ -101,7 +102,8 @@ def _compile(structure: Structure, for_looks: bool) -> str:
     return _described(structure)
 
 
-def _ignore_interrupts() -> None:
+def _left_to_parent() -> None:
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

@@ -10,11 +10,15 @@ import typer
 
 from rigsight.workflow.progress import Listener, Step, silent
 
+_REMEMBERED = 24 * 3600.0
+"""Time [s] over which the speed of steps is averaged."""
+
 
 @contextlib.contextmanager
 def listening(quiet: bool) -> Iterator[Listener]:
     """Show progress on stderr: a bar on a terminal, a line per stage where the output is kept, nothing if quiet."""
-    if quiet:
+    # A process without a terminal may have no stderr at all.
+    if quiet or sys.stderr is None:
         yield silent
     elif not sys.stderr.isatty():
         yield _say_stage
@@ -25,22 +29,36 @@ def listening(quiet: bool) -> Iterator[Listener]:
 
 def _say_stage(step: Step) -> None:
     if step.done == 0:
-        typer.echo(f"{step.stage} ...", err=True)
+        # A log that is full, or a terminal that went away, ends no work of hours.
+        with contextlib.suppress(OSError):
+            typer.echo(f"{step.stage} ...", err=True)
 
 
 @contextlib.contextmanager
 def _bar() -> Iterator[Listener]:
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
         TextColumn("{task.fields[detail]}"),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    # Single steps take minutes, and the time left is told from all of them.
+    with Progress(
+        *columns, console=Console(stderr=True), transient=True, speed_estimate_period=_REMEMBERED
+    ) as progress:
         tasks = {}
         # The first seconds go into importing numba and sympy: say that something happens.
         starting = progress.add_task("Starting", total=None, detail="")

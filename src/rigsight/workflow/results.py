@@ -7,13 +7,15 @@ import errno
 import json
 import os
 import secrets
-import shutil
+import signal
 import tempfile
-from collections.abc import Iterator, Mapping
+import threading
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError
+from rigsight.workflow.unfinished_files import hidden, keep_locked, remove_left, write_locked
 
 _REASONS = {
     errno.EACCES: "writing is not allowed there",
@@ -24,6 +26,11 @@ _REASONS = {
     errno.ENAMETOOLONG: "the name is too long",
     errno.ENOENT: "the folder above it does not exist and cannot be made",
 }
+ENDING_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+"""Ctrl-C, kill, and a terminal that goes away."""
+ELSEWHERE = "Name another place with --out."
 
 
 def json_text(content: Mapping[str, Any]) -> str:
@@ -46,12 +53,13 @@ def check_writable(folder: Path) -> None:
         If a file is in the way or the folder cannot be made or written.
     """
     existing = folder.absolute()
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir():
-        raise InputError(f"Cannot write results to {folder}: {existing} is a file. Name another folder.")
     try:
-        Path(tempfile.mkdtemp(prefix=".rigsight-", dir=existing)).rmdir()
+        while not existing.exists():
+            existing = existing.parent
+        if not existing.is_dir():
+            raise InputError(f"Cannot write results to {folder}: {existing} is a file. Name another folder.")
+        with signals_held():
+            Path(tempfile.mkdtemp(prefix=".rigsight-", dir=existing)).rmdir()
     except OSError as error:
         raise _told(folder, error) from None
 
@@ -68,15 +76,22 @@ def check_target(file: Path) -> None:
     _check_replaceable(file)
 
 
-def write_together(folder: Path, contents: Mapping[str, str | bytes]) -> tuple[Path, ...]:
+def write_together(
+    folder: Path, contents: Mapping[str, str | bytes], mend: str = ELSEWHERE
+) -> tuple[Path, ...]:
     """Write files into a folder, all of them or none; files of these names are replaced.
+
+    Whatever ends it, Ctrl-C and kill included, the folder holds all old files or all new ones; only a process that is killed
+    outright while the finished files are given their names can leave some of each. What such a one left is removed.
 
     Parameters
     ----------
     folder
         Made, with the folders above it, if it does not exist.
     contents
-        File name -> text, or bytes of a picture.
+        File name, or path inside the folder -> text, or bytes of a picture.
+    mend
+        What can be done where the folder cannot be written, for the message.
 
     Returns
     -------
@@ -87,52 +102,90 @@ def write_together(folder: Path, contents: Mapping[str, str | bytes]) -> tuple[P
     InputError
         If the folder cannot be made or written, something is in the way, or the disk is full.
     """
+    # Links keep pointing where they do; what they point to is replaced.
+    token = secrets.token_hex(4)
     made: list[Path] = []
     parts: dict[Path, Path] = {}
-    fresh: list[Path] = []
     try:
-        made = _made(folder)
-        for name, content in contents.items():
-            target = folder / name
-            _check_replaceable(target)
-            # A link keeps pointing where it does; what it points to is replaced.
-            target = target.resolve()
-            part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
-            parts[part] = target
-            with part.open("xb") as file:
-                file.write(content.encode("utf-8") if isinstance(content, str) else content)
-                file.flush()
+        with contextlib.ExitStack() as locks:
+            for name, content in contents.items():
+                made += _made((folder / name).parent)
+                _check_replaceable(folder / name)
+                target = (folder / name).resolve()
+                remove_left(target)
+                part = parts[target] = hidden(target, token, "part")
+                file = write_locked(part, content.encode("utf-8") if isinstance(content, str) else content)
+                locks.callback(file.close)
                 os.fsync(file.fileno())
-        for part, target in parts.items():
-            if not target.exists():
-                fresh.append(target)
-            part.replace(target)
+                if os.name == "nt":
+                    # An open file cannot be given another name there.
+                    file.close()
+            with signals_held() as held:
+                _name(parts, token, held)
     except BaseException as error:
-        for path in (*parts, *fresh):
-            path.unlink(missing_ok=True)
-        for path in reversed(made):
-            # Somebody else may have put a file there meanwhile.
-            if path.is_dir() and not any(path.iterdir()):
-                path.rmdir()
+        with signals_held(), contextlib.suppress(OSError):
+            for path in parts.values():
+                path.unlink(missing_ok=True)
+            for path in reversed(made):
+                # Somebody else may have put a file there meanwhile.
+                if path.is_dir() and not any(path.iterdir()):
+                    path.rmdir()
         if isinstance(error, OSError):
-            raise _told(folder, error) from None
+            raise _told(folder, error, mend) from None
         raise
     return tuple(folder / name for name in contents)
 
 
+def _name(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -> None:
+    """Give finished files their names; if one cannot have it, or a signal waits, the old files are back at theirs."""
+    kept: dict[Path, Path] = {}
+    fresh: list[Path] = []
+    with contextlib.ExitStack() as locks:
+        try:
+            for target in parts:
+                if target.exists():
+                    old = hidden(target, token, "old")
+                    locks.callback(keep_locked(target, old).close)
+                    kept[target] = old
+                else:
+                    fresh.append(target)
+            for target, part in parts.items():
+                part.replace(target)
+            if held:
+                # Who interrupts is told that nothing was written.
+                raise KeyboardInterrupt
+        except BaseException:
+            for path in fresh:
+                path.unlink(missing_ok=True)
+            for target, old in kept.items():
+                old.replace(target)
+            raise
+        finally:
+            # Two names of one file stay two when one is to replace the other.
+            for old in kept.values():
+                old.unlink(missing_ok=True)
+
+
 @contextlib.contextmanager
-def removed_on_failure(folder: Path) -> Iterator[None]:
-    """Remove a folder, with the folders above it, that was made inside this context if the work in it fails."""
-    new = [path for path in (folder, *folder.parents) if not path.exists()]
+def signals_held() -> Iterator[Sequence[int]]:
+    """Let Ctrl-C and requests to end wait until this context is left; those that wait are listed."""
+    held: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        # Signals reach the main thread alone.
+        yield held
+        return
+    before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+    # What was not set from Python cannot be set again; what is ignored stays so.
+    before = {number: old for number, old in before.items() if old not in (None, signal.SIG_IGN)}
+    for number in before:
+        signal.signal(number, lambda number, _: held.append(number))
     try:
-        yield
-    except BaseException:
-        if folder in new:
-            shutil.rmtree(folder, ignore_errors=True)
-        for path in new[1:]:
-            if path.is_dir() and not any(path.iterdir()):
-                path.rmdir()
-        raise
+        yield held
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+        for number in held[:1]:
+            signal.raise_signal(number)
 
 
 def _made(folder: Path) -> list[Path]:
@@ -158,8 +211,8 @@ def _check_replaceable(file: Path) -> None:
         raise InputError(f"Cannot write {file}: it is no ordinary file. Name a file.")
 
 
-def _told(folder: Path, error: OSError) -> InputError:
+def _told(folder: Path, error: OSError, mend: str = ELSEWHERE) -> InputError:
     if isinstance(error, FileExistsError | NotADirectoryError):
         return InputError(f"Cannot write results to {folder}: a file is in the way. Name another folder.")
     reason = _REASONS.get(error.errno or 0, error.strerror or str(error))
-    return InputError(f"Cannot write results to {folder}: {reason}. Name another place with --out.")
+    return InputError(f"Cannot write results to {folder}: {reason}. {mend}")
