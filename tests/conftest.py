@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,13 @@ from rigsight.simulate import compose, simulate
 # Timings decide no test: on a busy machine an example may take any time.
 settings.register_profile("rigsight", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("rigsight")
+
+# Whoever starts the tests in the background may have them ignore Ctrl-C and the like; commands that they start would inherit that.
+for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, handler)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
 

@@ -21,10 +21,10 @@ RIVALS = [effect_named(name) for name in ("coulomb_friction", "free_play", "cubi
 PLAY = effect_named("backlash")
 
 
-def measured(effect: str, own: dict[str, float]) -> tuple[Record, ...]:
+def measured(effects: Sequence[str], own: dict[str, float]) -> tuple[Record, ...]:
     """Return records of a rig that a torque disturbance moves by about a tenth of the sensor noise."""
     rng = np.random.default_rng(2)
-    structure = compose(AXIS, [effect_named(effect)])
+    structure = compose(AXIS, [effect_named(name) for name in effects])
     t = DT * np.arange(8000)
     records = []
     for amplitude, role in ((0.5, "estimation"), (1.0, "estimation"), (0.75, "validation")):
@@ -47,7 +47,7 @@ def diagnosed(records: Sequence[Record], effects: Sequence[Effect]) -> Diagnosis
 
 @pytest.fixture(scope="module")
 def of_play() -> tuple[Record, ...]:
-    return measured("backlash", {"g": 1.35e-4})
+    return measured(["backlash"], {"g": 1.35e-4})
 
 
 def test_the_play_is_named_in_windows_down_to_the_noise(of_play: tuple[Record, ...]) -> None:
@@ -66,7 +66,18 @@ def test_windows_do_not_make_a_wrong_effect_right(of_play: tuple[Record, ...]) -
     assert diagnosis.window_cycles is None
 
 
+def test_play_beside_another_effect_is_named_in_windows() -> None:
+    records = measured(["backlash", "input_dead_zone"], {"g": 1.35e-4, "u_0": 0.1})
+    diagnosis = diagnosed(records, [PLAY, effect_named("input_dead_zone")])
+    assert (diagnosis.verdict, set(diagnosis.effects)) == ("effect", {"backlash", "input_dead_zone"})
+    assert diagnosis.window_cycles == 4
+    assert diagnosis.candidates[0].excess == pytest.approx(1.0, abs=0.1)
+    assert diagnosis.candidates[0].parameters["u_0"].value == pytest.approx(0.1, rel=0.02)
+
+
 def test_what_can_be_predicted_is_read_whole() -> None:
-    diagnosis = diagnosed(measured("cubic_stiffness", {"k_3": 4e7}), [effect_named("cubic_stiffness"), PLAY])
+    diagnosis = diagnosed(
+        measured(["cubic_stiffness"], {"k_3": 4e7}), [effect_named("cubic_stiffness"), PLAY]
+    )
     assert diagnosis.effects == ("cubic_stiffness",)
     assert diagnosis.window_cycles is None

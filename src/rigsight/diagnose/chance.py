@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
+from rigsight.diagnose.first_look import mean_square
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
 from rigsight.diagnose.starts import start_values
+from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.simulate import Structure
 
 _AS_NEAR = 1.5
 _MOST_ASKED = 4
@@ -34,12 +35,36 @@ _MOST_STARTS = 2
 
 
 def is_predictable(
-    bench: Workbench, linear: Scored, singles: Sequence[Scored], at_floor: float, rng: np.random.Generator
+    bench: Workbench,
+    linear: Scored,
+    models: Sequence[Scored],
+    at_floor: float,
+    allowed: float,
+    rng: np.random.Generator,
 ) -> bool:
-    """Return False if no model explains the records and in a near one chance has a part in the motion."""
-    usable = _nearest(singles)
+    """Return False if no model explains the records and in a near one chance has a part in the motion.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    linear
+        The re-identified equations.
+    models
+        Candidates, fitted and scored.
+    at_floor
+        Held-out error in units of the noise floor at which nothing is left to explain.
+    allowed
+        What a named cause may leave in these units. A model that reaches the floor where it was fitted and leaves more elsewhere
+        has met chance there, or is wrong: windows tell.
+    rng
+        Source of the disturbances.
+    """
+    usable = _nearest(models)
     if not usable or usable[0].excess <= at_floor:
         return True
+    if usable[0].excess > allowed and mean_square(usable[0].fit) <= AT_FLOOR**2:
+        return False
     near = [model for model in usable if model.excess <= _AS_NEAR * usable[0].excess][:_MOST_ASKED]
     return all(growth_of_disturbances(bench, linear, model, rng) <= PREDICTABLE for model in near)
 
@@ -95,7 +120,7 @@ def _fitted(bench: Workbench, linear: Scored, model: Scored) -> Scored:
     if not usable:
         return replace(model, residuals=(), excess=float("inf"))
     best = min(usable, key=lambda fit: fit.cost)
-    return _on_scoring(bench, replace(model, fit=best), structure, best.values)
+    return scored_in_windows(bench, replace(model, fit=best), best.values)
 
 
 def _scored(bench: Workbench, model: Scored) -> Scored:
@@ -108,10 +133,21 @@ def _scored(bench: Workbench, model: Scored) -> Scored:
         cost=there.cost,
         substeps=there.substeps,
     )
-    return _on_scoring(bench, replace(model, fit=fit), structure, fit.values)
+    return scored_in_windows(bench, replace(model, fit=fit), fit.values)
 
 
-def _on_scoring(bench: Workbench, model: Scored, structure: Structure, values: Mapping[str, float]) -> Scored:
-    result = bench.problem(structure, bench.scoring).fit_windows(values, ())
+def scored_in_windows(bench: Workbench, model: Scored, values: Mapping[str, float]) -> Scored:
+    """Return a model scored on the windows that judge, with these numbers and the initial states that suit them.
+
+    Parameters
+    ----------
+    bench
+        Records cut into windows, scales and noise.
+    model
+        Gives the equations.
+    values
+        All parameters.
+    """
+    result = bench.problem(model.fit.structure, bench.scoring).fit_windows(values, ())
     excess = result.weighted_rms if result.residuals else float("inf")
     return replace(model, residuals=result.residuals, initial_states=result.initial_states, excess=excess)

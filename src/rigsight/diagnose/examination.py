@@ -13,10 +13,11 @@ from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_li
 from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.grow import Prepare, grown, pruned
+from rigsight.diagnose.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge
+from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
@@ -97,12 +98,20 @@ def examine(
     models = _singly(task, noise, effects, windowing, n_jobs, say, memory)
     pairs: list[Scored] = []
     in_windows = None
-    if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
+    allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
+    if windowing.whole and not is_predictable(
+        models.bench, models.linear, models.singles, at_floor, allowed, rng
+    ):
         in_windows = _in_windows(task, noise, models, at_floor, n_jobs, say)
     if in_windows is None:
         pairs = grown(models.bench, models.singles, effects, at_floor, n_jobs, prepare)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
-    else:
+        known = [*models.singles, *pairs]
+        if windowing.whole and not is_predictable(models.bench, models.linear, known, allowed, allowed, rng):
+            together = _pairs_in_windows(task, noise, models, effects, n_jobs, say)
+            if together is not None:
+                in_windows, pairs = together
+    if in_windows is not None:
         models = in_windows
     bench, before, linear = models.bench, models.before, models.linear
 
@@ -163,15 +172,39 @@ def _in_windows(
     say: Callable[[str], None],
 ) -> _Singly | None:
     """Return the models in windows of a few cycles if one of them explains the records there, else None."""
+    cut = _cut(task, noise, models, n_jobs)
+    say("in windows")
+    if not cut.linear.residuals or not min(m.excess for m in cut.singles) <= at_floor < cut.linear.excess:
+        return None
+    return cut
+
+
+def _cut(task: Task, noise: Mapping[str, float], models: _Singly, n_jobs: int) -> _Singly:
+    """Return the models in windows of a few cycles."""
     output = task.rig.outputs[0].name
     windowing = Windowing.by_cycles(output, noise[output])
     bench = _bench(task, noise, windowing, models.bench.memory)
     linear = fit_linear(bench, models.linear.fit.values)
     singles = fitted_in_windows(bench, linear, models.singles, n_jobs)
-    say("in windows")
-    if not linear.residuals or not min(model.excess for model in singles) <= at_floor < linear.excess:
+    before = _before(task, bench, linear) if linear.residuals else models.before
+    return _Singly(windowing, bench, before, linear, models.quality, singles)
+
+
+def _pairs_in_windows(
+    task: Task,
+    noise: Mapping[str, float],
+    models: _Singly,
+    effects: Sequence[Effect],
+    n_jobs: int,
+    say: Callable[[str], None],
+) -> tuple[_Singly, list[Scored]] | None:
+    """Return the models and pairs in windows of a few cycles if a pair explains the records there, else None."""
+    cut = _cut(task, noise, models, n_jobs)
+    pairs = pairs_in_windows(models.bench, cut.bench, models.linear, cut.singles, effects, n_jobs)
+    say("pairs in windows")
+    if not cut.linear.residuals or not min(pair.excess for pair in pairs) <= AT_FLOOR < cut.linear.excess:
         return None
-    return _Singly(windowing, bench, _before(task, bench, linear), linear, models.quality, singles)
+    return cut, pairs
 
 
 def _bench(

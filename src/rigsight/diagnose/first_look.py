@@ -122,6 +122,25 @@ def look_at(
     return Look(effects, structure, free, nearest, mean_square(nearest[0]))
 
 
+def looked_from(
+    bench: Workbench, effects: tuple[Effect, ...], structure: Structure, starts: Sequence[Mapping[str, float]]
+) -> Look:
+    """Fit a set of effects to the liveliest stretches of the records from given starts.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects, structure
+        The model.
+    starts
+        Values of all parameters.
+    """
+    free = tuple(bench.free_parameters(structure))
+    fits = _looked(bench, structure, free, starts)
+    return Look(effects, structure, free, fits, mean_square(fits[0]))
+
+
 def _looked(
     bench: Workbench,
     structure: Structure,

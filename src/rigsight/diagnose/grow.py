@@ -111,8 +111,10 @@ def grown(
                 (name,) = set(best_pair.names) - set(second.names)
                 instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
                 pairs += _grown_from(bench, second, instead, pairs, usable, n_jobs, prepare)
-    best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
-    if best_pair is not None and _NOTHING_LEFT < best_pair.excess <= allowed:
+    for _ in range(MOST_EFFECTS):
+        best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
+        if best_pair is None or not _NOTHING_LEFT < best_pair.excess <= allowed:
+            break
         pairs += _more_general(bench, best_pair, usable, effects, pairs, n_jobs, prepare)
     pairs.sort(key=lambda pair: pair.excess)
     pairs = [*(finished(bench, pair) for pair in pairs[:_MOST_FINISHED]), *pairs[_MOST_FINISHED:]]

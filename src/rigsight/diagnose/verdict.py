@@ -13,7 +13,7 @@ AT_LOWER_BOUND = 3.0
 """The same where the floor is only a lower bound: an assumption, white noise is taken to be at least a third of all."""
 _WORTHWHILE = 1.1
 """Factor by which a model must lower the held-out error to be believed to explain anything; an assumption."""
-LEAST_LEFT, MOST_LEFT, _LEFT_OF_GAP = 1.15, 1.6, 0.05
+LEAST_LEFT, MOST_LEFT, _LEFT_OF_GAP = 1.15, 1.6, 0.025
 """What a named cause may leave of a measured noise floor: a share of the gap, within these RMS in units of the floor.
 
 Assumptions, between what true causes left on 141 blind rigs (up to 1.08 of gaps below 5, 1.14 of larger ones; where a disturbance
