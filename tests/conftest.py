@@ -23,7 +23,7 @@ from rigsight.simulate import compose, simulate
 settings.register_profile("rigsight", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("rigsight")
 
-# Whoever starts the tests in the background may have them ignore Ctrl-C and the like; commands that they start would inherit that.
+# Whoever starts the tests in the background may have them ignore Ctrl-C, and the commands that they start inherit that.
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, handler)

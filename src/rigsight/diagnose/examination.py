@@ -106,9 +106,8 @@ def examine(
     if in_windows is None:
         pairs = grown(models.bench, models.singles, effects, at_floor, n_jobs, prepare)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
-        known = [*models.singles, *pairs]
-        if windowing.whole and not is_predictable(models.bench, models.linear, known, allowed, allowed, rng):
-            together = _pairs_in_windows(task, noise, models, effects, n_jobs, say)
+        if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, allowed, rng):
+            together = _pairs_in_windows(task, noise, models, pairs, n_jobs, say)
             if together is not None:
                 in_windows, pairs = together
     if in_windows is not None:
@@ -194,17 +193,17 @@ def _pairs_in_windows(
     task: Task,
     noise: Mapping[str, float],
     models: _Singly,
-    effects: Sequence[Effect],
+    pairs: Sequence[Scored],
     n_jobs: int,
     say: Callable[[str], None],
 ) -> tuple[_Singly, list[Scored]] | None:
     """Return the models and pairs in windows of a few cycles if a pair explains the records there, else None."""
     cut = _cut(task, noise, models, n_jobs)
-    pairs = pairs_in_windows(models.bench, cut.bench, models.linear, cut.singles, effects, n_jobs)
+    found = pairs_in_windows(models.bench, cut.bench, models.linear, pairs, n_jobs)
     say("pairs in windows")
-    if not cut.linear.residuals or not min(pair.excess for pair in pairs) <= AT_FLOOR < cut.linear.excess:
+    if not cut.linear.residuals or not min(pair.excess for pair in found) <= AT_FLOOR < cut.linear.excess:
         return None
-    return cut, pairs
+    return cut, found
 
 
 def _bench(
