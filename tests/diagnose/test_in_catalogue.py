@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.in_catalogue import is_linear, probability_in_catalogue
+from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.verdict import Judgement
-from rigsight.effects import CATALOGUE
 
 NOISE = np.random.default_rng(0).standard_normal(2000)
 
@@ -78,9 +77,3 @@ def test_two_effects_of_different_parts_may_be_sure(stated, pair) -> None:
 def test_unknown_leaves_little_for_all_candidates_and_no_gap_none(stated) -> None:
     assert stated(("free_play",), 2.0, 50.0, verdict="unknown") < 0.3
     assert stated(("free_play",), 1.0, 50.0, verdict="none") == 0.0
-
-
-@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
-def test_linear_effects_are_known(effect) -> None:
-    linear = {"flexible_mode", "actuator_lag", "input_delay", "sensor_lag", "sensor_delay"}
-    assert is_linear(effect) == (effect.name in linear)

@@ -39,7 +39,7 @@ STATED = {
     "verdict.AT_FLOOR": (1.1, "excess up to 1.1;"),
     "verdict.AT_LOWER_BOUND": (3.0, "up to 3 where the floor is a lower bound"),
     "verdict._WORTHWHILE": (1.1, "lower by a factor of 1.1"),
-    "verdict._LEFT_OF_GAP": (0.05, "1 + 5 % of the gap's excess"),
+    "verdict._LEFT_OF_GAP": (0.025, "1 + 2.5 % of the gap's excess"),
     "verdict.LEAST_LEFT": (1.15, "at least 1.15"),
     "verdict.MOST_LEFT": (1.6, "at most 1.6"),
     "verdict._NEARLY_ALL": (0.9, "nine tenths of the re-identified gap closed"),
@@ -47,6 +47,7 @@ STATED = {
     "in_catalogue._ODDS_OUTSIDE_ONE": (0.25, "1 : 4 against one effect"),
     "in_catalogue._ODDS_OUTSIDE_TWO": (1.0, "1 : 1 against two"),
     "in_catalogue._ONE_LAW": (0.5, "get at most one half"),
+    "one_law._EXACT": (1.03, "reach 1.03 of the floor"),
     "in_catalogue._AT_MOST_UNKNOWN": (0.3, "at most 0.3"),
     "advise._AMPLITUDES": ((0.3, 1.0, 1.5), "0.3, 1 and 1.5 times the largest input"),
 }

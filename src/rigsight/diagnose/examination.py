@@ -14,6 +14,7 @@ from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.grow import Prepare, grown, pruned
 from rigsight.diagnose.grow_in_windows import pairs_in_windows
+from rigsight.diagnose.one_law import without_imitations
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
@@ -113,6 +114,7 @@ def examine(
     if in_windows is not None:
         models = in_windows
     bench, before, linear = models.bench, models.before, models.linear
+    pairs = without_imitations(pairs, models.singles, allowed)
 
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
     ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)

@@ -8,15 +8,10 @@ below the uncertainty of the noise floor.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
-import sympy as sp
-
+from rigsight.diagnose.one_law import is_one_law
 from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.verdict import AT_FLOOR, Judgement
-from rigsight.diagnose.workbench import Scored
-from rigsight.effects import Effect, Place
-from rigsight.effects import symbols as canonical
 
 _ONE_LAW = 0.5
 """Most that is given to two effects that are one law together: another form of that law would look the same."""
@@ -64,8 +59,7 @@ def probability_in_catalogue(judgement: Judgement, ranking: Ranking, gap: float)
     # Above the floor something is left that is not the cause's, if its form is right at all: one half far above.
     form = 0.5 + (_MOST - 0.5) / (1.0 + above)
     share = form / (1.0 + odds * chance)
-    one_law = _one_force(model.effects) or _one_linear_system(model)
-    return min(share, _ONE_LAW) if one_law else share
+    return min(share, _ONE_LAW) if is_one_law(model) else share
 
 
 def _chance_of_a_relative(left: float, gap: float) -> float:
@@ -73,65 +67,3 @@ def _chance_of_a_relative(left: float, gap: float) -> float:
     if gap <= AT_FLOOR:
         return 1.0
     return min(1.0, math.sqrt((max(left, AT_FLOOR) ** 2 - 1.0) / (gap**2 - 1.0)))
-
-
-def _one_force(effects: Sequence[Effect]) -> bool:
-    """Return True for two effects of the spring or two forces without memory of the same signals: their sum is one more such."""
-    if len(effects) < 2:
-        return False
-    if all(_is_of_the_spring(effect) for effect in effects):
-        return True
-    return all(effect.torque is not None and not effect.states for effect in effects) and all(
-        _read(effect) == _read(effects[0]) for effect in effects
-    )
-
-
-def _one_linear_system(model: Scored) -> bool:
-    """Return True for two linear effects between the same signals: many another linear system has their frequency response."""
-    if len(model.effects) < 2:
-        return False
-    one_output = len(model.fit.structure.rig.outputs) == 1
-    return all(
-        is_linear(effect) and effect.lateral is None and (one_output or effect.place is not Place.SENSOR)
-        for effect in model.effects
-    )
-
-
-def is_linear(effect: Effect) -> bool:
-    """Return True if an effect leaves a linear rig linear.
-
-    Parameters
-    ----------
-    effect
-        Of the catalogue or from elsewhere.
-    """
-    signals = [canonical.x, canonical.v, canonical.u, canonical.reading, canonical.spring_torque]
-    signals += [
-        canonical.creepage,
-        canonical.lateral_displacement,
-        canonical.deflection,
-        canonical.deflection_rate,
-    ]
-    signals += [state.symbol for state in effect.states]
-    laws = [effect.torque, effect.spring, effect.deflection, effect.drive, effect.lateral, effect.measured]
-    laws += [state.rate for state in effect.states]
-    return all(_is_linear_in(law, signals) for law in laws if law is not None) and all(
-        state.limit is None for state in effect.states
-    )
-
-
-def _is_linear_in(law: sp.Expr, signals: Sequence[sp.Symbol]) -> bool:
-    own = [symbol for symbol in signals if symbol in law.free_symbols]
-    slopes = [sp.diff(law, symbol) for symbol in own]
-    return not any(slope.free_symbols & {*own, canonical.t} for slope in slopes)
-
-
-def _is_of_the_spring(effect: Effect) -> bool:
-    of_displacement = effect.torque is not None and not effect.states and _read(effect) == {canonical.x.name}
-    return effect.spring is not None or effect.deflection is not None or of_displacement
-
-
-def _read(effect: Effect) -> set[str]:
-    """Return the names of the signals that a force depends on."""
-    assert effect.torque is not None
-    return {symbol.name for symbol in effect.torque.free_symbols} - {p.name for p in effect.parameters}
