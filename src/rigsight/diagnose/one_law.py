@@ -1,8 +1,8 @@
 """Are two effects one law together, of which another form would look much the same?
 
 Two effects of the spring, two dampings, two linear effects between drive and motion: their sum bends like many a law that is in
-no catalogue. Of 14 such pairs that were named on blind rigs ten imitated a cause from outside and two a single effect whose own fit
-had stopped short (seeds 3 to 8, `experiments/blind_small`).
+no catalogue. Of 14 such pairs that were named on blind rigs ten imitated a cause from outside and two a single effect whose own
+fit had stopped short (seeds 3 to 8, `experiments/blind_small`).
 """
 
 from __future__ import annotations
