@@ -12,10 +12,8 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 
-from rigsight.diagnose.first_look import mean_square
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
 from rigsight.diagnose.starts import start_values
-from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored, Workbench
 
 _AS_NEAR = 1.5
@@ -35,36 +33,24 @@ _MOST_STARTS = 2
 
 
 def is_predictable(
-    bench: Workbench,
-    linear: Scored,
-    models: Sequence[Scored],
-    at_floor: float,
-    allowed: float,
-    rng: np.random.Generator,
+    bench: Workbench, linear: Scored, models: Sequence[Scored], at_floor: float, rng: np.random.Generator
 ) -> bool:
     """Return False if no model explains the records and in a near one chance has a part in the motion.
 
     Parameters
     ----------
-    bench
-        Records, scales and noise.
-    linear
-        The re-identified equations.
+    bench, linear
+        Whole records, and the re-identified equations on them.
     models
         Candidates, fitted and scored.
     at_floor
-        Held-out error in units of the noise floor at which nothing is left to explain.
-    allowed
-        What a named cause may leave in these units. A model that reaches the floor where it was fitted and leaves more elsewhere
-        has met chance there, or is wrong: windows tell.
+        Held-out error in units of the noise floor at which the records count as explained.
     rng
         Source of the disturbances.
     """
     usable = _nearest(models)
     if not usable or usable[0].excess <= at_floor:
         return True
-    if usable[0].excess > allowed and mean_square(usable[0].fit) <= AT_FLOOR**2:
-        return False
     near = [model for model in usable if model.excess <= _AS_NEAR * usable[0].excess][:_MOST_ASKED]
     return all(growth_of_disturbances(bench, linear, model, rng) <= PREDICTABLE for model in near)
 

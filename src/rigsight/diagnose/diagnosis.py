@@ -116,6 +116,12 @@ def diagnose(
                 "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
             )
     notes += [*found.quality.notes, found.judgement.reason]
+    if found.judgement.verdict == "unknown" and found.imitations:
+        nearest = min(found.imitations, key=lambda pair: pair.excess)
+        notes.append(
+            f"Together {' and '.join(nearest.names)} leave {nearest.excess:.3g} times the noise floor, but as one law: many "
+            "another form of it would come as near, so they are not named."
+        )
     diagnosis = _assembled(task, found, floors, notes, scored_on, rng)
     lacking = None
     if found.judgement.verdict == "unknown":

@@ -14,7 +14,7 @@ from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.grow import Prepare, grown, pruned
 from rigsight.diagnose.grow_in_windows import pairs_in_windows
-from rigsight.diagnose.one_law import without_imitations
+from rigsight.diagnose.one_law import told_apart
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
@@ -47,6 +47,8 @@ class Examination:
         The verdict.
     quality
         What the data are good for.
+    imitations
+        Pairs that came near and do not compete, as many another law would come as near.
     """
 
     bench: Workbench
@@ -56,6 +58,7 @@ class Examination:
     ranking: Ranking
     judgement: Judgement
     quality: DataQuality
+    imitations: tuple[Scored, ...] = ()
 
 
 def examine(
@@ -98,34 +101,38 @@ def examine(
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
     models = _singly(task, noise, effects, windowing, n_jobs, say, memory)
     pairs: list[Scored] = []
-    in_windows = None
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
-    if windowing.whole and not is_predictable(
-        models.bench, models.linear, models.singles, at_floor, allowed, rng
-    ):
-        in_windows = _in_windows(task, noise, models, at_floor, n_jobs, say)
-    if in_windows is None:
+    cut, in_windows = None, False
+    if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
+        cut = _cut(task, noise, models, n_jobs)
+        say("in windows")
+        in_windows = _explained(cut, cut.singles, at_floor)
+    if not in_windows:
         pairs = grown(models.bench, models.singles, effects, at_floor, n_jobs, prepare)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
-        if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, allowed, rng):
-            together = _pairs_in_windows(task, noise, models, pairs, n_jobs, say)
-            if together is not None:
-                in_windows, pairs = together
-    if in_windows is not None:
-        models = in_windows
+        if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
+            cut = cut or _cut(task, noise, models, n_jobs)
+            found = pairs_in_windows(models.bench, cut.bench, models.linear, pairs, n_jobs)
+            say("pairs in windows")
+            in_windows = _explained(cut, found, AT_FLOOR)
+            pairs = found if in_windows else pairs
+    if cut is not None and in_windows:
+        models = cut
     bench, before, linear = models.bench, models.before, models.linear
-    pairs = without_imitations(pairs, models.singles, allowed)
+    pairs, imitations = told_apart(pairs, models.singles, allowed)
 
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
     ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)
     if ranking.order and ranking.order[0].residuals:
-        if in_windows is None:
+        if not in_windows:
             ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
         judgement = judge(before.excess, linear, ranking.order[0], lower_bound, task.rig.is_driven)
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     quality = with_best_model(models.quality, bench, judgement.model)
-    return Examination(models.bench, models.windowing, before, linear, ranking, judgement, quality)
+    return Examination(
+        models.bench, models.windowing, before, linear, ranking, judgement, quality, tuple(imitations)
+    )
 
 
 @dataclass(frozen=True)
@@ -164,22 +171,6 @@ def _singly(
     return _Singly(windowing, bench, before, linear, quality, singles)
 
 
-def _in_windows(
-    task: Task,
-    noise: Mapping[str, float],
-    models: _Singly,
-    at_floor: float,
-    n_jobs: int,
-    say: Callable[[str], None],
-) -> _Singly | None:
-    """Return the models in windows of a few cycles if one of them explains the records there, else None."""
-    cut = _cut(task, noise, models, n_jobs)
-    say("in windows")
-    if not cut.linear.residuals or not min(m.excess for m in cut.singles) <= at_floor < cut.linear.excess:
-        return None
-    return cut
-
-
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly, n_jobs: int) -> _Singly:
     """Return the models in windows of a few cycles."""
     output = task.rig.outputs[0].name
@@ -191,21 +182,10 @@ def _cut(task: Task, noise: Mapping[str, float], models: _Singly, n_jobs: int) -
     return _Singly(windowing, bench, before, linear, models.quality, singles)
 
 
-def _pairs_in_windows(
-    task: Task,
-    noise: Mapping[str, float],
-    models: _Singly,
-    pairs: Sequence[Scored],
-    n_jobs: int,
-    say: Callable[[str], None],
-) -> tuple[_Singly, list[Scored]] | None:
-    """Return the models and pairs in windows of a few cycles if a pair explains the records there, else None."""
-    cut = _cut(task, noise, models, n_jobs)
-    found = pairs_in_windows(models.bench, cut.bench, models.linear, pairs, n_jobs)
-    say("pairs in windows")
-    if not cut.linear.residuals or not min(pair.excess for pair in found) <= AT_FLOOR < cut.linear.excess:
-        return None
-    return cut, found
+def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
+    """Return True if one of the models explains the records in windows and the equations without an effect do not."""
+    best = min((model.excess for model in models), default=float("inf"))
+    return bool(cut.linear.residuals) and best <= at_floor < cut.linear.excess
 
 
 def _bench(

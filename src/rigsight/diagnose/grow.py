@@ -44,7 +44,10 @@ _FINEST_STEPS = 4
 """Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
 and each of its partners would take as fine steps. An assumption, made for the time that it saves."""
 _NOTHING_LEFT = 1.03
-"""Held-out error in units of the noise floor from which on another parent is asked too: floors are known to a few percent."""
+"""Held-out error in units of the noise floor above which more is tried: another parent, effects that contain one of the pair's.
+
+An assumption: floors are known to a few percent.
+"""
 _IN_ITS_PLACE = 1.5
 """Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5

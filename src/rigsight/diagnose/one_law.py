@@ -18,14 +18,16 @@ from rigsight.effects import symbols as canonical
 _EXACT = 1.03
 """Held-out error in units of the noise floor up to which such a pair counts as exact: floors are known to a few percent.
 
-The two that were the truth left 0.99 and 1.01, seven of the twelve that were not 1.05 to 1.10.
+An assumption: the two that were the truth left 0.99 and 1.01, seven of the twelve that were not 1.05 to 1.10.
 """
 
 
-def without_imitations(pairs: Sequence[Scored], singles: Sequence[Scored], allowed: float) -> list[Scored]:
-    """Return the pairs without those that are one law and come near the floor as another form of it would.
+def told_apart(
+    pairs: Sequence[Scored], singles: Sequence[Scored], allowed: float
+) -> tuple[list[Scored], list[Scored]]:
+    """Return the pairs that compete, and those that are one law and come near the floor as another form of it would.
 
-    Such a pair stands only where it reaches the floor and no single effect comes near it.
+    Such a pair competes only where it reaches the floor and no single effect comes near it.
 
     Parameters
     ----------
@@ -35,7 +37,12 @@ def without_imitations(pairs: Sequence[Scored], singles: Sequence[Scored], allow
         What a named cause may leave, in units of the noise floor.
     """
     best = min((model.excess for model in singles), default=float("inf"))
-    return [pair for pair in pairs if not is_one_law(pair) or (pair.excess <= _EXACT and best > allowed)]
+    competing: list[Scored] = []
+    imitations: list[Scored] = []
+    for pair in pairs:
+        stands = not is_one_law(pair) or (pair.excess <= _EXACT and best > allowed)
+        (competing if stands else imitations).append(pair)
+    return competing, imitations
 
 
 def is_one_law(model: Scored) -> bool:

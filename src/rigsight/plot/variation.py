@@ -93,16 +93,9 @@ def picture_files(figure: Figure) -> dict[str, bytes]:
     """Return the picture as ``svg`` and ``png``, by ending."""
     import io
 
-    import matplotlib as mpl
+    from rigsight.plot.drawing import style, svg_text
 
-    from rigsight.plot.drawing import style
-
-    files = {}
+    png = io.BytesIO()
     with style():
-        # Names inside the drawing are random otherwise.
-        mpl.rcParams["svg.hashsalt"] = "vary"
-        for ending, options in (("svg", {"metadata": {"Date": None}}), ("png", {"dpi": 150})):
-            file = io.BytesIO()
-            figure.savefig(file, format=ending, **options)
-            files[ending] = file.getvalue()
-    return files
+        figure.savefig(png, format="png", dpi=150)
+    return {"svg": svg_text(figure, "vary").encode("utf-8"), "png": png.getvalue()}

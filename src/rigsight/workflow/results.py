@@ -121,7 +121,7 @@ def write_together(
                     # An open file cannot be given another name there.
                     file.close()
             with signals_held() as held:
-                _name(parts, token, held)
+                _put_in_place(parts, token, held)
     except BaseException as error:
         with signals_held(), contextlib.suppress(OSError):
             for path in parts.values():
@@ -136,7 +136,7 @@ def write_together(
     return tuple(folder / name for name in contents)
 
 
-def _name(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -> None:
+def _put_in_place(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -> None:
     """Give finished files their names; if one cannot have it, or a signal waits, the old files are back at theirs."""
     kept: dict[Path, Path] = {}
     fresh: list[Path] = []

@@ -16,6 +16,7 @@ MODELS = ("running_gear", "axis", "element")
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
 _DRIVES = ("A", "V", "N", "N m")
+"""What amplifiers are told, and what motors give."""
 
 
 @dataclass(frozen=True)
