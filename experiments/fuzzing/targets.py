@@ -269,13 +269,13 @@ def _mutate_packed_matlab(data: bytes, rng: random.Random, plain: Plain) -> byte
 
 _FORMATS = {
     "CSV, TSV": ("CSV", ".dat", False, _mutate_text),
-    "MATLAB 5": ("MATLAB 5", ".mat", False, None),
-    "MATLAB 7": ("MATLAB 7", ".mat", False, _mutate_packed_matlab),
+    "MATLAB 5": ("MATLAB 5", ".mat", True, None),
+    "MATLAB 7": ("MATLAB 7", ".mat", True, _mutate_packed_matlab),
     "MATLAB 7.3": ("MATLAB 7.3", ".mat", True, None),
     "HDF5": ("HDF5", ".h5", True, None),
     "MDF4": ("MDF4", ".mf4", True, None),
     "TDMS": ("TDMS", ".tdms", False, None),
-    "Parquet": ("Parquet", ".parquet", False, None),
+    "Parquet": ("Parquet", ".parquet", True, None),
     "UFF": ("UFF", ".uff", False, None),
 }
 _CAMPAIGN_WORDS = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -172,3 +173,12 @@ def test_a_compiler_that_fails_is_named(case_named, monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("CC", "false")
     with pytest.raises(InputError, match="false failed"):
         export_model(case_named("linear axis").model, "fmu", source="model.json")
+
+
+def test_a_compiler_without_room_on_the_disk_is_not_blamed(case_named, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("CC", "false")
+    full = SimpleNamespace(total=10**9, used=10**9, free=0)
+    monkeypatch.setattr("rigsight.export.fmu.shutil.disk_usage", lambda _: full)
+    with pytest.raises(OSError, match="No space left") as told:
+        export_model(case_named("linear axis").model, "fmu", source="model.json")
+    assert told.value.filename

@@ -24,7 +24,7 @@ class Named:
 
 SIGNALS = {"u": "A", "psi": "rad", "y": "m"}
 # A process is started for every such file.
-TRIALS = {"MDF4": 3, "HDF5": 12, "MATLAB 7.3": 12}
+TRIALS = {"MDF4": 3, "HDF5": 12, "MATLAB 7.3": 12, "MATLAB 5": 12, "MATLAB 7": 12, "Parquet": 12}
 formats = pytest.mark.parametrize("name", FORMATS)
 
 
@@ -159,6 +159,7 @@ def test_a_matlab_file_that_declares_more_than_it_holds_is_refused_unread(
     def load(*_: object, **__: object) -> None:
         pytest.fail("it was read")
 
+    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
     monkeypatch.setattr("scipy.io.loadmat", load)
     path = tmp_path / "run.mat"
     path.write_bytes(HEADER + BOMBS[bomb])
@@ -168,6 +169,7 @@ def test_a_matlab_file_that_declares_more_than_it_holds_is_refused_unread(
 def test_a_matlab_file_that_unpacks_to_too_much_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
     monkeypatch.setattr("rigsight.records.matlab_elements._LARGEST_VARIABLE", 10_000)
     path = tmp_path / "run.mat"
     path.write_bytes(HEADER + element(15, zlib.compress(element(14, bytes(1_000_000)))))
@@ -190,7 +192,7 @@ def test_a_struct_whose_size_is_no_array_is_no_signal(tmp_path: Path) -> None:
         read(tmp_path / "run.mat")
 
 
-@pytest.mark.parametrize("name", ["MATLAB 7.3", "HDF5", "MDF4"])
+@pytest.mark.parametrize("name", ["MATLAB 5", "MATLAB 7.3", "HDF5", "MDF4", "Parquet"])
 def test_a_library_that_does_not_come_back_is_ended_and_told(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

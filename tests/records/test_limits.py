@@ -157,6 +157,7 @@ def test_packed_variables_that_are_too_large_together_are_refused(
     packed = zlib.compress(matrix(6, (1000, 1), element(9, bytes(8000))))
     one = struct.pack("<II", 15, len(packed)) + packed
     (tmp_path / "run.mat").write_bytes(HEADER + one * 3)
+    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
     monkeypatch.setattr("rigsight.records.matlab_elements._MOST_UNPACKED", 20_000)
     with pytest.raises(InputError, match="together, the most that is read"):
         run_inspect(tmp_path / "run.mat")

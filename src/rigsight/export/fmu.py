@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import platform
@@ -26,6 +27,8 @@ _BINARIES = {
     "Darwin": ("darwin64", ".dylib", ["-dynamiclib", "-fPIC", "-fvisibility=hidden"]),
     "Windows": ("win64", ".dll", ["-shared"]),
 }
+_ROOM = 1_000_000
+"""What a compiler needs for its files [bytes]; with less left, the disk is what failed."""
 _NAMESPACE = uuid.UUID("0a4b5d0e-2f0f-5a53-9d5e-6f1c2a7e9b31")
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 _INTERPOLATED = "Set the first derivatives of the inputs for it; without them they are constant."
@@ -50,6 +53,8 @@ def fmu(exported: Exported, source: str, name: str, *, source_only: bool = False
     ------
     InputError
         If there is no C compiler, or it fails.
+    OSError
+        If there is no room for the compiler's files.
     """
     model = c_source(exported, source, name)
     template = files("rigsight.export").joinpath("templates/fmi2.c.txt").read_text("utf-8")
@@ -101,6 +106,8 @@ def _compiled(sources: Mapping[str, str], name: str) -> tuple[str, str, bytes]:
         command = [compiler, "-O2", "-std=c99", *options, "-o", target.name, f"fmi2_{name}.c", "-lm"]
         run = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         if run.returncode != 0 or not target.is_file():
+            if shutil.disk_usage(place).free < _ROOM:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), place)
             first = next(iter(run.stderr.strip().splitlines()), "no message")
             raise InputError(
                 f"The C compiler {compiler} failed: {first}. Name another one in the variable CC, or write --source-only."

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.records.channel import Channel, ChannelFile, Load, check_count, check_size, check_total
-from rigsight.records.isolated_reader import PACKAGES, open_isolated
+from rigsight.records.isolated_reader import PACKAGES, ReadingError, open_isolated
 from rigsight.records.ordinary_file import file_size
 
 LARGEST_FILE = 2_000_000_000
@@ -180,10 +180,10 @@ def _told(path: Path, name: str) -> Iterator[None]:
             f"{path.name} needs more memory than there is, or is damaged. Split it into several records."
         ) from None
     except Exception as error:
-        reason = " ".join(str(error).split())[:200]
+        told = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"
+        reason = " ".join(told.split())[:200].removesuffix(":")
         raise InputError(
-            f"{path.name} cannot be read as {name}: the file is cut short or damaged "
-            f"({type(error).__name__}{': ' if reason else ''}{reason}). {MEND}"
+            f"{path.name} cannot be read as {name}: the file is cut short or damaged ({reason}). {MEND}"
         ) from None
 
 

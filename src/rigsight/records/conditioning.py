@@ -131,8 +131,10 @@ def resolution(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
     digits = [_digits(float(stamp)) for stamp in stamps[chosen]]
     decimals = max(after_point for _, after_point in digits)
     significant = max(count for count, _ in digits)
-    magnitude = np.floor(np.log10(np.maximum(np.abs(stamps), 10.0**-decimals))) + 1.0
-    return np.asarray(np.maximum(10.0**-decimals, 10.0 ** (magnitude - significant)), dtype=np.float64)
+    # Damaged stamps may have more decimals than numbers have room for.
+    last_decimal = max(10.0**-decimals, float(np.finfo(np.float64).tiny))
+    magnitude = np.floor(np.log10(np.maximum(np.abs(stamps), last_decimal))) + 1.0
+    return np.asarray(np.maximum(last_decimal, 10.0 ** (magnitude - significant)), dtype=np.float64)
 
 
 def _digits(number: float) -> tuple[int, int]:

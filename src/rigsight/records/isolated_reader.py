@@ -18,10 +18,14 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.records.channel import Channel, ChannelFile, Load, Refused, TimeAxis
 
-PACKAGES = {"mdf": "asammdf", "hdf5": "h5py", "matlab_hdf5": "h5py"}
+PACKAGES = {"mdf": "asammdf", "hdf5": "h5py", "matlab_hdf5": "h5py", "matlab": "scipy", "parquet": "pyarrow"}
 """Format -> package whose C code is kept apart."""
 LONGEST_WAIT = 120.0
 """For one answer [s]; a damaged file can lead a library in circles."""
+
+
+class ReadingError(Exception):
+    """What the process says that its library raised, by kind and text."""
 
 
 def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
@@ -86,17 +90,17 @@ class _Process:
         try:
             line = self._process.stdout.readline()
             if not line:
-                raise ValueError("it makes the library that reads it crash, or run in circles")
+                raise ReadingError("it makes the library that reads it crash, or run in circles")
             answer: dict[str, Any] = json.loads(line)
             if answer.get("error") == "MemoryError":
                 raise MemoryError
             if answer.get("error") == "InputError":
                 raise InputError(answer["reason"])
             if "error" in answer:
-                raise ValueError(f"{answer['error']}: {answer['reason']}")
+                raise ReadingError(f"{answer['error']}: {answer['reason']}")
             kind = np.dtype(answer.get("type", "<f8"))
             if kind.kind not in "iufb":
-                raise ValueError(f"its data is of type {kind}")
+                raise ReadingError(f"its data is of type {kind}")
             return answer, np.frombuffer(self._process.stdout.read(answer.get("n_bytes", 0)), dtype=kind)
         finally:
             watch.cancel()
