@@ -108,7 +108,7 @@ def examine(
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
     if not in_windows:
-        pairs = grown(models.bench, models.singles, effects, at_floor, n_jobs, prepare)
+        pairs = _grown(models, effects, lower_bound, task.rig.is_driven, n_jobs, prepare)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
         if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models, n_jobs)
@@ -169,6 +169,26 @@ def _singly(
     quality = data_quality(bench, task.records, linear)
     singles = fit_candidates(bench, linear, effects, n_jobs, say)
     return _Singly(windowing, bench, before, linear, quality, singles)
+
+
+def _grown(
+    models: _Singly,
+    effects: Sequence[Effect],
+    lower_bound: bool,
+    is_driven: bool,
+    n_jobs: int,
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return pairs where a single effect leaves something to explain.
+
+    Above a lower bound of the floor what a single one leaves may be noise, so that a pair must reach that very bound to say
+    otherwise. An element's equations are no more exact than that bound, and its pairs no more than other forms of them.
+    """
+    is_excused = lower_bound and min((m.excess for m in models.singles), default=np.inf) <= AT_LOWER_BOUND
+    if is_excused and not is_driven:
+        return []
+    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, n_jobs, prepare)
+    return [pair for pair in pairs if not is_excused or pair.excess <= AT_FLOOR]
 
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly, n_jobs: int) -> _Singly:

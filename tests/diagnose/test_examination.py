@@ -1,0 +1,38 @@
+"""When a second effect is asked for, and what it must do where the noise floor is only known from below."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from rigsight.diagnose import examination
+
+SINGLE = ("periodic_disturbance",)
+PAIR = ("periodic_disturbance", "cubic_stiffness")
+
+
+@pytest.mark.parametrize(
+    ("single", "pair", "lower_bound", "is_driven", "competes"),
+    [
+        pytest.param(1.9, 1.02, True, True, True, id="reaches the very bound"),
+        pytest.param(1.9, 1.3, True, True, False, id="may as well fit noise"),
+        pytest.param(1.9, 1.02, True, False, False, id="a form of the same force"),
+        pytest.param(20.0, 1.3, True, True, True, id="more is left than noise could be"),
+        pytest.param(1.9, 1.3, False, True, True, id="a measured floor"),
+    ],
+)
+def test_above_a_lower_bound_a_pair_must_reach_it(
+    scored,
+    monkeypatch: pytest.MonkeyPatch,
+    single: float,
+    pair: float,
+    lower_bound: bool,
+    is_driven: bool,
+    competes: bool,
+) -> None:
+    found = [scored(PAIR, excess=pair)]
+    monkeypatch.setattr(examination, "grown", lambda *_: found)
+    models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)])
+    kept = examination._grown(models, [], lower_bound, is_driven, 1, None)
+    assert kept == (found if competes else [])
