@@ -52,6 +52,11 @@ def test_more_left_above_the_floor_is_less_sure(stated) -> None:
     )
 
 
+def test_more_left_than_a_measured_floor_would_allow_is_never_more_than_half_sure(stated) -> None:
+    assert stated(("free_play",), 1.16, 5.0) <= 0.5
+    assert stated(("free_play",), 1.14, 5.0) > 0.9
+
+
 @pytest.mark.parametrize(
     "pair",
     [

@@ -11,10 +11,15 @@ import math
 
 from rigsight.diagnose.one_law import is_one_law
 from rigsight.diagnose.rank import Ranking
-from rigsight.diagnose.verdict import AT_FLOOR, Judgement
+from rigsight.diagnose.verdict import AT_FLOOR, Judgement, most_left
 
 _ONE_LAW = 0.5
 """Most that is given to two effects that are one law together: another form of that law would look the same."""
+_ABOVE_THE_BOUND = 0.5
+"""Most that is given to a cause that leaves more of a lower bound of the floor than a cause may leave of a measured one.
+
+An assumption: that the rest is noise and that the form is wrong are taken to be as likely.
+"""
 _MOST = 0.99
 _ODDS_OUTSIDE_ONE = 0.25
 """Odds of a cause outside the catalogue against one effect of it, before any record is seen; an assumption."""
@@ -59,7 +64,9 @@ def probability_in_catalogue(judgement: Judgement, ranking: Ranking, gap: float)
     # Above the floor something is left that is not the cause's, if its form is right at all: one half far above.
     form = 0.5 + (_MOST - 0.5) / (1.0 + above)
     share = form / (1.0 + odds * chance)
-    return min(share, _ONE_LAW) if is_one_law(model) else share
+    if is_one_law(model):
+        share = min(share, _ONE_LAW)
+    return min(share, _ABOVE_THE_BOUND) if model.excess > most_left(gap) else share
 
 
 def _chance_of_a_relative(left: float, gap: float) -> float:
