@@ -24,7 +24,7 @@ class Named:
 
 SIGNALS = {"u": "A", "psi": "rad", "y": "m"}
 # A process is started for every such file.
-TRIALS = {"MDF4": 3, "HDF5": 12, "MATLAB 7.3": 12, "MATLAB 5": 12, "MATLAB 7": 12, "Parquet": 12}
+TRIALS = {"MDF4": 3, "HDF5": 8, "MATLAB 7.3": 8, "MATLAB 5": 8, "MATLAB 7": 8, "Parquet": 8}
 formats = pytest.mark.parametrize("name", FORMATS)
 
 

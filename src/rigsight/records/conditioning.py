@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from rigsight.errors import InputError
 from rigsight.records.record import Hold
@@ -56,6 +55,9 @@ class TimeBase:
         grid = np.linspace(self.stamps[0], self.stamps[-1], self.stamps.size)
         if hold == "foh":
             return np.interp(grid, self.stamps, samples)
+        # Slow to load, and every process that reads a file apart would wait for it.
+        from scipy.interpolate import CubicSpline
+
         return np.asarray(CubicSpline(self.stamps, samples)(grid), dtype=np.float64)
 
 

@@ -8,7 +8,6 @@ from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from rigsight.errors import InputError
 from rigsight.records.channel import MOST_SAMPLES
@@ -134,6 +133,9 @@ def _interpolated(
     index = np.arange(even.size, dtype=np.float64)
     if hold == "foh":
         return np.interp(position, index, even), "linearly"
+    # Slow to load, and every process that reads a file apart would wait for it.
+    from scipy.interpolate import CubicSpline
+
     return np.asarray(CubicSpline(index, even)(position), dtype=np.float64), "cubic spline"
 
 
