@@ -101,10 +101,10 @@ def read_csv(
     for signal, column in values.items():
         finite = np.isfinite(column)
         if not finite.all():
-            row = int(np.argmin(finite))
+            row, count = int(np.argmin(finite)), int(np.count_nonzero(~finite))
             raise InputError(
                 f"{path.name}, line {rows[row]}, column '{layout.names[found[signal]]}': {column[row]} is not a finite "
-                f"number ({np.count_nonzero(~finite)} such cells). Cut the record there or fill the gap before reading."
+                f"number ({count} such cell{'s' if count > 1 else ''}). Cut the record there or fill the gap before reading."
             )
     labels = {signal: layout.names[position] for signal, position in found.items()}
     return Columns(values, labels, np.array(rows, dtype=np.int64), layout.notes)
