@@ -20,26 +20,29 @@ from rigsight.simulate import compose, kernel_cache, simulate
 from rigsight.simulate.kernel_source import kernel_source
 
 PROGRAM = """
-import sys, time
+import hashlib
 import numpy as np
+from rigsight.effects import effect_named
 from rigsight.records.record import Record
-from rigsight.rigs import AXIS
+from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.kernel_cache import kernels
-record = Record(name="r", dt=0.01, signals={"u": np.ones(50)}, units={})
-values = dict(gain=1.0, m=1.0, d=1.0, k=float(sys.argv[1]), x_off=0.0, force_off=0.0)
-structure = compose(AXIS)
-x = simulate(structure, values, record)["x"]
+t = 5e-3 * np.arange(4000)
+record = Record(name="r", dt=5e-3, signals={"u": 0.5 * np.sin(t + 0.6 * t**2)}, units={})
+values = dict(v=1.0, r_0=0.1, b=0.3, k_tau=0.27, J_z=0.56, k_c=81.0, k_d=2.0, l_0=0.25, c_y=0.98, psi_off=1e-3, y_off=1e-3)
+structure = compose(RUNNING_GEAR, [effect_named("coulomb_friction")])
+psi = simulate(structure, {**values, "T_c": 0.02}, record)["psi"]
 statistics = kernels(structure).simulate_one.stats
-print(sum(statistics.cache_hits.values()), sum(statistics.cache_misses.values()), repr(float(x[-1])))
+hits, misses = (sum(counts.values()) for counts in (statistics.cache_hits, statistics.cache_misses))
+print(hits, misses, hashlib.sha256(psi.tobytes()).hexdigest())
 """
 
 
-def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def run(folder: Path) -> subprocess.CompletedProcess[str]:
     source = str(Path(rigsight.__file__).parents[1])
     environment = {**os.environ, "RIGSIGHT_CACHE_DIR": str(folder), "PYTHONPATH": source}
     return subprocess.run(
-        [sys.executable, "-c", PROGRAM, *arguments],
+        [sys.executable, "-c", PROGRAM],
         env=environment,
         capture_output=True,
         text=True,
@@ -47,10 +50,11 @@ def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_second_process_does_not_compile(tmp_path):
-    first = run(tmp_path, "4.0")
+def test_second_process_does_not_compile_and_gives_the_same_bits(tmp_path):
+    """A function of a kernel that was not inlined rounded differently where it had been compiled just before."""
+    first = run(tmp_path)
     assert first.returncode == 0, first.stderr
-    second = run(tmp_path, "4.0")
+    second = run(tmp_path)
     hits, misses, result = second.stdout.split()
     assert first.stdout.split() == ["0", "1", result]
     assert (hits, misses) == ("1", "0")
@@ -141,10 +145,10 @@ def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
 
 
 def test_damaged_machine_code_is_replaced(tmp_path):
-    assert run(tmp_path, "4.0").returncode == 0
+    assert run(tmp_path).returncode == 0
     for file in (tmp_path / "__pycache__").glob("*.nb?"):
         file.write_bytes(b"\x00damaged")
-    damaged = run(tmp_path, "4.0")
+    damaged = run(tmp_path)
     assert damaged.returncode == 0, damaged.stderr
 
 
