@@ -29,6 +29,10 @@ class InputError(RigsightError, ValueError):
     """A file, an option or an argument cannot be used as it is."""
 
 
+class MachineError(InputError):
+    """Nothing is wrong with the input: a disk, a folder or the memory of this machine does not take what is to be kept."""
+
+
 class SimulationError(RigsightError, ArithmeticError):
     """A simulation left the range of numbers, or could not reach the accuracy asked for."""
 

@@ -17,6 +17,7 @@ import pytest
 
 from rigsight.workflow.progress import Stage
 from rigsight.workflow.progress_display import listening
+from rigsight.workflow.results import write_together
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")
 Run = Callable[..., tuple[int, str, str]]
@@ -198,11 +199,56 @@ def test_a_process_without_stderr_works(monkeypatch: pytest.MonkeyPatch) -> None
         Stage("Diagnosing", 2, listener).finished("one")
 
 
-def test_a_terminal_shows_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
 
+
+class Gone(Terminal):
+    def write(self, _: str) -> int:
+        raise OSError(errno.EIO, "Input/output error")
+
+
+def test_a_terminal_that_went_away_hides_no_interruption(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", Gone())
+    monkeypatch.setenv("TERM", "xterm")
+
+    def interrupted() -> None:
+        with listening(quiet=False) as listener:
+            Stage("Diagnosing", 4, listener).finished("one")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+
+
+def test_who_is_interrupted_when_all_is_written_is_told_so(
+    axis_campaign: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diagnosed(*_: object, **__: object) -> None:
+        write_together(tmp_path / "out", {"diagnosis.json": "{}"})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rigsight.workflow.diagnose.diagnose_campaign", diagnosed)
+    code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
+    assert code == 130
+    assert stderr == f"rigsight: interrupted; the results in {tmp_path / 'out'} are complete.\n"
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EFBIG])
+def test_a_limit_of_the_session_is_no_defect(
+    number: int, axis_campaign: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def limited(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("rigsight.workflow.diagnose.diagnose_campaign", limited)
+    code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
+    assert code == 2
+    assert stderr.startswith(f"rigsight: a limit of this session stands in the way: {os.strerror(number)}.")
+
+
+def test_a_terminal_shows_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = Terminal()
     monkeypatch.setattr(sys, "stderr", shown)
     monkeypatch.setenv("TERM", "xterm")

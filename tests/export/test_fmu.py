@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
+import tempfile
+import threading
+import time
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -182,3 +187,30 @@ def test_a_compiler_without_room_on_the_disk_is_not_blamed(case_named, monkeypat
     with pytest.raises(OSError, match="No space left") as told:
         export_model(case_named("linear axis").model, "fmu", source="model.json")
     assert told.value.filename
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell script stands for the compiler")
+def test_an_interrupted_compiler_leaves_no_file_and_no_helper(
+    case_named, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    compiler, mark = tmp_path / "cc", tmp_path / "mark"
+    compiler.write_text(f'#!/bin/sh\necho > "$TMPDIR/part.s"\nsleep 60 & echo $! > {mark}\nwait\n', "utf-8")
+    compiler.chmod(0o755)
+    place = tmp_path / "tmp"
+    place.mkdir()
+    monkeypatch.setenv("CC", str(compiler))
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+
+    def interrupt() -> None:
+        while not (mark.exists() and mark.read_text()):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        export_model(case_named("linear axis").model, "fmu", source="model.json")
+    thread.join()
+    assert list(place.iterdir()) == []
+    helper = Path("/proc") / mark.read_text().strip() / "stat"
+    assert not helper.exists() or helper.read_text().rpartition(")")[2].split()[0] == "Z"

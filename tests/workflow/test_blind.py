@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
 from collections import Counter
 from dataclasses import replace
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 
 from rigsight.blind import Outcome, Trial, draw_trial, n_trials, subject_of
-from rigsight.errors import InputError, RigsightError
+from rigsight.errors import InputError, MachineError, RigsightError
 from rigsight.records import Record
 from rigsight.workflow import blind, blind_trial
 from rigsight.workflow.blind import rescore, run_blind
@@ -255,6 +257,28 @@ def test_a_failed_diagnosis_is_kept_with_its_reason(bench: BenchFolder) -> None:
     diagnose_trial(bench, NAME, start=("-c", "import sys; sys.exit('rigsight: no good')"))
     found = score_trial(bench, NAME)
     assert (found.verdict, found.right, found.message) == ("failed", False, "rigsight: no good")
+
+
+def test_a_machine_that_lets_no_diagnosis_work_is_no_result_of_a_trial(
+    bench: BenchFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("no folder", "utf-8")
+    monkeypatch.setenv("RIGSIGHT_CACHE_DIR", str(in_the_way / "kernels"))
+    with pytest.raises(MachineError, match="on this machine: rigsight: Cannot keep compiled kernels"):
+        diagnose_trial(bench, NAME)
+    assert not bench.diagnosed(NAME)
+
+
+def test_a_disk_without_room_for_results_says_so(bench: BenchFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("rigsight.workflow.blind_trial.shutil.copy2", full)
+    with pytest.raises(OSError, match="No space left") as raised:
+        diagnose_trial(bench, NAME, start=("-c", ""))
+    assert raised.value.errno == errno.ENOSPC
+    assert not bench.diagnosed(NAME)
 
 
 def test_what_diagnosing_needs_is_all_that_it_gets(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from rigsight.workflow.campaign import read_campaign
 @pytest.fixture
 def campaign_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The campaign of the demo, without its diagnosis."""
-    monkeypatch.setattr(demo, "diagnose_campaign", lambda *_, **__: None)
+    monkeypatch.setattr(demo, "diagnose_campaign", lambda *arguments: arguments[-1](None))
     monkeypatch.setattr(demo, "result_files", lambda *_, **__: {})
     monkeypatch.setattr(demo, "prepare_kernels", lambda *_, **__: None)
     demo.run_demo(tmp_path / "demo", seed=1)

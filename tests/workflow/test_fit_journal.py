@@ -9,6 +9,7 @@ import pytest
 
 from rigsight.diagnose import Diagnosis
 from rigsight.effects import effect_named
+from rigsight.errors import MachineError
 from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.fit_journal import FitJournal
 from rigsight.workflow.progress import Step
@@ -106,3 +107,18 @@ def test_a_cache_that_cannot_be_written_stops_nothing(
     in_the_way.write_text("")
     monkeypatch.setattr("rigsight.workflow.fit_journal.cache_folder", lambda: in_the_way)
     assert diagnosed(axis_campaign).verdict
+
+
+def test_fits_are_kept_where_the_disk_does_not_take_the_result(
+    axis_campaign: Path, journals: Path, counted: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise MachineError("the disk is full")
+
+    monkeypatch.setattr("rigsight.workflow.diagnose.write_diagnosis", full)
+    with pytest.raises(MachineError):
+        run_diagnose(axis_campaign, tmp_path / "out", effects=CANDIDATES, n_jobs=1)
+    (journal,) = journals.iterdir()
+    n_finished = len(journal.read_text().splitlines())
+    run_diagnose(axis_campaign, None, effects=CANDIDATES, n_jobs=1)
+    assert counted == [0, n_finished]

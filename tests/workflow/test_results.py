@@ -6,10 +6,12 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from rigsight.errors import InputError
+from rigsight.workflow import results
 from rigsight.workflow.results import (
     check_target,
     check_writable,
@@ -57,6 +59,42 @@ def test_a_failure_leaves_no_part_and_no_folder(
     assert list(tmp_path.iterdir()) == []
     if isinstance(error, OSError):
         assert "the disk is full" in str(raised.value)
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_an_interruption_while_folders_are_made_leaves_none(
+    when: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = Path.mkdir
+
+    def interrupted(path: Path, **options: bool) -> None:
+        if when == "after" or path.name == "out":
+            original(path, **options)
+        if path.name == "out" or when == "before":
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "mkdir", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_together(tmp_path / "new" / "out", CONTENTS)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
+def test_a_signal_that_comes_when_all_is_in_place_leaves_the_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put = results._put_in_place
+
+    def interrupted(*arguments: Any) -> None:
+        put(*arguments)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(results, "_put_in_place", interrupted)
+    results.forget_written()
+    with pytest.raises(KeyboardInterrupt):
+        write_together(tmp_path / "out", CONTENTS)
+    assert {path.name: path.read_text("utf-8") for path in (tmp_path / "out").iterdir()} == CONTENTS
+    assert results.written() == (tmp_path / "out",)
 
 
 def test_a_failure_keeps_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,10 +17,12 @@ from typing import NoReturn
 import typer
 
 from rigsight.cli.signals import exit_code
-from rigsight.errors import RigsightError
+from rigsight.errors import MachineError, RigsightError
+from rigsight.workflow.results import forget_written, written
 
 DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
+_OF_THE_SESSION = (errno.EMFILE, errno.ENFILE, errno.EFBIG)
 GOES_ON = "nothing was written; the same command goes on from there"
 """What an interrupted diagnosis leaves: no file, but the fits that it has done."""
 
@@ -44,18 +46,27 @@ def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
     if debug:
         yield
         return
+    forget_written()
     try:
         with warnings.catch_warnings():
             # Trial parameters far off the mark overflow; fits expect that and go elsewhere.
             warnings.simplefilter("ignore")
             yield
     except RigsightError as error:
-        leave(str(error), BAD_INPUT)
+        leave(str(error), BAD_INPUT, isinstance(error, MachineError))
     except KeyboardInterrupt as error:
+        if written():
+            left = f"the results in {', '.join(sorted({str(folder) for folder in written()}))} are complete"
         leave(f"interrupted; {left}.", exit_code(error))
     except BrokenPipeError:
         raise
     except OSError as error:
+        if error.errno in _OF_THE_SESSION:
+            leave(
+                f"a limit of this session stands in the way: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
+                BAD_INPUT,
+                is_of_the_machine=True,
+            )
         if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
             _leave_defect(error)
         # Results have messages of their own; what is left is what is read, and what lies between.
@@ -66,15 +77,27 @@ def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
             f"a temporary file or the output cannot be written{place}: {error.strerror}. Make room there, or set TMPDIR to a "
             f"folder that can be written; {left}.",
             BAD_INPUT,
+            is_of_the_machine=True,
         )
     except MemoryError:
-        leave("this needs more memory than there is. Shorten the records, or lower --jobs.", BAD_INPUT)
+        message = "this needs more memory than there is. Shorten the records, or lower --jobs."
+        leave(message, BAD_INPUT, is_of_the_machine=True)
     except Exception as error:
         _leave_defect(error)
 
 
 class Left(SystemExit):
-    """The process ends, and has said why."""
+    """The process ends, and has said why.
+
+    Attributes
+    ----------
+    is_of_the_machine
+        Whether its disk, memory or limits are to blame, and the same command may work elsewhere or later.
+    """
+
+    def __init__(self, code: int, is_of_the_machine: bool = False) -> None:
+        super().__init__(code)
+        self.is_of_the_machine = is_of_the_machine
 
 
 def _leave_defect(error: Exception) -> NoReturn:
@@ -134,7 +157,7 @@ def _forget_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def leave(message: str, code: int) -> NoReturn:
+def leave(message: str, code: int, is_of_the_machine: bool = False) -> NoReturn:
     """Say on stderr why the command ends, and end it.
 
     Raises
@@ -144,4 +167,4 @@ def leave(message: str, code: int) -> NoReturn:
     """
     with contextlib.suppress(OSError):
         typer.echo(f"rigsight: {message}", err=True)
-    raise Left(code)
+    raise Left(code, is_of_the_machine)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import signal
 import threading
 from collections.abc import Iterator
 from types import FrameType
 
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
 _AGAIN_AFTER = 0.05
 """Seconds after which a request is repeated that came where an exception would be dropped."""
 _DROPPING = ("__del__", "_raw_object_cache_notify", "_raw_object_cache_getbuffer")
@@ -28,8 +30,7 @@ def ended_by_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    numbers = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
     # Who runs the command line inside another program may have handlers of their own.
     usual = (signal.SIG_DFL, signal.default_int_handler)
     before = {number: signal.getsignal(number) for number in numbers}
@@ -54,7 +55,15 @@ def _end(number: int, frame: FrameType | None) -> None:
         later.daemon = True
         later.start()
         return
+    # One is enough: another would only interrupt the interpreter as it clears up.
+    atexit.register(_end_quietly)
     raise Ended(number)
+
+
+def _end_quietly() -> None:
+    for name in _ENDING:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def _repeat(number: int) -> None:

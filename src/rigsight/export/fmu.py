@@ -7,11 +7,12 @@ import io
 import os
 import platform
 import shutil
+import signal
 import subprocess
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -104,15 +105,41 @@ def _compiled(sources: Mapping[str, str], name: str) -> tuple[str, str, bytes]:
             Path(place, file).write_text(text, encoding="utf-8")
         target = Path(place, f"{name}{suffix}")
         command = [compiler, "-O2", "-std=c99", *options, "-o", target.name, f"fmi2_{name}.c", "-lm"]
-        run = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
-        if run.returncode != 0 or not target.is_file():
+        code, said = _run(command, place)
+        if code != 0 or not target.is_file():
             if shutil.disk_usage(place).free < _ROOM:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), place)
-            first = next(iter(run.stderr.strip().splitlines()), "no message")
+            first = next(iter(said.strip().splitlines()), "no message")
             raise InputError(
                 f"The C compiler {compiler} failed: {first}. Name another one in the variable CC, or write --source-only."
             )
         return folder, suffix, target.read_bytes()
+
+
+def _run(command: Sequence[str], place: str) -> tuple[int, str]:
+    """Run a compiler in a folder that holds its own temporary files too; return its exit code and what it said.
+
+    It runs programs of its own, which end with it when we are interrupted.
+    """
+    temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), place)
+    with subprocess.Popen(
+        command,
+        cwd=place,
+        env={**os.environ, **temporary},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            _, said = process.communicate()
+        except BaseException:
+            if os.name == "nt":
+                process.kill()
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+        return process.returncode, said
 
 
 def _zipped(members: Mapping[str, str | bytes]) -> bytes:

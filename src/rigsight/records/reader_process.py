@@ -23,6 +23,8 @@ import numpy as np
 from rigsight.records.channel import ChannelFile, TimeAxis
 
 LARGEST_MEMORY = 8_000_000_000
+LONGEST_WORK = 600
+"""Processor time [s]."""
 
 
 def main(kind: str, path: Path) -> None:
@@ -36,6 +38,8 @@ def main(kind: str, path: Path) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (LARGEST_MEMORY, LARGEST_MEMORY))
+        # Who asked ends what runs in circles; if it was killed, nobody does.
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
     reader = getattr(import_module(f"rigsight.records.read_{kind}"), f"open_{kind}")
     try:
         with contextlib.contextmanager(reader)(path) as file:

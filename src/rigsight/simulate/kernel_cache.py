@@ -17,7 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, MachineError
 from rigsight.simulate.kernel_source import kernel_source
 from rigsight.simulate.structure import Structure
 
@@ -102,7 +102,7 @@ def run_kernel(structure: Structure, function: str, *arguments: Any) -> Any:
                 _modules[path.stem] = _load(path.stem, path)
             return getattr(_modules[path.stem], function)(*arguments)
         except Exception:
-            raise InputError(
+            raise MachineError(
                 f"Cannot use the compiled kernels in {path.parent} ({error}). "
                 f"Remove that folder, or set {CACHE_VARIABLE} to one that can be written."
             ) from error
@@ -162,7 +162,7 @@ def _written(name: str, text: str) -> Path:
             Path(part).unlink(missing_ok=True)
             raise
     except OSError as error:
-        raise InputError(
+        raise MachineError(
             f"Cannot keep compiled kernels in {folder} ({error.strerror}). "
             f"Set {CACHE_VARIABLE} to a folder that can be written."
         ) from error
@@ -182,7 +182,7 @@ def _load(name: str, path: Path) -> ModuleType:
         if "cannot cache" not in str(error):
             raise
         del sys.modules[name]
-        raise InputError(
+        raise MachineError(
             f"Cannot keep compiled kernels in {path.parent} (it cannot be written). "
             f"Set {CACHE_VARIABLE} to a folder that can be written."
         ) from error

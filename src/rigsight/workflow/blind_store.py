@@ -17,11 +17,12 @@ from types import TracebackType
 from typing import Any, get_type_hints
 
 from rigsight.blind import Outcome, ParameterError, WithheldError
-from rigsight.errors import InputError
+from rigsight.errors import InputError, MachineError
 
 SCHEMA_VERSION = 1
 _PATIENCE = 60.0
 """Time [s] to wait for another process that writes."""
+_OF_THE_DISK = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY")
 _TYPES: dict[Any, str] = {
     str: "TEXT NOT NULL",
     int: "INTEGER NOT NULL",
@@ -151,6 +152,10 @@ class TrialStore:
             raise self._told(error) from None
 
     def _told(self, error: sqlite3.Error) -> InputError:
+        if getattr(error, "sqlite_errorname", "").startswith(_OF_THE_DISK):
+            return MachineError(
+                f"{self._path} cannot be written: {error}. Make room there; the same command goes on from here."
+            )
         return InputError(
             f"{self._path} cannot be used: {error}. If it is damaged, remove it: 'rigsight blind --rescore' scores the trials "
             "anew from their results."

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.blind import Design, draw_trial
-from rigsight.errors import RigsightError
+from rigsight.errors import MachineError, RigsightError
 from rigsight.workflow.blind_files import RUN_FILE, BenchFolder, trial_name
 from rigsight.workflow.results import json_text
 
@@ -30,12 +30,11 @@ _KEPT_VARIABLES = (
     "RIGSIGHT_CACHE_DIR",
 )
 """What a diagnosing process needs of its surroundings; nothing else of them reaches it."""
-_START = (
-    "import os; from rigsight.workflow.parent_watch import end_with_parent; end_with_parent(os.getcwd()); "
-    "from rigsight.cli import main; main()"
-)
+_START = "from rigsight.cli.trial_process import main; main()"
 _FAILURES = (1, 2)
 """Exit codes of a diagnosis that ended by itself; any other end says nothing about the trial."""
+MACHINE = 75
+"""Exit code of one that this machine did not let work: a full disk, too little memory."""
 
 
 def make_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> None:
@@ -68,14 +67,14 @@ def diagnose_trial(folder: BenchFolder, name: str, start: tuple[str, ...] = ("-c
     Raises
     ------
     RigsightError
-        If the process was ended from outside.
+        If the process was ended from outside, or found no room on the disk or in memory.
     """
     if folder.diagnosed(name):
         return
     fingerprint = folder.fingerprint(name)
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="rigsight-") as place:
-        shutil.copytree(folder.campaign(name), Path(place) / "campaign")
+        _copy(folder.campaign(name), Path(place) / "campaign")
         run = subprocess.run(
             [
                 sys.executable,
@@ -96,6 +95,8 @@ def diagnose_trial(folder: BenchFolder, name: str, start: tuple[str, ...] = ("-c
             text=True,
             check=False,
         )
+        if run.returncode == MACHINE:
+            raise MachineError(f"Trial {name} cannot be diagnosed on this machine: {run.stderr.strip()}")
         if run.returncode not in (0, *_FAILURES):
             raise RigsightError(
                 f"The diagnosis of trial {name} was ended from outside (exit code {run.returncode}); "
@@ -121,10 +122,20 @@ def _keep(found: Path, target: Path, about: dict[str, Any]) -> None:
     with tempfile.TemporaryDirectory(prefix=".part-", dir=target.parent) as part:
         place = Path(part) / "results"
         if found.is_dir():
-            shutil.copytree(found, place)
+            _copy(found, place)
         else:
             place.mkdir()
         (place / RUN_FILE).write_text(json_text(about), encoding="utf-8")
         if target.exists():
             shutil.rmtree(target)
         place.rename(target)
+
+
+def _copy(folder: Path, target: Path) -> None:
+    """Copy a folder; unlike shutil.copytree, end with the first file that the disk does not take, and with its error."""
+    target.mkdir()
+    for path in sorted(folder.iterdir()):
+        if path.is_dir():
+            _copy(path, target / path.name)
+        else:
+            shutil.copy2(path, target / path.name)

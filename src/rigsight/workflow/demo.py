@@ -107,11 +107,13 @@ def run_demo(
             Path(place, name).write_text(text, encoding="utf-8")
         # The path names the fits from which an interrupted demo goes on.
         campaign = replace(read_campaign(place), path=folder / "campaign.toml")
-    diagnosis = diagnose_campaign(campaign, CATALOGUE, seed, jobs, listener)
     # A campaign beside results of another one would be worse than none.
     inside = {f"{CAMPAIGN_FOLDER}/{name}": text for name, text in files.items()}
-    write_together(out, inside | result_files(diagnosis, command, seed))
-    return diagnosis
+
+    def keep(diagnosis: Diagnosis) -> None:
+        write_together(out, inside | result_files(diagnosis, command, seed))
+
+    return diagnose_campaign(campaign, CATALOGUE, seed, jobs, listener, keep)
 
 
 def _structures() -> list[Structure]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import platform
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -74,16 +74,13 @@ def run_diagnose(
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    diagnosis = diagnose_campaign(read_campaign(campaign, own_effects), effects, seed, jobs, listener)
-    if out is not None:
-        write_diagnosis(
-            diagnosis,
-            Path(out),
-            command or f"rigsight diagnose {shlex.quote(str(campaign))}",
-            seed,
-            (*effects, *own_effects),
-        )
-    return diagnosis
+
+    def keep(diagnosis: Diagnosis) -> None:
+        if out is not None:
+            called = command or f"rigsight diagnose {shlex.quote(str(campaign))}"
+            write_diagnosis(diagnosis, Path(out), called, seed, (*effects, *own_effects))
+
+    return diagnose_campaign(read_campaign(campaign, own_effects), effects, seed, jobs, listener, keep)
 
 
 def diagnose_campaign(
@@ -92,6 +89,7 @@ def diagnose_campaign(
     seed: int = 0,
     n_jobs: int = 1,
     listener: Listener = silent,
+    keep: Callable[[Diagnosis], None] | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records.
 
@@ -103,6 +101,8 @@ def diagnose_campaign(
         Candidates; those that the rig does not offer or the simulation has already are passed over.
     seed, n_jobs, listener
         As in `run_diagnose`.
+    keep
+        Given the result before its fits are forgotten: where it fails, for want of room on a disk, they need not be done again.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def diagnose_campaign(
     )
     # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
-        return diagnose(
+        diagnosis = diagnose(
             task_of(campaign),
             candidates,
             seed=seed,
@@ -128,6 +128,9 @@ def diagnose_campaign(
             prepare=lambda structures: prepare_kernels(structures, n_jobs, listener, for_looks=True),
             memory=memory,
         )
+        if keep is not None:
+            keep(diagnosis)
+        return diagnosis
 
 
 def _tell_going_on(count: int, listener: Listener) -> None:

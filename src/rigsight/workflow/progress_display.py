@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator
+from typing import IO, Any, cast
 
 import typer
 
@@ -34,6 +35,25 @@ def _say_stage(step: Step) -> None:
             typer.echo(f"{step.stage} ...", err=True)
 
 
+class _Lasting:
+    """A terminal that may go away: what can no longer be shown ends no work of hours and hides no error."""
+
+    def __init__(self, terminal: IO[str]) -> None:
+        self._terminal = terminal
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._terminal, name)
+
+    def write(self, text: str, /) -> int:
+        with contextlib.suppress(OSError):
+            return self._terminal.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with contextlib.suppress(OSError):
+            self._terminal.flush()
+
+
 @contextlib.contextmanager
 def _bar() -> Iterator[Listener]:
     from rich.console import Console
@@ -57,7 +77,10 @@ def _bar() -> Iterator[Listener]:
     )
     # Single steps take minutes, and the time left is told from all of them.
     with Progress(
-        *columns, console=Console(stderr=True), transient=True, speed_estimate_period=_REMEMBERED
+        *columns,
+        console=Console(file=cast("IO[str]", _Lasting(sys.stderr)), force_terminal=True),
+        transient=True,
+        speed_estimate_period=_REMEMBERED,
     ) as progress:
         tasks = {}
         # The first seconds go into importing numba and sympy: say that something happens.

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, MachineError
 from rigsight.workflow.unfinished_files import hidden, keep_locked, remove_left, write_locked
 
 _REASONS = {
@@ -31,6 +31,18 @@ ENDING_SIGNALS = tuple(
 )
 """Ctrl-C, kill, and a terminal that goes away."""
 ELSEWHERE = "Name another place with --out."
+
+_written: list[Path] = []
+
+
+def written() -> Sequence[Path]:
+    """Return the folders into which this process has written results since `forget_written`, for who says what is there."""
+    return tuple(_written)
+
+
+def forget_written() -> None:
+    """Count from here on."""
+    _written.clear()
 
 
 def json_text(content: Mapping[str, Any]) -> str:
@@ -106,10 +118,11 @@ def write_together(
     token = secrets.token_hex(4)
     made: list[Path] = []
     parts: dict[Path, Path] = {}
+    is_in_place = False
     try:
         with contextlib.ExitStack() as locks:
             for name, content in contents.items():
-                made += _made((folder / name).parent)
+                _make((folder / name).parent, made)
                 _check_replaceable(folder / name)
                 target = (folder / name).resolve()
                 remove_left(target)
@@ -122,7 +135,12 @@ def write_together(
                     file.close()
             with signals_held() as held:
                 _put_in_place(parts, token, held)
+                is_in_place = True
+                _written.append(folder)
     except BaseException as error:
+        if is_in_place:
+            # A signal that waited; it came when all was done.
+            raise
         with signals_held(), contextlib.suppress(OSError):
             for path in parts.values():
                 path.unlink(missing_ok=True)
@@ -163,7 +181,9 @@ def _put_in_place(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -
         finally:
             # Two names of one file stay two when one is to replace the other.
             for old in kept.values():
-                old.unlink(missing_ok=True)
+                # All is in place; the next run removes what is left here.
+                with contextlib.suppress(OSError):
+                    old.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -188,19 +208,11 @@ def signals_held() -> Iterator[Sequence[int]]:
             signal.raise_signal(number)
 
 
-def _made(folder: Path) -> list[Path]:
-    """Make a folder with those above it and return the new ones, outermost first."""
-    missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    made = []
-    try:
-        for path in reversed(missing):
-            path.mkdir(exist_ok=True)
-            made.append(path)
-    except BaseException:
-        for path in reversed(made):
-            path.rmdir()
-        raise
-    return made
+def _make(folder: Path, made: list[Path]) -> None:
+    """Make a folder with those above it; the new ones are appended, outermost first, each before it is made."""
+    for path in reversed([path for path in (folder, *folder.parents) if not path.exists()]):
+        made.append(path)
+        path.mkdir(exist_ok=True)
 
 
 def _check_replaceable(file: Path) -> None:
@@ -215,4 +227,4 @@ def _told(folder: Path, error: OSError, mend: str = ELSEWHERE) -> InputError:
     if isinstance(error, FileExistsError | NotADirectoryError):
         return InputError(f"Cannot write results to {folder}: a file is in the way. Name another folder.")
     reason = _REASONS.get(error.errno or 0, error.strerror or str(error))
-    return InputError(f"Cannot write results to {folder}: {reason}. {mend}")
+    return MachineError(f"Cannot write results to {folder}: {reason}. {mend}")

@@ -63,7 +63,11 @@ def keep_locked(target: Path, path: Path) -> IO[bytes]:
         except BaseException:
             path.unlink(missing_ok=True)
             raise
-    file = path.open("rb")
+    try:
+        file = path.open("rb")
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
     _lock(file)
     return file
 

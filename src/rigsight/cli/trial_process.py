@@ -1,0 +1,19 @@
+"""How does a process that diagnoses a blind trial run the command line, and say whether the trial or the machine ended it?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigsight.cli.application import main as command_line
+from rigsight.cli.exit_codes import Left
+from rigsight.workflow.blind_trial import MACHINE
+from rigsight.workflow.parent_watch import end_with_parent
+
+
+def main() -> None:
+    """Run the command line as a child that ends, and clears its folder, with the process that started it."""
+    end_with_parent(str(Path.cwd()))
+    try:
+        command_line()
+    except Left as end:
+        raise SystemExit(MACHINE if end.is_of_the_machine else end.code) from None
