@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigsight.identify.amplitude_dependence import amplitude_dependence
@@ -42,6 +44,19 @@ def test_scatter_inside_the_intervals_is_no_change() -> None:
     statement, changing = amplitude_dependence([found(1.0, 80.0, 2.0), found(2.0, 81.0, 1.98)], UNITS, "A")
     assert changing == ()
     assert statement.startswith("No parameter changes")
+
+
+def test_a_resonance_that_moves_is_told_where_intervals_are_too_wide() -> None:
+    resonances = {1.0: 30.0, 2.0: 31.0, 3.0: 37.0}
+    records = [
+        replace(found(amplitude, 80.0 + amplitude, 2.0, error=0.5), resonance=resonance)
+        for amplitude, resonance in resonances.items()
+    ]
+    statement, changing = amplitude_dependence(records, UNITS, "A")
+    assert changing == ()
+    assert "lies between 30 and 37 rad/s" in statement
+    steady, _ = amplitude_dependence([replace(r, resonance=30.0) for r in records], UNITS, "A")
+    assert "resonance" not in steady
 
 
 def test_a_step_is_not_compared_with_a_sweep() -> None:

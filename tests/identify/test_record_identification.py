@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep, step
 from rigsight.identify.record_identification import Wishes, identify_record, input_peak
 from rigsight.records import Record
@@ -50,3 +51,16 @@ def test_a_record_that_is_too_short_is_told_what_would_help() -> None:
     assert motion.problem is not None
     assert "does not determine" in motion.problem
     assert "Record for longer" in motion.problem
+
+
+def test_a_signal_of_the_wrong_sign_is_told_also_where_friction_spoils_the_phases() -> None:
+    t = DT * np.arange(8000)
+    driven = Record("own", DT, {"u": log_sweep(t, 0.5, 0.5, 60.0)}, {"u": "A", "psi": "rad"}, kind="sweep")
+    rng = np.random.default_rng(3)
+    structure = compose(RUNNING_GEAR, [effect_named("coulomb_friction")])
+    psi = simulate(structure, {**VALUES, "T_c": 0.02}, driven)["psi"] + rng.normal(0.0, 2e-5, t.size)
+    right = identify_record(driven.with_signals(psi=psi), RUNNING_GEAR, CONSTANTS, False, Wishes()).paths[0]
+    assert right.fit is not None
+    assert "magnitudes only" in right.fit.message
+    turned = identify_record(driven.with_signals(psi=-psi), RUNNING_GEAR, CONSTANTS, False, Wishes())
+    assert "Change the sign" in turned.paths[0].problem

@@ -88,3 +88,20 @@ def test_the_message_says_what_to_write() -> None:
 def test_scale_and_unit_exclude_each_other() -> None:
     with pytest.raises(InputError, match="give one of the two"):
         ColumnMapping("u", scale=1.0, unit="mA")
+
+
+def test_a_drive_may_be_given_in_any_unit_of_drives() -> None:
+    mapping, notes = si_mapping("run.mat", "u", "1", ColumnMapping("F", unit="kN"), "F", None)
+    assert (mapping.scale, notes) == (1000.0, ())
+    with pytest.raises(InputError, match=r"no unit of a drive \(A, V, N, N m\)"):
+        si_mapping("run.mat", "u", "1", ColumnMapping("F", unit="mm"), "F", None)
+
+
+def test_a_unit_in_a_name_that_is_not_read_is_asked_about() -> None:
+    mapping, (note,) = si_mapping("run.mat", "t", "s", ColumnMapping("t_ms"), "t_ms", None)
+    assert not mapping.is_converted
+    assert 't = { name = "t_ms", unit = "ms" }' in note
+    for said in (ColumnMapping("t_ms", unit="ms"), ColumnMapping("t_ms", scale=1.0)):
+        assert si_mapping("run.mat", "t", "s", said, "t_ms", None)[1] == ()
+    for name in ("t", "time_s", "Time [s]", "x_A"):
+        assert si_mapping("run.mat", "t", "s", ColumnMapping(name), name, None)[1] == ()

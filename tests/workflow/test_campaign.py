@@ -151,7 +151,8 @@ BROKEN: list[tuple[str, str, str, list[str]]] = [
     ),
     ("no records", RECORDS, "", ["records", "missing", "[[records]]"]),
     ("empty records", RECORDS, "", ["records: 0 given, 1 to 1000"]),
-    ("records no list", "[[records]]\nfile", "[records]\nfile", ["campaign.toml"]),
+    ("records no list", "[[records]]\nfile", "[records]\nfile", ["campaign.toml", "begins with [[records]]"]),
+    ("path of Windows", '"sweep.csv"', '"C:\\data.csv"', ["campaign.toml", "Write paths with /"]),
     ("file missing", 'file = "sweep.csv"', "", ["record 1: file", "missing"]),
     (
         "file not there",
@@ -233,6 +234,18 @@ def test_broken_campaigns_are_told_with_key_and_mend(
     assert "pydantic" not in message
 
 
+def test_sample_times_a_thousand_apart_are_asked_about(campaign: Callable[..., Path]) -> None:
+    def change(lines: Lines) -> None:
+        for i, line in enumerate(lines[1:], 1):
+            t, _, rest = line.partition(",")
+            lines[i] = f"{1e3 * float(t):.9g},{rest}"
+
+    (note,) = read_campaign(campaign(change=change)).notes
+    assert "factor of 1e+03" in note
+    assert "'sweep' 10 s" in note
+    assert 'unit = "ms"' in note
+
+
 def test_errors_of_a_record_name_campaign_file_and_line(campaign: Callable[..., Path]) -> None:
     def change(lines: Lines) -> None:
         lines[7] = lines[7].replace(lines[7].split(",")[1], "off")
@@ -248,7 +261,7 @@ def test_a_link_that_leaves_the_folder_is_refused(
     outside = tmp_path_factory.mktemp("elsewhere") / "sweep.csv"
     (folder / "sweep.csv").rename(outside)
     (folder / "sweep.csv").symlink_to(outside)
-    with pytest.raises(InputError, match="leaves the campaign's folder"):
+    with pytest.raises(InputError, match="is a link that leaves the campaign's folder"):
         read_campaign(folder)
 
 

@@ -43,6 +43,20 @@ def test_units_in_names_are_written_and_applied(tmp_path: Path) -> None:
     assert (first.dt, second.role) == (pytest.approx(0.01, rel=1e-12), "validation")
 
 
+def test_a_drive_in_kilonewtons_is_converted(tmp_path: Path) -> None:
+    write_text(tmp_path / "run.csv", {"t": T, "Drive Force [kN]": 0.02 * SWEEP, "Pos [mm]": ANSWER}, {})
+    run_init(tmp_path, model="axis")
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["u"], 20.0 * SWEEP, rtol=1e-12)
+    assert record.amplitude == pytest.approx(20.0, rel=0.02)
+
+
+def test_a_time_that_is_hardly_in_seconds_is_asked_about(tmp_path: Path) -> None:
+    write_text(tmp_path / "run.csv", {"t": 1e3 * T, "u": SWEEP, "x": ANSWER}, {})
+    run_init(tmp_path)
+    assert "sample time 10 s; is it in ms?" in (tmp_path / "campaign.toml").read_text("utf-8")
+
+
 def test_the_kind_of_rig_is_guessed_from_the_channels(tmp_path: Path) -> None:
     for folder, columns in {
         "element": ("t", "Hub [mm]", "Kraft [kN]"),

@@ -50,7 +50,8 @@ def init(
         return
     if quiet:
         return
-    typer.echo(f"Written: {draft.path} ({draft.model}, {len(draft.records)} records)")
+    count = len(draft.records)
+    typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")
     if draft.n_blanks:

@@ -12,6 +12,8 @@ from rigsight.identify.identification import RecordIdentification
 _CHANCE = 1e-3
 """Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
 _SAME_AMPLITUDE = 0.01
+_MOVED = 1.15
+"""Ratio of resonance frequencies that no scatter of a peak explains."""
 
 
 def amplitude_dependence(
@@ -59,14 +61,23 @@ def amplitude_dependence(
             verb = "falls" if high < low else "rises"
             told.append(f"{name} {verb} from {low:.3g} to {high:.3g} {units.get(name, '')}")
     if not changing:
-        return (
-            f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval.",
-            (),
-        )
+        text = f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval."
+        return text + _moving_resonance(compared), ()
     return (
         f"With amplitudes {span}, {'; '.join(text.strip() for text in told)}: beyond their intervals, the sign of a nonlinear "
         "effect. 'rigsight diagnose' looks for it."
     ), tuple(changing)
+
+
+def _moving_resonance(compared: Sequence[tuple[float, Sequence[RecordIdentification]]]) -> str:
+    """Say that the resonance moves although intervals of parameters, wide where the form does not fit, do not tell."""
+    found = [r.resonance for _, group in compared for r in group if r.resonance is not None]
+    if len(found) < 2 or max(found) <= _MOVED * min(found):
+        return ""
+    return (
+        f" The resonance, though, lies between {min(found):.3g} and {max(found):.3g} rad/s: the intervals are too wide to tell, "
+        "and a nonlinear effect is likely. 'rigsight diagnose' looks for it."
+    )
 
 
 def _comparable(

@@ -34,6 +34,8 @@ MISFIT = 3.0
 """Residuals in units of the noise from which a form is not the whole of the rig."""
 _LONGEST_DELAY = 0.5 * math.pi
 """Phase by which a dead time may turn the largest magnitude [rad]."""
+_TURNED = -0.5
+"""Correlation of fitted and measured values below which the sign of one signal is turned; no phase lag of a rig does that."""
 _SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 
 
@@ -219,7 +221,15 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
         f"The residuals are {misfit:.0f} times what the noise explains: this form is not the whole of the rig.{read} An error of "
         f"{100.0 * share:.0f} % of the magnitude was allowed for at every line."
     )
-    return replace(fit, misfit=misfit, message=f"{fit.message} {note}")
+    return replace(fit, values=_with_sign(fit, response), misfit=misfit, message=f"{fit.message} {note}")
+
+
+def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float]:
+    """Return the values of a fit, with a negative gain where the phases say that the response moves against the source."""
+    fitted = fit.at(response.omega)
+    agreement = float(np.vdot(fitted, response.values).real)
+    is_turned = agreement < _TURNED * float(np.linalg.norm(fitted) * np.linalg.norm(response.values))
+    return {**fit.values, "gain": -fit.values["gain"]} if is_turned else fit.values
 
 
 def _step_fit(record: Record, source: str, response: str, order: Order, no_spring: bool) -> TransferFit:

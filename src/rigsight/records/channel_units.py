@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from functools import cache
 from typing import Any
 
 from rigsight.errors import InputError
+from rigsight.records.channel_names import split_unit
 from rigsight.records.column_mapping import ColumnMapping
 
 _SI = ("A", "rad", "m", "N", "N m", "s", "V", "kg", "Hz")
 """Units that need no library to be known."""
+DRIVES = ("A", "V", "N", "N m")
+"""What amplifiers are told, and what motors give."""
 # Only products of units with small powers reach pint: its parser would work out 9**9**9 for as long as that takes.
 _UNIT = r"[A-Za-zµμΩ°%]+(?:(?:\^|\*\*)?-?[1-4])?"
 _PRODUCT = re.compile(rf"{_UNIT}(?:\s*[*/·.⋅ ]\s*{_UNIT}){{0,5}}")
@@ -93,6 +97,14 @@ def has_si(unit: str) -> bool:
     return unit in _SI
 
 
+def in_drive_unit(unit: str) -> tuple[float, str] | None:
+    """Return what one `unit` of a drive is in its SI unit, and that unit: kN is 1000 N. None where it is no unit of a drive."""
+    for si in DRIVES:
+        with contextlib.suppress(UnknownUnitError):
+            return factor(unit, si), si
+    return None
+
+
 def is_a(unit: str, si: str) -> bool:
     """Return True if a unit as a file states it measures the same as `si`."""
     try:
@@ -124,15 +136,26 @@ def si_mapping(
         Naming file, column and unit, and what to write instead: it is unknown, or measures something else.
     """
     unit = mapping.unit if mapping.unit is not None else stated
-    if mapping.is_converted or unit is None:
-        return mapping, ()
     where = f"{file}, column '{label}'"
+    if mapping.is_converted:
+        return mapping, ()
+    if unit is None:
+        named = split_unit(label)[1]
+        if named is None or not has_si(si) or named == si or not is_a(named, si):
+            return mapping, ()
+        return mapping, (
+            f"{where}: taken in {si} as it stands, though its name ends with {named}. If it is in {named}, write "
+            f'{signal} = {{ name = "{label}", unit = "{named}" }}; if not, scale = 1.0.',
+        )
     if not has_si(si):
         if mapping.unit is not None:
-            raise InputError(
-                f'{where}: unit = "{unit}" cannot be converted: {signal} has no unit of its own on this rig. '
-                "Give scale and offset instead."
-            )
+            found = in_drive_unit(mapping.unit)
+            if found is None:
+                raise InputError(
+                    f'{where}: unit = "{unit}" cannot be converted: {signal} has no unit of its own on this rig, and this is '
+                    f"no unit of a drive ({', '.join(DRIVES)}). Give scale and offset instead."
+                )
+            return ColumnMapping(mapping.name, scale=found[0]), ()
         return mapping, (
             f"{where}: {signal} has no unit of its own on this rig; values were taken as they stand, in {unit}.",
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign_file import CampaignTable, RecordTable, locate, read_campaign_table
 
+_RATES_APART = 100.0
+"""Ratio of sample times from which they are asked about."""
 NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
 # What an alternative parameter determines, and so must not be given beside.
 DETERMINES = {"delta_0": "c_y"}
@@ -115,11 +117,9 @@ def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> C
         read_listed_record(path, given.rig, number, record, file)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
     )
-    notes = (
-        ()
-        if any(record.role == "validation" for record in records)
-        else (NO_VALIDATION.format(file=path.name),)
-    )
+    notes = [_rates_apart(records)] if _rates_apart(records) else []
+    if all(record.role != "validation" for record in records):
+        notes.append(NO_VALIDATION.format(file=path.name))
     return Campaign(
         title=table.title or path.parent.resolve().name,
         path=path,
@@ -128,7 +128,19 @@ def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> C
         constants=given.constants,
         parameters=given.parameters,
         records=_with_distinct_names(table, records),
-        notes=notes,
+        notes=tuple(notes),
+    )
+
+
+def _rates_apart(records: Sequence[Record]) -> str:
+    """Say that sample times lie so far apart that the time of one record is probably in another unit; empty if they do not."""
+    finest, coarsest = (choose(records, key=lambda record: record.dt) for choose in (min, max))
+    if coarsest.dt < _RATES_APART * finest.dt:
+        return ""
+    return (
+        f"The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' has "
+        f"{finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
+        't = { name = "...", unit = "ms" } for it.'
     )
 
 
@@ -273,8 +285,10 @@ def file_inside(path: Path, number: int, record: RecordTable) -> Path:
         # Longer than names may be, with a null or half a sign in it, or a link to itself.
         raise InputError(f"{key}: is no file name that can be looked up: {shown(record.file)}.") from None
     if asked.is_absolute() or ".." in asked.parts or not inside:
+        is_link = not asked.is_absolute() and ".." not in asked.parts
+        how = "is a link that leaves" if is_link else "leaves"
         raise InputError(
-            f"{key}: '{record.file}' leaves the campaign's folder; put the file beside {path.name}."
+            f"{key}: '{record.file}' {how} the campaign's folder; put the file beside {path.name}."
         )
     if not exists:
         files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]

@@ -107,9 +107,7 @@ def read_campaign_table(path: Path) -> CampaignTable:
             raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no campaign.toml.")
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"{path.name} is not valid TOML: {error}. Texts stand in quotes, tables in [brackets]."
-        ) from None
+        raise InputError(f"{path.name} is not valid TOML: {error}. {_mend(str(error))}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
     except OSError as error:
@@ -235,3 +233,15 @@ def _how_to_write(location: tuple[str | int, ...]) -> str:
         "records": ' Write [[records]] and file = "..." for every record.',
         "file": ' Write file = "name.csv".',
     }.get(str(location[-1]), "")
+
+
+def _mend(error: str) -> str:
+    """Return what to write, for the mistakes of TOML that campaigns see most."""
+    if "Cannot declare" in error or "Cannot overwrite" in error or "Cannot mutate" in error:
+        return (
+            "Every record begins with [[records]], in double brackets; its columns follow it under [records.columns]. "
+            "Other tables and keys stand once."
+        )
+    if "Unescaped" in error and "\\" in error:
+        return "Write paths with / instead of \\."
+    return "Texts stand in quotes, tables in [brackets]."

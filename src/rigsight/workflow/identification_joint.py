@@ -25,6 +25,8 @@ from rigsight.workflow.campaign import Campaign
 _DIFFERENT = 0.01
 """Probability of differences as large by chance below which records are said to need sets of their own."""
 _SMALL_LOSS = 0.01
+_UNSERVED = 0.9
+"""Share of a motion that is left where a fit has not followed it at all."""
 _LATERAL = ("l_0", "c_y")
 _BELOW = 1e-6
 
@@ -203,6 +205,18 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str
     if not math.isfinite(fit.probability):
         return (
             "The records have no parameter in common that each of them determines; nothing can be compared."
+        )
+    unserved = [
+        f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
+        for score in scores
+        if score.role == "estimation"
+        for name in score.nrmse
+        if not score.nrmse[name] < _UNSERVED
+    ]
+    if fit.probability >= _DIFFERENT and unserved:
+        return (
+            "The joint fit follows the records too poorly to say whether one parameter set serves all: it leaves "
+            f"{', '.join(unserved[:3])}. Its numbers are to be doubted; look for a signal of the wrong sign, unit or column."
         )
     if fit.probability >= _DIFFERENT:
         return (

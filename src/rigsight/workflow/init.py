@@ -156,7 +156,7 @@ def _text(
         "# Written by rigsight init from the files of this folder. What stands behind a # was guessed: check it.",
     ]
     if n_blanks:
-        lines.append(f"# What could not be guessed reads {BLANK} ({n_blanks} times): fill it in.")
+        lines.append(f"# What could not be guessed reads {BLANK} ({_times(n_blanks)}): fill it in.")
     others = " or ".join(f'"{name}"' for name in RIGS if name != rig.name)
     remark = (
         f"  # guessed from the channels: {rig.summary} Otherwise {others}"
@@ -182,6 +182,10 @@ def _text(
         lines += ["", "# Not used:"]
         lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]
     return "\n".join(_printable(line) for text in lines for line in text.split("\n")) + "\n", n_blanks
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def _printable(text: str) -> str:

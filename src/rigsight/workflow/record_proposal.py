@@ -15,13 +15,16 @@ from rigsight.errors import InputError
 from rigsight.records import Kind, Role
 from rigsight.records.channel import Channel, ChannelFile, as_floats
 from rigsight.records.channel_summary import step_and_gaps
-from rigsight.records.channel_units import has_si, is_a
+from rigsight.records.channel_units import has_si, in_drive_unit, is_a
 from rigsight.records.excitation_kind import guess_amplitude, guess_kind
+from rigsight.records.read_record import TIME
 from rigsight.workflow.signal_guesses import FileGuess, Guess, guess_file
 
 BLANK = '"FILL IN"'
 """Stands where nothing could be guessed; a diagnosis refuses it by the key's name."""
 _LISTED = 12
+_COARSE = 0.5
+"""Sample time [s] from which the unit of time is asked about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +111,11 @@ def quoted(text: str) -> str:
 def _in_si(samples: NDArray[np.float64], guess: Guess) -> NDArray[np.float64]:
     from rigsight.records.channel_units import UnknownUnitError, factor
 
-    if guess.unit is None or not has_si(guess.si):
+    if guess.unit is None:
         return samples
+    if not has_si(guess.si):
+        found = in_drive_unit(guess.unit)
+        return samples if found is None else found[0] * samples
     with suppress(UnknownUnitError):
         return factor(guess.unit, guess.si) * samples
     return samples
@@ -157,6 +163,16 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     return lines, blanks
 
 
+def _coarse_step(time: Channel) -> float | None:
+    """Return the sample time that values taken in seconds make, if it is one that few rigs are measured with."""
+    with suppress(InputError):
+        stamps = as_floats(time.load())
+        if stamps.size > 1 and np.isfinite(stamps).all():
+            step = float(np.median(np.diff(stamps)))
+            return step if step >= _COARSE else None
+    return None
+
+
 def _unit_of(guess: Guess) -> str:
     return f"[{guess.si}], " if has_si(guess.si) else ""
 
@@ -167,12 +183,19 @@ def _column(guess: Guess) -> list[str]:
     name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
     if guess.unit is None:
         needed = guess.channel.name != guess.signal
+        if guess.signal == TIME and (step := _coarse_step(guess.channel)):
+            return [f"t = {name}  # taken in s, which makes the sample time {step:.3g} s; is it in ms? check"]
         remark = (
             f"  # taken to be in {guess.si}; check" if has_si(guess.si) else "  # taken as it stands; check"
         )
         return [f"{guess.signal} = {name}{remark}"] if needed else []
     if not has_si(guess.si):
-        return [f"{guess.signal} = {name}  # in {guess.unit}, taken as it stands"]
+        found = in_drive_unit(guess.unit)
+        if found is None or found[0] == 1.0:
+            return [f"{guess.signal} = {name}  # in {guess.unit}, taken as it stands"]
+        return [
+            f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}  # becomes {found[1]}; check gain"
+        ]
     if not is_a(guess.unit, guess.si):
         return [
             f"{guess.signal} = {{ name = {name}, scale = 1.0 }}  # in {guess.unit}, taken as it stands; "

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from rigsight.records.channel import Channel
 from rigsight.records.channel_names import closeness, split_unit
-from rigsight.records.channel_units import has_si, is_a
+from rigsight.records.channel_units import DRIVES, has_si, is_a
 from rigsight.records.read_record import TIME
 from rigsight.rigs import RIGS, Rig
 
@@ -15,8 +15,6 @@ MODELS = ("running_gear", "axis", "element")
 """In the order in which they are tried: a yaw angle is telling, a displacement belongs to two."""
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
-_DRIVES = ("A", "V", "N", "N m")
-"""What amplifiers are told, and what motors give."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
             continue
         taken = [found.time.channel, *(own.channel for own in guesses)]
         # A drive has the unit of its amplifier.
-        units = [guess.si] if has_si(guess.si) else _DRIVES
+        units = [guess.si] if has_si(guess.si) else DRIVES
         fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
         rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
         if len(fitting) == len(rivals) == 1:
