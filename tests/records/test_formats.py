@@ -164,26 +164,59 @@ def test_odd_names(tmp_path: Path, write: Write) -> None:
 
 
 @pytest.mark.parametrize("packed", [False, True])
-def test_a_struct_one_level_deep(tmp_path: Path, packed: bool) -> None:
+def test_structs_are_looked_into(tmp_path: Path, packed: bool) -> None:
     from scipy.io import savemat
 
     content = {
-        "log": {**rows(), "info": "bench 3", "deep": {"x": rows()["u"]}},
+        "log": {**rows(), "info": "bench 3", "deep": {"er": {"x": rows()["u"]}}},
         "names": np.array(["a", "b"], dtype=object),
         "fs": 100.0,
     }
     savemat(tmp_path / "run.mat", content, do_compression=packed)
     np.testing.assert_array_equal(read(tmp_path / "run.mat")["psi"], rows()["psi"])
     with open_channels(tmp_path / "run.mat") as file:
-        assert [channel.name for channel in file.channels] == ["log/t", "log/u", "log/psi", "log/y"]
+        names = [channel.name for channel in file.channels]
         refused = {one.name: one.reason for one in file.refused}
-    assert "one level deep" in refused["log/deep"]
+    assert names == ["log/t", "log/u", "log/psi", "log/y", "log/deep/er/x"]
     assert "text" in refused["log/info"]
     assert "cell" in refused["names"]
-    with pytest.raises(
-        InputError, match="'log/deep', which signal 'u' is mapped to, is a struct in a struct"
-    ):
-        read(tmp_path / "run.mat", columns={"u": ColumnMapping("log/deep")})
+    deep = read(tmp_path / "run.mat", columns={"psi": ColumnMapping("log/deep/er/x")})
+    np.testing.assert_array_equal(deep["psi"], rows()["u"])
+    with pytest.raises(InputError, match="'log/info', which signal 'u' is mapped to, is text"):
+        read(tmp_path / "run.mat", columns={"u": ColumnMapping("log/info")})
+
+
+def test_structures_with_time_as_simulink_logs_them(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    good = rows()
+    signals = np.zeros((1, 3), dtype=[("values", object), ("label", object)])
+    for place, name in enumerate(("u", "psi", "y")):
+        signals[0, place] = (good[name][:, None], name)
+    savemat(tmp_path / "run.mat", {"logsout": {"time": good["t"][:, None], "signals": signals}})
+    columns = {
+        "t": ColumnMapping("logsout/time"),
+        **{
+            name: ColumnMapping(f"logsout/signals({i})/values") for i, name in enumerate(("u", "psi", "y"), 1)
+        },
+    }
+    record = read(tmp_path / "run.mat", columns=columns)
+    for name in ("u", "psi", "y"):
+        np.testing.assert_array_equal(record[name], good[name])
+
+
+def test_a_group_inside_itself_ends(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    write_matlab_hdf5(tmp_path / "run.mat", rows(), {})
+    with h5py.File(tmp_path / "run.mat", "r+") as file:
+        group = file.create_group("log")
+        group["again"] = group
+        group.create_dataset("x", data=rows()["u"][None, :]).attrs["MATLAB_class"] = np.bytes_("double")
+    with open_channels(tmp_path / "run.mat") as opened:
+        names = [channel.name for channel in opened.channels]
+        (refused,) = opened.refused
+    assert {"t", "u", "psi", "y", "log/x", "log/again/x"} < set(names)
+    assert "structs deep" in refused.reason
 
 
 def test_columns_of_a_matrix(tmp_path: Path) -> None:

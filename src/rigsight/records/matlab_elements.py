@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from rigsight.errors import InputError
 from rigsight.records.channel import MOST_SAMPLES, check_count
-from rigsight.records.matlab_names import NUMERIC
+from rigsight.records.matlab_names import DEEPEST, NUMERIC
 
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
 _BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
@@ -23,7 +23,6 @@ _TEXT = (1, 2, 4, 16, 17, 18)
 _CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse", *NUMERIC, "function", "opaque"), 1))
 _COMPLEX, _LOGICAL = 0x0800, 0x0200
 HEADER = 128
-_DEEPEST = 16
 # A variable that needs more once unpacked holds more samples than are read.
 _LARGEST_VARIABLE = 16 * MOST_SAMPLES
 # As many bytes as the largest file may have that is not packed.
@@ -47,7 +46,7 @@ class Variable:
     shape
         Declared dimensions.
     fields
-        Of a struct of one element, in order.
+        Of a struct, in order; of an array of structs those of all elements, one after the other, in the order of columns.
     """
 
     name: str
@@ -144,8 +143,8 @@ def _part(data: bytes, position: int, stop: int, order: str, allowed: int) -> tu
 
 
 def _matrix(data: bytes, position: int, stop: int, order: str, depth: int) -> Variable:
-    if depth > _DEEPEST:
-        raise DamagedError(f"variables are nested more than {_DEEPEST} deep")
+    if depth > DEEPEST:
+        raise DamagedError(f"variables are nested more than {DEEPEST} deep")
     if position == stop:
         return Variable("", "double", (0, 0))
     start, end, position = _part(data, position, stop, order, _UINT32)

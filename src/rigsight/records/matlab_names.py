@@ -14,14 +14,14 @@ NUMERIC = (
     "int64",
     "uint64",
 )
-DEEPER = (
-    "is a struct in a struct; only structs one level deep are read. Save its fields as variables of their own"
-)
+DEEPEST = 16
+"""Structs in structs that are looked into."""
+DEEPER = f"lies more than {DEEPEST} structs deep. Save its fields as variables of their own"
 _REASONS = {
     "char": "is text",
     "logical": "is of type logical",
-    "cell": "is a cell array; save its contents as variables of their own",
-    "struct": "is an array of structs; save each as a variable of its own",
+    "cell": "is a cell array, or an array of structs saved with -v7.3; save its contents as variables of their own",
+    "struct": "is a struct without fields",
     "sparse": "is a sparse matrix",
     "complex": "holds complex numbers",
     "function": "is a function, which is not read",

@@ -11,7 +11,15 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.channel import Channel, ChannelFile, Load, Refused, columns_of, with_distinct_names
+from rigsight.records.channel import (
+    Channel,
+    ChannelFile,
+    Load,
+    Refused,
+    check_count,
+    columns_of,
+    with_distinct_names,
+)
 from rigsight.records.matlab_elements import (
     HEADER,
     DamagedError,
@@ -19,11 +27,14 @@ from rigsight.records.matlab_elements import (
     begins_with_variable,
     declared_variables,
 )
-from rigsight.records.matlab_names import DEEPER, NUMERIC, why_no_signal
+from rigsight.records.matlab_names import NUMERIC, why_no_signal
+
+Way = tuple[tuple[int, str], ...]
+"""Elements of structs and their fields, from a variable to what is inside."""
 
 
 def open_matlab(path: Path) -> Iterator[ChannelFile]:
-    """Yield the channels of a MATLAB file: arrays, and those in structs one level deep as ``struct/field``.
+    """Yield the channels of a MATLAB file: arrays, and those in structs as ``struct/field`` or ``structs(2)/field``.
 
     MATLAB files state no units. Tables and timetables are objects that only MATLAB reads; they are refused by name.
     """
@@ -31,15 +42,16 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
     data = path.read_bytes()
     read: dict[str, Any] = {}
 
-    def load(variable: str, field: str | None) -> Load:
+    def load(variable: str, way: Way) -> Load:
         def numbers() -> NDArray[Any]:
             if variable not in read:
                 # One at a time: packed variables together may be larger than any memory.
                 read.clear()
                 read[variable] = _read(data, variable)
-            content = read[variable]
-            numbers: NDArray[Any] = content if field is None else content[field].item()
-            return numbers
+            content: NDArray[Any] = read[variable]
+            for element, field in way:
+                content = content.reshape(-1, order="F")[element][field]
+            return content
 
         return numbers
 
@@ -51,17 +63,28 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
         text = str(error)
         raise InputError(text if text.startswith(path.name) else f"{path.name}: {text}") from None
     for variable in variables:
-        parts: list[tuple[str, Variable, str | None]] = [(variable.name, variable, None)]
-        if variable.kind == "struct" and math.prod(variable.shape) == 1:
-            parts = [(f"{variable.name}/{field.name}", field, field.name) for field in variable.fields]
-        for name, part, field in parts:
-            found = _channels(name, part, load(variable.name, field))
+        for name, part, way in _parts(variable.name, variable, ()):
+            check_count(path.name, len(channels) + len(refused))
+            found = _channels(name, part, load(variable.name, way))
             if isinstance(found, Refused):
                 # MATLAB keeps the workspace of functions and objects under an empty name.
                 refused += [found] if variable.name else []
             else:
                 channels.extend(found)
     yield ChannelFile("MATLAB", with_distinct_names(channels), tuple(refused))
+
+
+def _parts(name: str, variable: Variable, way: Way) -> Iterator[tuple[str, Variable, Way]]:
+    """Yield a variable, or what is inside where it is a struct or an array of structs."""
+    count = math.prod(variable.shape)
+    if variable.kind != "struct" or not variable.fields:
+        yield name, variable, way
+        return
+    per_element = len(variable.fields) // count
+    for place, field in enumerate(variable.fields):
+        element = place // per_element
+        owner = name if count == 1 else f"{name}({element + 1})"
+        yield from _parts(f"{owner}/{field.name}", field, (*way, (element, field.name)))
 
 
 def _check_first(path: Path) -> None:
@@ -74,9 +97,7 @@ def _check_first(path: Path) -> None:
 
 def _channels(name: str, declared: Variable, load: Load) -> list[Channel] | Refused:
     if declared.kind not in NUMERIC:
-        return Refused(
-            name, DEEPER if declared.kind == "struct" and "/" in name else why_no_signal(declared.kind)
-        )
+        return Refused(name, why_no_signal(declared.kind))
     return columns_of(name, declared.shape, load)
 
 

@@ -17,13 +17,13 @@ from rigsight.records.channel import (
     kept_last,
     with_distinct_names,
 )
-from rigsight.records.matlab_names import DEEPER, NUMERIC, why_no_signal
+from rigsight.records.matlab_names import DEEPER, DEEPEST, NUMERIC, why_no_signal
 
 _INTERNAL = ("#refs#", "#subsystem#")
 
 
 def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
-    """Yield the channels of a file saved with ``-v7.3``: arrays, and those in structs one level deep as ``struct/field``."""
+    """Yield the channels of a file saved with ``-v7.3``: arrays, and those in structs as ``struct/field``."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -39,20 +39,21 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
             else:
                 channels.extend(found)
 
-        for name in map(str, file):
-            if name in _INTERNAL or file.get(name, getlink=True).__class__ is not h5py.HardLink:
-                continue
-            item = file[name]
-            if not isinstance(item, h5py.Group):
-                take(name, item)
-                continue
-            for field in map(str, item):
-                if item.get(field, getlink=True).__class__ is h5py.HardLink:
-                    inside = item[field]
-                    if isinstance(inside, h5py.Group):
-                        refused.append(Refused(f"{name}/{field}", DEEPER))
-                    else:
-                        take(f"{name}/{field}", inside)
+        def look_into(group: Any, above: str, depth: int) -> None:
+            for name in map(str, group):
+                if name in _INTERNAL or group.get(name, getlink=True).__class__ is not h5py.HardLink:
+                    continue
+                item = group[name]
+                if not isinstance(item, h5py.Group):
+                    take(above + name, item)
+                elif depth == DEEPEST:
+                    # A damaged file may hold a group inside itself.
+                    check_count(path.name, len(channels) + len(refused))
+                    refused.append(Refused(above + name, DEEPER))
+                else:
+                    look_into(item, f"{above}{name}/", depth + 1)
+
+        look_into(file, "", 0)
         yield ChannelFile("MATLAB 7.3", with_distinct_names(channels), tuple(refused))
 
 
