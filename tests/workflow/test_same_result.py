@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from rigsight.effects import effect_named
 from rigsight.workflow.diagnose import run_diagnose
-names = ("coulomb_friction", "quadratic_damping")
+names = ("coulomb_friction",)
 if __name__ == "__main__":
     folder, out, jobs = sys.argv[1:]
     run_diagnose(Path(folder), Path(out), effects=[effect_named(name) for name in names], n_jobs=int(jobs))
