@@ -6,6 +6,8 @@ Everything heavy is imported inside the commands, so that ``rigsight --help`` an
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +16,26 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
+_INTERRUPTED = (129, 130, 143)
+
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line as a process of its own."""
+    try:
+        command_line()
+    except SystemExit as end:
+        if end.code in _INTERRUPTED:
+            # All is cleared up and said. What an interruption left of LLVM in the middle of a compilation crashes where the
+            # interpreter takes it apart, and another Ctrl-C would complain there.
+            for stream in (sys.stdout, sys.stderr):
+                with contextlib.suppress(OSError, ValueError, AttributeError):
+                    stream.flush()
+            os._exit(end.code)
+        raise
+
+
+def command_line() -> None:
+    """Run the command line and leave with SystemExit."""
     try:
         from rigsight.cli import application
     except KeyboardInterrupt:

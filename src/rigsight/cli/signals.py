@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import signal
 import threading
@@ -55,15 +54,7 @@ def _end(number: int, frame: FrameType | None) -> None:
         later.daemon = True
         later.start()
         return
-    # One is enough: another would only interrupt the interpreter as it clears up.
-    atexit.register(_end_quietly)
     raise Ended(number)
-
-
-def _end_quietly() -> None:
-    for name in _ENDING:
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def _repeat(number: int) -> None:
