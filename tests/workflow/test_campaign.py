@@ -139,6 +139,7 @@ BROKEN: list[tuple[str, str, str, list[str]]] = [
         ["rig.constants.k_tau", "must be a number", "without quotes"],
     ),
     ("constant as truth value", "k_tau = 0.27", "k_tau = true", ["rig.constants.k_tau", "must be a number"]),
+    ("constant zero", "k_tau = 0.27", "k_tau = 0.0", ["rig.constants.k_tau"]),
     ("constant NaN", "k_tau = 0.27", "k_tau = nan", ["rig.constants.k_tau", "finite"]),
     ("constant out of range", "r_0 = 0.1", "r_0 = -0.1", ["rig.constants.r_0", "must lie in", "got -0.1"]),
     ("parameter unknown", "J_z = 0.56", "J_zz = 0.56", ["rig.parameters.J_zz", "Did you mean 'J_z'"]),
@@ -232,6 +233,24 @@ def test_broken_campaigns_are_told_with_key_and_mend(
         assert fragment in message
     assert len(message.splitlines()) == 1
     assert "pydantic" not in message
+
+
+@pytest.mark.parametrize(("stated", "n_notes"), [(0.25, 0), (1.0, 0), (3.9, 0), (250.0, 1), (1e-3, 1)])
+def test_an_amplitude_that_cannot_be_is_asked_about(
+    stated: float, n_notes: int, campaign: Callable[..., Path]
+) -> None:
+    notes = read_campaign(campaign(HEAD + RECORDS.replace("0.25", f"{stated}"))).notes
+    assert len(notes) == n_notes
+    assert all(f"amplitude = {stated:g}" in note for note in notes)
+
+
+def test_a_gain_of_zero_is_refused(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
+    write_csv("run.csv", header="t,u,x,y")
+    (tmp_path / "campaign.toml").write_text(
+        '[rig]\nmodel = "axis"\n[rig.constants]\ngain = 0\n[[records]]\nfile = "run.csv"\n', "utf-8"
+    )
+    with pytest.raises(InputError, match=r"rig.constants.gain: is 0"):
+        read_campaign(tmp_path)
 
 
 def test_sample_times_a_thousand_apart_are_asked_about(campaign: Callable[..., Path]) -> None:

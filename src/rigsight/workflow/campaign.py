@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, nearest, shown
 from rigsight.parameters import Parameter
@@ -15,6 +17,8 @@ from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign_file import CampaignTable, RecordTable, locate, read_campaign_table
 
+_SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
+"""How far the amplitude of an input may lie below and above half its range: one line of many, and a step counted from rest."""
 _RATES_APART = 100.0
 """Ratio of sample times from which they are asked about."""
 NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
@@ -117,7 +121,9 @@ def read_campaign(campaign: str | Path, own_effects: Iterable[Effect] = ()) -> C
         read_listed_record(path, given.rig, number, record, file)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
     )
-    notes = [_rates_apart(records)] if _rates_apart(records) else []
+    notes = [
+        note for note in (_rates_apart(records), *(_other_amplitude(r, given.rig) for r in records)) if note
+    ]
     if all(record.role != "validation" for record in records):
         notes.append(NO_VALIDATION.format(file=path.name))
     return Campaign(
@@ -141,6 +147,18 @@ def _rates_apart(records: Sequence[Record]) -> str:
         f"The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' has "
         f"{finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
         't = { name = "...", unit = "ms" } for it.'
+    )
+
+
+def _other_amplitude(record: Record, rig: Rig) -> str:
+    """Say that the stated amplitude cannot be that of the input; empty if it can, as a peak, an RMS or that of a line."""
+    half = 0.5 * float(np.ptp(record[rig.inputs[0].name]))
+    stated = record.amplitude
+    if stated is None or half == 0.0 or half / _SMALLEST_SHARE <= abs(stated) <= _LARGEST_SHARE * half:
+        return ""
+    return (
+        f"Record '{record.name}': amplitude = {stated:g}, but '{rig.inputs[0].name}' moves by {half:.3g} to each side. Is one of "
+        "them in another unit?"
     )
 
 
@@ -201,6 +219,9 @@ def _constants(where: str, rig: Rig, given: Mapping[str, float]) -> dict[str, fl
                 f"({constant.description} [{constant.unit}])."
             )
         checked[constant.name] = constant.default
+    gain = rig.motion.drive_gain
+    if checked.get(str(gain)) == 0.0:
+        raise InputError(f"{where}: rig.constants.{gain}: is 0, so that the input would drive nothing.")
     return {constant.name: checked[constant.name] for constant in rig.constants}
 
 
