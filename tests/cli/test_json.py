@@ -43,6 +43,7 @@ def test_simulation_tells_where_it_wrote(
         "schema_version": 1,
         "file": str(file),
         "n_samples": len(file.read_text(encoding="utf-8").splitlines()) - 1,
+        "notes": [],
     }
 
 

@@ -63,6 +63,8 @@ def test_a_broken_model_gets_one_helpful_message(
     ("arguments", "expected"),
     [
         (["--column", "u"], "SIGNAL=COLUMN"),
+        (["--unit", "t"], "SIGNAL=UNIT"),
+        (["--unit", "t=mm"], "does not measure the same as s"),
         (["--column", "x=pos"], "does not read it"),
         (["--column", "u=7"], "columns are 1 to 3"),
         (["--initial-state", "x"], "STATE=VALUE"),
@@ -115,3 +117,19 @@ def test_simulate_maps_columns_and_starts_elsewhere(
     x = np.loadtxt(out, delimiter=",", skiprows=1)[:, 2]
     assert x[0] == 0.01
     assert x.min() < -0.005
+
+
+def test_simulate_converts_units_and_asks_about_those_in_names(
+    write_model: Callable[..., Path], tmp_path: Path, run: Run
+) -> None:
+    record = tmp_path / "drive.csv"
+    record.write_text("t_ms,F_kN\n" + "\n".join(f"{10 * i},{0.001 * (i > 9)}" for i in range(60)))
+    out = tmp_path / "predicted.csv"
+    asked = ("simulate", write_model(), record, "-o", out, "--column", "t=t_ms", "--column", "u=F_kN")
+    code, stdout, _ = run(*asked)
+    assert code == 0
+    assert "Note: drive.csv, column 't_ms': taken in s as it stands" in stdout
+    code, stdout, _ = run(*asked, "--unit", "t=ms", "--unit", "u=kN")
+    assert (code, "Note" in stdout) == (0, False)
+    rows = np.loadtxt(out, delimiter=",", skiprows=1)
+    assert (rows[-1, 0], rows[-1, 1]) == (pytest.approx(0.59), 1.0)

@@ -46,6 +46,15 @@ def simulate(
             help="Where a signal stands: u=current or u=2. May be repeated.",
         ),
     ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unit",
+            metavar="SIGNAL=UNIT",
+            show_default="SI, or what the file states",
+            help="Unit of a signal's column: t=ms. May be repeated.",
+        ),
+    ] = None,
     initial_state: Annotated[
         str | None,
         typer.Option(
@@ -72,28 +81,37 @@ def simulate(
             model,
             record,
             file,
-            columns=_columns(column or []),
+            columns=_columns(column or [], unit or []),
             initial_state=_states(initial_state),
             own_effects=own_effects(effects or [], check=False),
         )
     if json:
-        show_as_json({"file": str(file), "n_samples": simulated.n_samples})
+        content = {"file": str(file), "n_samples": simulated.n_samples, "notes": list(simulated.notes)}
+        show_as_json(content)
     elif not quiet:
+        for note in simulated.notes:
+            typer.echo(f"Note: {note}")
         typer.echo(f"{simulated.n_samples} samples simulated: {file}")
 
 
-def _columns(given: list[str]) -> dict[str, ColumnMapping]:
+def _columns(columns: list[str], units: list[str]) -> dict[str, ColumnMapping]:
     from rigsight.records import ColumnMapping
 
-    columns = {}
-    for text in given:
-        signal, sign, name = text.partition("=")
-        if not (signal and sign and name):
-            raise InputError(
-                f"--column '{text}' cannot be read; write SIGNAL=COLUMN, for instance u=current."
-            )
-        columns[signal.strip()] = ColumnMapping(int(name) if name.isascii() and name.isdigit() else name)
-    return columns
+    names = dict(_pair("--column", text, "SIGNAL=COLUMN, for instance u=current") for text in columns)
+    unit_of = dict(_pair("--unit", text, "SIGNAL=UNIT, for instance t=ms") for text in units)
+    mapped = {}
+    for signal in dict.fromkeys((*names, *unit_of)):
+        name = names.get(signal, signal)
+        place = int(name) if name.isascii() and name.isdigit() else name
+        mapped[signal] = ColumnMapping(place, unit=unit_of.get(signal))
+    return mapped
+
+
+def _pair(option: str, text: str, form: str) -> tuple[str, str]:
+    signal, _, value = (part.strip() for part in text.partition("="))
+    if not (signal and value):
+        raise InputError(f"{option} '{text}' cannot be read; write {form}.")
+    return signal, value
 
 
 def _states(given: str | None) -> dict[str, float] | Literal["estimated"]:
