@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
+from rigsight.errors import InputError
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.running_gear import creep_factor
 from rigsight.workflow.campaign import read_campaign
@@ -54,6 +55,13 @@ def test_a_missing_cubic_spring_is_found_and_written_as_the_contract_says(
     assert found["value"] == pytest.approx(5e6, abs=4 * found["std"])
     assert "<html" in (out / "report.html").read_text("utf-8").lower()
     assert steps[-1].done == steps[-1].total
+
+
+def test_a_given_simulation_that_cannot_be_run_is_told_with_its_records(axis_campaign: Path) -> None:
+    file = axis_campaign / "campaign.toml"
+    file.write_text(file.read_text("utf-8").replace("m = 2.0", "m = 2e-9"), "utf-8")
+    with pytest.raises(InputError, match=r"motion in 'fit' \(sample time 0.005 s\).*Check the units"):
+        run_diagnose(axis_campaign, effects=FEW[:1], n_jobs=1)
 
 
 def test_the_written_model_alone_predicts_what_the_diagnosis_did(axis_campaign: Path, tmp_path: Path) -> None:

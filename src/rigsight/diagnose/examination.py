@@ -24,6 +24,7 @@ from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, characteristic_scales, linear_start
+from rigsight.simulate import Structure
 
 _SIGNIFICANT = 3.0
 """Standard errors from zero at which a constant force counts as needed."""
@@ -256,8 +257,19 @@ def _before(task: Task, bench: Workbench, linear: Scored) -> Scored:
     missing = [name for name in bench.free_parameters(structure) if name not in task.given]
     fit = bench.problem(structure, bench.estimation).fit(start, missing)
     if not fit.residuals:
-        raise InputError(f"The given simulation cannot be run: {fit.message}")
+        raise InputError(_why_not_run(bench, structure, start))
     return bench.score((), fit)
+
+
+def _why_not_run(bench: Workbench, structure: Structure, values: Mapping[str, float]) -> str:
+    """Name the records that the given simulation cannot follow, with what decides it."""
+    failing = [r for r in bench.estimation if not bench.problem(structure, [r]).fit(values, ()).residuals]
+    told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
+    where = f" in {told}" if told else ""
+    return (
+        f"The given simulation cannot be run: with the given parameters the motion{where} leaves the range of numbers, or is too "
+        "fast for the sample time. Check the units of time and input, and the given parameters."
+    )
 
 
 def _with_offset_rivals(
