@@ -141,10 +141,9 @@ def test_an_input_without_a_unit_of_its_own_is_taken_as_it_stands_and_told(tmp_p
     record = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS)
     np.testing.assert_array_equal(record["u"], rows()["u"])
     assert "in kN" in record.notes[0]
-    with pytest.raises(InputError, match="no unit of its own"):
-        read_record(
-            tmp_path / "run", (Named("u", "input"),), OUTPUTS, columns={"u": ColumnMapping("u", unit="N")}
-        )
+    columns = {"u": ColumnMapping("u", unit="kN")}
+    asked = read_record(tmp_path / "run", (Named("u", "input"),), OUTPUTS, columns=columns)
+    np.testing.assert_allclose(asked["u"], 1e3 * rows()["u"], rtol=1e-14)
 
 
 ODD = {"Zeit [ms]": "t", "Strom (A)": "u", "Signal/Winkel °": "psi", "Weg, quer µm": "y"}

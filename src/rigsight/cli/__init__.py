@@ -6,10 +6,12 @@ Everything heavy is imported inside the commands, so that ``rigsight --help`` an
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
+import signal
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from rigsight.cli.application import app as app
@@ -25,13 +27,22 @@ def main() -> None:
         command_line()
     except SystemExit as end:
         if end.code in _INTERRUPTED:
-            # All is cleared up and said. What an interruption left of LLVM in the middle of a compilation crashes where the
-            # interpreter takes it apart, and another Ctrl-C would complain there.
-            for stream in (sys.stdout, sys.stderr):
-                with contextlib.suppress(OSError, ValueError, AttributeError):
-                    stream.flush()
-            os._exit(end.code)
+            _end_at_once(end.code)
         raise
+
+
+def _end_at_once(code: int) -> NoReturn:
+    """End without taking the interpreter apart: what an interrupted compilation leaves of LLVM crashes there."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            # One is enough: another would only complain.
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    # What worker processes shared is given back.
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(code)
 
 
 def command_line() -> None:
