@@ -186,7 +186,9 @@ class _Run:
             begin = t
             event = None
             while solver.status == "running" and event is None:
-                message = solver.step()
+                # A motion that leaves the range of numbers is told below, once.
+                with np.errstate(over="ignore", invalid="ignore"):
+                    message = solver.step()
                 if message is not None or not np.all(np.isfinite(solver.y)):
                     raise SimulationError(f"The plant cannot be integrated past {solver.t:.4g} s: {message}")
                 path = solver.dense_output()
