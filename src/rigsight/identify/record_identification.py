@@ -35,7 +35,9 @@ MISFIT = 3.0
 _LONGEST_DELAY = 0.5 * math.pi
 """Phase by which a dead time may turn the largest magnitude [rad]."""
 _TURNED = -0.5
-"""Correlation of fitted and measured values below which the sign of one signal is turned; no phase lag of a rig does that."""
+"""Correlation of fitted and measured values below which the sign of one signal is turned."""
+_WELL_BELOW = 0.5
+"""Share of the break frequency up to which a response follows its source: there a late drive turns the phase little."""
 _SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 
 
@@ -226,9 +228,10 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
 
 def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float]:
     """Return the values of a fit, with a negative gain where the phases say that the response moves against the source."""
-    fitted = fit.at(response.omega)
-    agreement = float(np.vdot(fitted, response.values).real)
-    is_turned = agreement < _TURNED * float(np.linalg.norm(fitted) * np.linalg.norm(response.values))
+    slow = response.omega < _WELL_BELOW * fit.values["omega_b"]
+    fitted, measured = fit.at(response.omega[slow]), response.values[slow]
+    agreement = float(np.vdot(fitted, measured).real)
+    is_turned = agreement < _TURNED * float(np.linalg.norm(fitted) * np.linalg.norm(measured))
     return {**fit.values, "gain": -fit.values["gain"]} if is_turned else fit.values
 
 
