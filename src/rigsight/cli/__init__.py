@@ -33,10 +33,11 @@ def main() -> None:
 
 def _end_at_once(code: int) -> NoReturn:
     """End without taking the interpreter apart: what an interrupted compilation leaves of LLVM crashes there."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            # One is enough: another would only complain.
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    from rigsight.workflow.results import ENDING_SIGNALS
+
+    for number in ENDING_SIGNALS:
+        # One is enough: another would only complain.
+        signal.signal(number, signal.SIG_IGN)
     # What worker processes shared is given back.
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):

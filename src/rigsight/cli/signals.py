@@ -8,7 +8,8 @@ import threading
 from collections.abc import Iterator
 from types import FrameType
 
-_ENDING = ("SIGINT", "SIGTERM", "SIGHUP")
+from rigsight.workflow.results import ENDING_SIGNALS
+
 _AGAIN_AFTER = 0.05
 """Seconds after which a request is repeated that came where an exception would be dropped."""
 _DROPPING = ("__del__", "_raw_object_cache_notify", "_raw_object_cache_getbuffer")
@@ -29,10 +30,9 @@ def ended_by_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    numbers = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
     # Who runs the command line inside another program may have handlers of their own.
     usual = (signal.SIG_DFL, signal.default_int_handler)
-    before = {number: signal.getsignal(number) for number in numbers}
+    before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
     mine = {number: handler for number, handler in before.items() if handler in usual}
     for number in mine:
         signal.signal(number, _end)
