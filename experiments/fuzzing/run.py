@@ -17,15 +17,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from targets import TARGETS
+
 HERE = Path(__file__).parent
 OUT = HERE.parents[1] / "out/fuzzing"
 TABLE = HERE / "results.md"
-_NAMES = (
-    "CSV, TSV", "MATLAB 5", "MATLAB 7", "MATLAB 7.3", "HDF5", "MDF4", "TDMS", "Parquet", "UFF", "campaign.toml", "model.json",
-    "blind key", "effect file, text", "effect file, declaration",
-)  # fmt: skip
-IN_CHILD = ("MATLAB 7.3", "HDF5", "MDF4")
-"""Read by the program in a process of its own, here also through that."""
 _MOST_RESTARTS = 30
 _STATUS = re.compile(r"#\d+\s+\w+\s+cov: (\d+) ft: (\d+) corp: (\d+)/")
 
@@ -95,7 +91,7 @@ def _outcome(name: str, folder: Path, before: int, after: int) -> Outcome:
     kinds = list(counts["kinds"])
     apart = None
     crashes = [file for kind in ("crash", "timeout", "oom") for file in folder.glob(f"{kind}-*")]
-    if name in IN_CHILD:
+    if TARGETS[name].in_child:
         subprocess.run([sys.executable, str(HERE / "apart.py"), name, str(folder)], check=True)
         told = _counts(folder / "apart")
         apart, kinds = told["inputs"], kinds + told["kinds"]
@@ -145,11 +141,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--table", type=Path, default=None, help=f"default {TABLE}, where every target is fuzzed"
     )
     asked = parser.parse_args(arguments)
-    unknown = [name for name in asked.only if name not in _NAMES]
+    unknown = [name for name in asked.only if name not in TARGETS]
     if unknown:
-        raise SystemExit(f"Unknown: {', '.join(unknown)}. There are: {', '.join(_NAMES)}.")
+        raise SystemExit(f"Unknown: {', '.join(unknown)}. There are: {', '.join(TARGETS)}.")
     outcomes = []
-    for name in asked.only or _NAMES:
+    for name in asked.only or TARGETS:
         outcomes.append(fuzz(name, asked.seconds, asked.out))
         print(table(outcomes[-1:]).splitlines()[-1], flush=True)
     written = asked.table or (None if asked.only else TABLE)

@@ -104,7 +104,9 @@ def write_samples(format_name: str, folder: Path) -> list[Path]:
         module.write_uff(path, record, UNITS, binary=0)
         found.append(path)
     if format_name in ("MATLAB 5", "MATLAB 7"):
-        found.append(_matlab(folder, record, packed=format_name == "MATLAB 7"))
+        found += _matlab(folder, record, packed=format_name == "MATLAB 7")
+    if format_name == "MATLAB 7.3":
+        found.append(_matlab_groups(folder, record))
     if format_name == "HDF5":
         found += _hdf5(folder, record)
     return found
@@ -130,7 +132,7 @@ def _lines(table: np.ndarray, separator: str) -> str:
     return "".join(separator.join(f"{value:.6g}" for value in row) + "\n" for row in table)
 
 
-def _matlab(folder: Path, record: dict[str, np.ndarray], packed: bool) -> Path:
+def _matlab(folder: Path, record: dict[str, np.ndarray], packed: bool) -> list[Path]:
     from scipy.io import savemat
     from scipy.sparse import csc_array
 
@@ -139,8 +141,33 @@ def _matlab(folder: Path, record: dict[str, np.ndarray], packed: bool) -> Path:
         "wave": np.exp(1j * record["t"]), "is_on": record["t"] > 0.3, "sparse": csc_array(np.eye(4)),
         "deep": {"inner": {"u": record["u"]}, "u": record["u"]}, "table": np.column_stack(list(record.values())),
     }  # fmt: skip
+    signals = np.zeros(3, dtype=[("values", object), ("label", object), ("dimensions", object)])
+    for i, name in enumerate(("u", "psi", "y")):
+        signals[i] = (record[name][:, None], name, 1.0)
+    runs = np.array([[(record["t"], {"u": record["u"]})] * 2] * 2, dtype=[("t", object), ("drive", object)])
+    logged = {"logsout": {"time": record["t"][:, None], "signals": signals}, "runs": runs}
     savemat(folder / "others.mat", record | others, do_compression=packed)
-    return folder / "others.mat"
+    savemat(folder / "logged.mat", logged, do_compression=packed)
+    return [folder / "others.mat", folder / "logged.mat"]
+
+
+def _matlab_groups(folder: Path, record: dict[str, np.ndarray]) -> Path:
+    """Structs as MATLAB 7.3 keeps them: a struct is a group, an array of structs holds references."""
+    import h5py
+
+    path = folder / "groups.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, samples in record.items():
+            file.create_dataset(f"run/inner/{name}", data=samples[None, :]).attrs["MATLAB_class"] = np.bytes_(
+                "double"
+            )
+        file["run"].attrs["MATLAB_class"] = file["run/inner"].attrs["MATLAB_class"] = np.bytes_("struct")
+        cells = file.create_dataset("cells", (1, 2), dtype=h5py.ref_dtype)
+        cells[0, 0] = cells[0, 1] = file["run/inner/u"].ref
+        cells.attrs["MATLAB_class"] = np.bytes_("cell")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, HDF5 schema 1.00 .".ljust(124) + b"\x00\x02IM")
+    return path
 
 
 def _hdf5(folder: Path, record: dict[str, np.ndarray]) -> list[Path]:
