@@ -7,7 +7,8 @@ after a pass that compiles the kernels. Dask's scheduler and workers are started
 
 Efficiency is the rate of two workers over twice that of one; the rate is trials over the time from the first hand-over to the
 last result. With few trials the end, where one worker idles while the other finishes, weighs much: "without the end" counts the
-time of each worker only until its own last trial ends.
+time of each worker only until its own last trial ends. Of that, the bench answers for the share of this time in which workers are
+at a trial; that a trial takes longer beside another is this machine's, whose processors share memory and clock.
 
 The projection takes from measurements the time of a trial on a Dask worker, what client and scheduler spend on one that does
 nothing, and what its row in the store takes. It assumes that workers are as fast as this machine's with both of its workers busy,
@@ -103,6 +104,11 @@ class Pass:
         for one in self.ran:
             last[one.worker] = max(last[one.worker], one.end)
         return sum(end - self.start for end in last.values())
+
+    @property
+    def at_trials(self) -> float:
+        """Time of all workers at a trial [s]."""
+        return sum(one.end - one.begin for one in self.ran)
 
 
 @contextmanager
@@ -254,6 +260,11 @@ def main() -> None:
             print(
                 f"  {way:7} efficiency of two workers {one.wall / (2.0 * two.wall):.3f}, without the end "
                 f"{one.until_idle / two.until_idle:.3f}"
+            )
+            slower = two.at_trials / one.at_trials
+            print(
+                f"          at a trial {two.at_trials / two.until_idle:.1%} of this time (alone "
+                f"{one.at_trials / one.until_idle:.1%}), which takes {slower:.3f} times as long beside another"
             )
         empty, start = time_of_an_empty_trial(), time_of_a_start()
         print(

@@ -117,9 +117,8 @@ def _expression(tree: Any, depth: int) -> Any:
 
 def _applied(sign: Any, parts: list[Any]) -> Any:
     if sign in ("*", "+"):
-        return (sp.Mul if sign == "*" else sp.Add)(
-            *map(sp.sympify, parts, [None] * len(parts), [True] * len(parts))
-        )
+        # Strict: a text would be run.
+        return (sp.Mul if sign == "*" else sp.Add)(*(sp.sympify(part, strict=True) for part in parts))
     if sign in ("-", "/", "**") and len(parts) == 2:
         first, second = parts
         return first - second if sign == "-" else first / second if sign == "/" else first**second

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import resource
 import sys
 from pathlib import Path
 
@@ -22,12 +21,12 @@ _INSTRUMENTED = [
     ),
 ]  # fmt: skip
 _LIBRARIES = {"TDMS": ["nptdms"], "UFF": ["pyuff"], "campaign.toml": ["tomllib"]}
-LARGEST_MEMORY = 8_000_000_000
-"""As the process that reads apart has it."""
 
 with atheris.instrument_imports(include=[*_INSTRUMENTED, *_LIBRARIES.get(sys.argv[1], [])]):
     import oracle
     import targets
+
+    from rigsight.records import isolated_reader, reader_process
 
     for _reader in ("hdf5", "matlab", "matlab_hdf5", "mdf", "parquet", "tdms", "uff"):
         __import__(f"rigsight.records.read_{_reader}")
@@ -46,7 +45,9 @@ def main(name: str, folder: Path, options: list[str]) -> None:
     judge = oracle.Oracle.resumed(folder)
     if target.in_child:
         targets.read_in_this_process()
-    resource.setrlimit(resource.RLIMIT_DATA, (LARGEST_MEMORY, LARGEST_MEMORY))
+        # As the process that reads apart does.
+        judge.most_growth = isolated_reader.LEAST_MEMORY
+        reader_process.limit_memory(judge.most_growth)
 
     def try_it(data: bytes) -> None:
         judge.judge(data, target.try_it)

@@ -18,8 +18,8 @@ LONGEST = 5.0
 """For one input [s of processor time]: other work on the machine is no breach. libFuzzer ends what waits."""
 _WARM = 20
 """Inputs of a process, over which libraries are loaded."""
-MOST_GROWTH = 500_000
-"""Of the process over one input [kB]."""
+MOST_GROWTH = 500_000_000
+"""Of the process over one input [bytes]."""
 LONGEST_MESSAGE = 6000
 """In characters; a message is read by somebody."""
 
@@ -38,6 +38,8 @@ class Oracle:
         Kinds of breaches met.
     longest
         For one input [s].
+    most_growth
+        Of the process over one input [bytes].
     n_here
         Inputs tried in this process.
     """
@@ -47,6 +49,7 @@ class Oracle:
     n_accepted: int = 0
     kinds: set[str] = field(default_factory=set)
     longest: float = LONGEST
+    most_growth: int = MOST_GROWTH
     n_here: int = 0
 
     @classmethod
@@ -87,8 +90,8 @@ class Oracle:
             return
         if seconds > self.longest:
             self.found(data, "slow", f"{seconds:.1f} s")
-        if growth > MOST_GROWTH:
-            self.found(data, "memory", f"{growth / 1000:.0f} MB")
+        if growth > self.most_growth:
+            self.found(data, "memory", f"{growth / 1e6:.0f} MB")
         self.save()
 
     def _judge_message(self, data: bytes, message: str) -> None:
@@ -122,4 +125,4 @@ class Oracle:
 
 
 def _peak() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -169,7 +169,7 @@ def _declaration(data: bytes) -> object:
     """Check an effect that a file might declare."""
     try:
         effect = effect_of(json.loads(data))
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError, IndexError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError, IndexError, ArithmeticError):
         # No effect could be made: what a file raises while it runs is told with its line.
         raise InputError("no declaration") from None
     own_effects._loaded = lambda _: [own_effects.OwnEffect(effect, "mine.py, line 3")]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ..records.formats import FORMATS, Write, write_matlab, write_text
+from ..records.formats import FORMATS, Write, write_matlab, write_tdms, write_text
 
 Run = Callable[..., tuple[int, str, str]]
 T = 0.01 * np.arange(300)
@@ -48,6 +48,14 @@ def test_text_is_inspected_with_its_gaps(tmp_path: Path, run: Run) -> None:
         assert part in stdout
     told = json.loads(run("inspect", path, "--json")[1])
     assert [one["n_not_finite"] for one in told["channels"]] == [0, 0, 1]
+
+
+def test_times_that_are_no_numbers_are_left_out(tmp_path: Path, run: Run) -> None:
+    write_tdms(tmp_path / "run.tdms", {**ROWS, "t": np.where(T == 0.0, np.nan, T)}, {})
+    code, stdout, _ = run("inspect", tmp_path / "run.tdms", "--json")
+    assert code == 0
+    (u, _) = json.loads(stdout)["channels"]
+    assert (u["dt"], u["t0"], u["t1"], u["n_gaps"]) == (None, None, None, None)
 
 
 def test_what_is_no_signal_is_told(tmp_path: Path, run: Run) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import struct
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -188,3 +190,29 @@ def test_signs_that_no_list_can_hold_leave_names_and_the_proposal_is_toml(tmp_pa
     found = run_inspect(tmp_path / "run.csv")
     assert "\ufffd" in found.channels[1].name
     assert "records" in tomllib.loads(found.proposal)
+
+
+def test_a_process_that_reads_takes_no_more_memory_than_it_may() -> None:
+    code = (
+        "import numpy as np\n"
+        "from rigsight.records.reader_process import limit_memory\n"
+        "limit_memory(10_000_000)\n"
+        "held = np.ones(500_000)\n"
+        "try:\n"
+        "    np.ones(2_000_000)\n"
+        "except MemoryError:\n"
+        "    print('refused')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == ("refused\n" if sys.platform == "linux" else "")
+
+
+def test_the_memory_that_a_file_may_take_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_matlab_packed(tmp_path / "run.mat", ROWS, {})
+    monkeypatch.setattr(
+        "rigsight.records.isolated_reader.json.loads", lambda _: {"error": "MemoryError", "reason": ""}
+    )
+    with pytest.raises(
+        InputError, match=r"run.mat needs more memory than the 1 GB that a file of its size may take"
+    ):
+        read(tmp_path / "run.mat")

@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import shutil
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +42,8 @@ TELLS_ALL = """
 import json, os, sys
 os.makedirs("results")
 files = [os.path.join(folder, file) for folder, _, names in os.walk(".") for file in names]
-seen = {"environment": dict(os.environ), "arguments": sys.argv, "folder": os.getcwd(), "files": sorted(files)}
+seen = {"environment": dict(os.environ), "arguments": sys.argv, "folder": os.getcwd(), "files": sorted(files),
+        "oldest": min(map(os.path.getmtime, files))}
 json.dump(seen, open("results/seen.json", "w"))
 """
 
@@ -73,6 +75,8 @@ def shortened(folder: BenchFolder, n_samples: int = 1500) -> None:
 
 
 def test_a_process_that_diagnoses_is_told_nothing_but_the_campaign(bench: BenchFolder) -> None:
+    drawn = time.time() - 3600.0
+    os.utime(bench.campaign(NAME) / "record_1.csv", (drawn, drawn))
     diagnose_trial(bench, NAME, start=("-c", TELLS_ALL))
     seen = read_json(bench.result(NAME) / "seen.json")
     text = json.dumps(seen)
@@ -82,6 +86,7 @@ def test_a_process_that_diagnoses_is_told_nothing_but_the_campaign(bench: BenchF
         "campaign.toml",
         *(f"record_{i}.csv" for i in range(1, 7)),
     ]
+    assert seen["oldest"] > drawn + 1800.0, "times of files tell how long the trial took to draw"
 
 
 @pytest.mark.slow
@@ -274,7 +279,7 @@ def test_a_disk_without_room_for_results_says_so(bench: BenchFolder, monkeypatch
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("rigsight.workflow.blind_trial.shutil.copy2", full)
+    monkeypatch.setattr("rigsight.workflow.blind_trial.shutil.copy", full)
     with pytest.raises(OSError, match="No space left") as raised:
         diagnose_trial(bench, NAME, start=("-c", ""))
     assert raised.value.errno == errno.ENOSPC

@@ -175,9 +175,10 @@ def _told(path: Path, name: str) -> Iterator[None]:
             f"{path.name} is a {name} file; reading it needs the package {error.name or 'that reads it'}: "
             'pip install "rigsight[formats]".'
         ) from None
-    except MemoryError:
+    except MemoryError as error:
         raise InputError(
-            f"{path.name} needs more memory than there is, or is damaged. Split it into several records."
+            f"{path.name} needs more memory than {error.args[0] if error.args else 'there is'}, or is damaged. "
+            "Split it into several records."
         ) from None
     except Exception as error:
         told = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"

@@ -24,7 +24,7 @@ class ChannelSummary:
     n_samples
         Number of samples.
     dt, t0, t1
-        Median step, first and last stamp of its own time axis, in that axis' unit; None where it has none.
+        Median step, first and last stamp of its own time axis, in that axis' unit; None where it has none, or no finite one.
     minimum, maximum
         Of the finite samples; None without any.
     n_not_finite
@@ -63,7 +63,7 @@ def summarize(channel: Channel) -> ChannelSummary:
     if channel.axis is not None:
         stamps = channel.axis.stamps()
         dt, n_gaps = step_and_gaps(stamps)
-        t0, t1 = float(stamps[0]), float(stamps[-1])
+        t0, t1 = (float(stamp) if np.isfinite(stamp) else None for stamp in (stamps[0], stamps[-1]))
     return ChannelSummary(
         channel.name,
         channel.unit,
@@ -82,7 +82,7 @@ def summarize(channel: Channel) -> ChannelSummary:
 def step_and_gaps(stamps: NDArray[np.float64]) -> tuple[float | None, int | None]:
     """Return the median step of time stamps, shape (n_samples,), and how often they jump; None where they do not rise."""
     steps = np.diff(stamps)
-    if steps.size == 0 or not np.all(steps > 0.0):
+    if steps.size == 0 or not np.all((steps > 0.0) & (steps < np.inf)):
         return None, None
     dt = float(np.median(steps))
     return dt, int(np.count_nonzero(steps > _GAP * dt))

@@ -20,8 +20,15 @@ from rigsight.records.channel import Channel, ChannelFile, Load, Refused, TimeAx
 
 PACKAGES = {"mdf": "asammdf", "hdf5": "h5py", "matlab_hdf5": "h5py", "matlab": "scipy", "parquet": "pyarrow"}
 """Format -> package whose C code is kept apart."""
-LONGEST_WAIT = 120.0
-"""For one answer [s]; a damaged file can lead a library in circles."""
+LEAST_MEMORY, MEMORY_PER_BYTE, LARGEST_MEMORY = 1_000_000_000, 100, 8_000_000_000
+"""What reading may take beside the libraries [bytes]: so much, and so much for every byte of the file, since files are packed."""
+LEAST_WAIT, WAIT_PER_BYTE, LONGEST_WAIT = 30.0, 1e-6, 120.0
+"""For one answer [s]: so long, and so much more for every byte of the file; a damaged file can lead a library in circles."""
+
+
+def most_memory(path: Path) -> int:
+    """Return how many bytes reading a file may take beside the libraries that read it."""
+    return min(LEAST_MEMORY + MEMORY_PER_BYTE * path.stat().st_size, LARGEST_MEMORY)
 
 
 class ReadingError(Exception):
@@ -50,6 +57,8 @@ class _Process:
     """The process that reads, as long as the file is open."""
 
     def __init__(self, kind: str, path: Path) -> None:
+        self._most_memory = most_memory(path)
+        self._longest_wait = min(LEAST_WAIT + WAIT_PER_BYTE * path.stat().st_size, LONGEST_WAIT)
         # -P: the folder a user stands in must not lend its modules.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "rigsight.records.reader_process", kind, str(path.resolve())],
@@ -84,7 +93,7 @@ class _Process:
     def answer(self) -> tuple[dict[str, Any], NDArray[Any]]:
         """Return what the process says, and the samples that come with it."""
         assert self._process.stdout is not None
-        watch = threading.Timer(LONGEST_WAIT, self._process.kill)
+        watch = threading.Timer(self._longest_wait, self._process.kill)
         watch.daemon = True
         watch.start()
         try:
@@ -93,7 +102,7 @@ class _Process:
                 raise ReadingError("it makes the library that reads it crash, or run in circles")
             answer: dict[str, Any] = json.loads(line)
             if answer.get("error") == "MemoryError":
-                raise MemoryError
+                raise MemoryError(f"the {self._most_memory / 1e9:.2g} GB that a file of its size may take")
             if answer.get("error") == "InputError":
                 raise InputError(answer["reason"])
             if "error" in answer:

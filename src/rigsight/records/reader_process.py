@@ -21,8 +21,8 @@ from typing import IO, Any
 import numpy as np
 
 from rigsight.records.channel import ChannelFile, TimeAxis
+from rigsight.records.isolated_reader import PACKAGES, most_memory
 
-LARGEST_MEMORY = 8_000_000_000
 LONGEST_WORK = 600
 """Processor time [s]."""
 
@@ -37,11 +37,13 @@ def main(kind: str, path: Path) -> None:
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
-        resource.setrlimit(resource.RLIMIT_DATA, (LARGEST_MEMORY, LARGEST_MEMORY))
         # Who asked ends what runs in circles; if it was killed, nobody does.
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
     reader = getattr(import_module(f"rigsight.records.read_{kind}"), f"open_{kind}")
     try:
+        # Before the limit: what libraries set aside for their threads is no matter of the file.
+        import_module(PACKAGES[kind])
+        limit_memory(most_memory(path))
         with contextlib.contextmanager(reader)(path) as file:
             axes = list(dict.fromkeys(one.axis for one in file.channels if one.axis is not None))
             _answer(answers, _contents(file, axes))
@@ -56,6 +58,16 @@ def main(kind: str, path: Path) -> None:
     # Clearing up after a failure may fail as well.
     answers.flush()
     os._exit(0)
+
+
+def limit_memory(more: int) -> None:
+    """Let this process take so many bytes from now on and no more, where the system can be told so."""
+    with contextlib.suppress(ImportError, ValueError, OSError, IndexError):
+        import resource
+
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
+        limit = pages * resource.getpagesize() + more
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> None:

@@ -132,10 +132,13 @@ def _keep(found: Path, target: Path, about: dict[str, Any]) -> None:
 
 
 def _copy(folder: Path, target: Path) -> None:
-    """Copy a folder; unlike shutil.copytree, end with the first file that the disk does not take, and with its error."""
+    """Copy a folder; unlike shutil.copytree, end with the first file that the disk does not take, and with its error.
+
+    Times of files stay behind: those of a campaign tell how long its parts were simulated.
+    """
     target.mkdir()
     for path in sorted(folder.iterdir()):
         if path.is_dir():
             _copy(path, target / path.name)
         else:
-            shutil.copy2(path, target / path.name)
+            shutil.copy(path, target / path.name)
