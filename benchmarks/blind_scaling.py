@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import itertools
 import json
 import os
 import resource
@@ -28,7 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -145,18 +146,24 @@ def passed(run_one: Callable[[int], Ran], trials: range, n_jobs: int, address: s
     return Pass(start, time.time(), ran)
 
 
-def measured(trials: range, prepare: Callable[[], Callable[[int], Ran]]) -> dict[tuple[str, int], Pass]:
-    """Run all trials each way; `prepare` returns what runs one of them, from the begin."""
-    found = {}
-    for workers in (1, 2):
-        # Processes that are up are part of neither way: joblib's are started by a first, empty pass.
-        list(finished(_which_worker, range(2 * workers), workers))
-        found["joblib", workers] = passed(prepare(), trials, workers, None)
-        told("joblib", workers, found["joblib", workers])
-    for workers in (1, 2):
-        with cluster(workers) as address:
-            found["dask", workers] = passed(prepare(), trials, workers, address)
-            told("dask", workers, found["dask", workers])
+def measured(
+    trials: range, prepare: Callable[[], Callable[[int], Ran]], ways: Sequence[str], rounds: int
+) -> dict[tuple[str, int], list[Pass]]:
+    """Run all trials each way; `prepare` returns what runs one of them, from the begin.
+
+    The speed of a machine drifts: one and two workers take turns, in every other round two before one.
+    """
+    found: dict[tuple[str, int], list[Pass]] = {(way, workers): [] for way in ways for workers in (1, 2)}
+    for way, again in itertools.product(ways, range(rounds)):
+        for workers in (1, 2) if again % 2 == 0 else (2, 1):
+            if way == "joblib":
+                # Processes that are up are part of neither way: joblib's are started by a first, empty pass.
+                list(finished(_which_worker, range(2 * workers), workers))
+                found[way, workers].append(passed(prepare(), trials, workers, None))
+            else:
+                with cluster(workers) as address:
+                    found[way, workers].append(passed(prepare(), trials, workers, address))
+            told(way, workers, found[way, workers][-1])
     return found
 
 
@@ -232,6 +239,13 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1, help="seed of the small design")
     parser.add_argument(
+        "--rounds", type=int, default=1, help="times that each way is gone; an even number cancels drift"
+    )
+    parser.add_argument("--ways", nargs="+", choices=("joblib", "dask"), default=("joblib", "dask"))
+    parser.add_argument(
+        "--compiled", action="store_true", help="leave out the pass that compiles the kernels of these trials"
+    )
+    parser.add_argument(
         "--stand-in",
         type=float,
         metavar="SECONDS",
@@ -251,27 +265,27 @@ def main() -> None:
 
         trials = range(options.trials)
         print(f"{options.trials} trials, {os.cpu_count()} processors", flush=True)
-        if options.stand_in is None:
+        if options.stand_in is None and not options.compiled:
             warm = passed(prepare(), trials, os.cpu_count() or 1, None)
             print(f"  kernels compiled in a first pass of {warm.wall:.0f} s", flush=True)
-        found = measured(trials, prepare)
-        for way in ("joblib", "dask"):
+        found = measured(trials, prepare, options.ways, options.rounds)
+        for way in options.ways:
             one, two = found[way, 1], found[way, 2]
-            print(
-                f"  {way:7} efficiency of two workers {one.wall / (2.0 * two.wall):.3f}, without the end "
-                f"{one.until_idle / two.until_idle:.3f}"
+            wall, until_idle, at_trials = (
+                [sum(getattr(each, time) for each in passes) for passes in (one, two)]
+                for time in ("wall", "until_idle", "at_trials")
             )
-            slower = two.at_trials / one.at_trials
             print(
-                f"          at a trial {two.at_trials / two.until_idle:.1%} of this time (alone "
-                f"{one.at_trials / one.until_idle:.1%}), which takes {slower:.3f} times as long beside another"
+                f"  {way:7} efficiency of two workers {wall[0] / (2.0 * wall[1]):.3f}, without the end "
+                f"{until_idle[0] / until_idle[1]:.3f}: at a trial {at_trials[1] / until_idle[1]:.1%} of this time (alone "
+                f"{at_trials[0] / until_idle[0]:.1%}), which takes {at_trials[1] / at_trials[0]:.3f} times as long beside another"
             )
         empty, start = time_of_an_empty_trial(), time_of_a_start()
         print(
             f"  a trial that does nothing takes client and scheduler {1e3 * empty:.2f} ms ({N_EMPTY} of them)"
         )
         print(f"  a process that diagnoses has started in {start:.2f} s (part of every trial)")
-        ran, row, traffic = found["dask", 2].ran, 0.0, 0.0
+        ran, row, traffic = found[options.ways[-1], 2][-1].ran, 0.0, 0.0
         if ran[0].outcome is not None:
             row = time_of_a_row(ran[0].outcome, place)
             traffic = megabytes(place / "bench-0") / len(ran)
