@@ -40,6 +40,21 @@ def test_a_change_that_turns_back_is_no_fall() -> None:
     assert "k moves between 80 and 160 N/m" in statement
 
 
+def test_an_inertia_that_changes_points_to_units_and_not_to_an_effect_alone() -> None:
+    def weighed(amplitude: float, scale: float) -> RecordIdentification:
+        one = found(amplitude, 80.0 * scale, 2.0 * scale)
+        values = {"m": 40.0 * scale, "d": 2.0 * scale}
+        physical = PhysicalEstimates(("m", "d"), values, np.diag([0.1, 0.01]), "by hand")
+        return replace(one, paths=(PathIdentification("u", "x", physical=physical),))
+
+    units = {"m": "kg", "d": "N s/m"}
+    statement, _ = amplitude_dependence([weighed(1.0, 1.0), weighed(2.0, 1.0), weighed(3.0, 0.1)], units, "N")
+    assert "m differs by a factor of 10" in statement
+    assert "check units and scales of input and output, first of record sweep_3.0" in statement
+    alike, _ = amplitude_dependence([weighed(1.0, 1.0), weighed(2.0, 1.2)], units, "N")
+    assert "factor" not in alike
+
+
 def test_scatter_inside_the_intervals_is_no_change() -> None:
     statement, changing = amplitude_dependence([found(1.0, 80.0, 2.0), found(2.0, 81.0, 1.98)], UNITS, "A")
     assert changing == ()

@@ -52,6 +52,11 @@ def init(
         return
     count = len(draft.records)
     typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
+    if model is None:
+        others = ", ".join(name for name in ("running_gear", "axis", "element") if name != draft.model)
+        typer.echo(
+            f"The rig is a guess from the channels; remove the file and say --model for another ({others})."
+        )
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")
     if draft.n_blanks:

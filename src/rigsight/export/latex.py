@@ -6,7 +6,7 @@ import re
 
 import sympy as sp
 
-from rigsight.export.description import hold_text, made_by
+from rigsight.export.description import made_by
 from rigsight.export.equations import Exported, Quantity
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
@@ -36,7 +36,7 @@ def latex(exported: Exported, source: str) -> str:
     table = [re.sub(r"^  (.*?) & (.*?) & (.*?) &", r"  $\1$ & $\2$ & $\3$ &", row) for row in table]
     lines = [
         f"% {exported.title}. {made_by(source)}.",
-        f"% For a document that loads amsmath. In a simulation {hold_text(exported)}.",
+        "% For a document that loads amsmath.",
         r"\begin{align*}",
         " \\\\\n".join(f"  {equation}" for equation in writer.equations()),
         r"\end{align*}",

@@ -12,6 +12,9 @@ from rigsight.identify.identification import RecordIdentification
 _CHANCE = 1e-3
 """Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
 _SAME_AMPLITUDE = 0.01
+_SAME_INERTIA = 2.0
+"""Ratio of inertias that a nonlinear effect, seen by a linear form, does not make of one; an assumption."""
+_INERTIAS = ("kg", "kg m^2")
 _MOVED = 1.15
 """Ratio of resonance frequencies that no scatter of a peak explains."""
 
@@ -65,8 +68,31 @@ def amplitude_dependence(
         return text + _moving_resonance(compared), ()
     return (
         f"With amplitudes {span}, {'; '.join(text.strip() for text in told)}: beyond their intervals, the sign of a nonlinear "
-        "effect. 'rigsight diagnose' looks for it."
+        "effect. 'rigsight diagnose' looks for it." + _no_single_inertia(compared, units, changing)
     ), tuple(changing)
+
+
+def _no_single_inertia(
+    compared: Sequence[tuple[float, Sequence[RecordIdentification]]],
+    units: Mapping[str, str],
+    changing: Sequence[str],
+) -> str:
+    """Say that records disagree about an inertia as only units and scales make them; amplitudes leave it alone."""
+    records = [record for _, group in compared for record in group]
+    for name in changing:
+        if units.get(name) not in _INERTIAS:
+            continue
+        values = np.array([record.estimates[name][0] for record in records])
+        if np.min(values) <= 0.0 or np.max(values) < _SAME_INERTIA * np.min(values):
+            continue
+        off = records[int(np.argmax(np.abs(np.log(values / np.median(values)))))]
+        first = f", first of record {off.record.name}" if len(records) > 2 else ""
+        ratio = np.max(values) / np.min(values)
+        return (
+            f" But {name} differs by a factor of {ratio:.3g}, and no amplitude changes an inertia so much: "
+            f"check units and scales of input and output{first}."
+        )
+    return ""
 
 
 def _moving_resonance(compared: Sequence[tuple[float, Sequence[RecordIdentification]]]) -> str:

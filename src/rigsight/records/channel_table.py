@@ -110,7 +110,7 @@ def _find(
     )
     raise InputError(
         f"{path.name} has no channel '{mapping.name}' for signal '{signal}'.{hint} Its channels: {_listed(file)}. "
-        f'Map it under columns: {signal} = "...". rigsight inspect tells more.'
+        f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). rigsight inspect tells more.'
     )
 
 

@@ -105,6 +105,12 @@ def in_drive_unit(unit: str) -> tuple[float, str] | None:
     return None
 
 
+def _drive_of(unit: str | None) -> str | None:
+    """Return the SI unit of a drive that this unit is another size of, None where it is none."""
+    found = None if unit is None else in_drive_unit(unit)
+    return None if found is None else found[1]
+
+
 def is_a(unit: str, si: str) -> bool:
     """Return True if a unit as a file states it measures the same as `si`."""
     try:
@@ -141,11 +147,13 @@ def si_mapping(
         return mapping, ()
     if unit is None:
         named = split_unit(label)[1]
-        if named is None or not has_si(si) or named == si or not is_a(named, si):
+        taken = si if has_si(si) else _drive_of(named)
+        if named is None or taken is None or named == taken or not is_a(named, taken):
             return mapping, ()
         return mapping, (
-            f"{where}: taken in {si} as it stands, though its name ends with {named}. If it is in {named}, write "
-            f'{signal} = {{ name = "{label}", unit = "{named}" }}; if not, scale = 1.0.',
+            f"{where}: taken in {taken} as it stands, though its name ends with {named}. If it is in {named}, write "
+            f'{signal} = {{ name = "{label}", unit = "{named}" }} (on a command line --unit {signal}={named}); if not, '
+            "scale = 1.0.",
         )
     if not has_si(si):
         if mapping.unit is not None:

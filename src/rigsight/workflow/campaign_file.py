@@ -90,7 +90,11 @@ def locate(campaign: Path) -> Path:
     if path.is_file():
         return path
     others = ", ".join(sorted(other.name for other in campaign.glob("*.toml"))[:10])
-    mend = f"Name one of its files: {others}." if others else "Write one beside the records."
+    mend = (
+        f"Name one of its files: {others}."
+        if others
+        else f"Write one beside the records; rigsight init {campaign} proposes it."
+    )
     raise InputError(f"Folder {campaign} holds no campaign.toml. {mend}")
 
 
