@@ -30,7 +30,11 @@ def test_ten_lines_say_verdict_gap_ranking_and_parameters(diagnosis: Diagnosis) 
         in text
     )
     assert "beta = 1203 +/- 31 1/rad" in text
-    assert "k_c" not in text, "the rig's own numbers are for the report"
+    (own,) = (i for i, line in enumerate(lines) if line.startswith("  parameters"))
+    (rig,) = (i for i, line in enumerate(lines) if line.startswith("  of the rig"))
+    assert own < rig
+    assert "k_c" in "".join(lines[rig:])
+    assert "k_c" not in "".join(lines[own:rig])
     assert "gamma = not determined by these records" in text
 
 

@@ -79,7 +79,7 @@ def summary(diagnosis: Diagnosis) -> Summary:
 
 
 def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Yield subject and words: the gap of each output, the best candidates, the numbers of the effect."""
+    """Yield subject and words: the gap of each output, the best candidates, the numbers of the effect and of the rig."""
     for output, gap in diagnosis.gap.items():
         yield (
             f"gap in {output}",
@@ -89,16 +89,15 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "candidates", "; ".join(map(_candidate, diagnosis.candidates[:_RANKED]))
     named = named_candidate(diagnosis)
     if named is not None and named.parameters:
-        # The effect's own numbers are the news; the report and the results hold all of them.
         own = diagnosis.model.get("effect_parameters", {}) if diagnosis.effects else named.parameters
-        yield (
-            "parameters",
-            "; ".join(
+        for subject, is_told in (("parameters", True), ("of the rig", False)):
+            numbers = [
                 f"{name} = {estimate_text(estimate)}"
                 for name, estimate in named.parameters.items()
-                if name in own
-            ),
-        )
+                if (name in own) == is_told
+            ]
+            if numbers:
+                yield subject, "; ".join(numbers)
 
 
 def _candidate(candidate: Candidate) -> str:
