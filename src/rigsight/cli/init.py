@@ -34,6 +34,7 @@ def init(
     Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten.
     """
     with told(debug):
+        from rigsight.rigs import RIGS
         from rigsight.workflow.init import run_init
 
         draft = run_init(folder, model=model)
@@ -53,7 +54,7 @@ def init(
     count = len(draft.records)
     typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
     if model is None:
-        others = ", ".join(name for name in ("running_gear", "axis", "element") if name != draft.model)
+        others = ", ".join(name for name in RIGS if name != draft.model)
         typer.echo(
             f"The rig is a guess from the channels; remove the file and say --model for another ({others})."
         )
