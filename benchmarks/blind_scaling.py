@@ -44,7 +44,7 @@ from rigsight.workflow.blind_trial import diagnose_trial, make_trial
 N_EMPTY = 2000
 N_ROWS = 200
 N_STARTS = 5
-START = "import numba, sympy, rigsight.workflow.diagnose"
+START = "import sympy, rigsight.workflow.diagnose"
 """What a process that diagnoses loads before it works."""
 WORKERS = 1000
 BENCHES = (10_000, 100_000)

@@ -72,9 +72,7 @@ def campaign(effect: str, length: float) -> Task:
 def diagnosed(task: Task, n_jobs: int) -> tuple[float, tuple[str, ...]]:
     start = time.perf_counter()
     with threadpool_limits(limits=1, user_api="blas"):
-        found = diagnose(
-            task, n_jobs=n_jobs, prepare=lambda s: prepare_kernels(s, n_jobs, lambda _: None, for_looks=True)
-        )
+        found = diagnose(task, n_jobs=n_jobs, prepare=lambda s: prepare_kernels(s, n_jobs, lambda _: None))
     return time.perf_counter() - start, found.effects
 
 

@@ -13,7 +13,7 @@ import pytest
 
 import rigsight as rs
 
-HEAVY = {"matplotlib", "numba", "numpy", "pandas", "pydantic", "rich", "scipy", "sklearn", "sympy", "typer"}
+HEAVY = {"matplotlib", "numpy", "pandas", "pydantic", "rich", "scipy", "sklearn", "sympy", "typer"}
 
 
 def declared_for_type_checkers() -> dict[str, str]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import pytest
-from numba import njit
 
 from rigsight.effects import effect_named
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS, ELEMENT
 from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate, simulate_sets
+from rigsight.simulate.compiler import c_compilers, library, library_suffix
 
 DT = 5e-3
 STEPS = 400
@@ -22,26 +24,45 @@ CASES = {
 """Effect -> its values, share of the stiffness on the displacement itself, shares on the stopped states, their limits."""
 
 
-@njit
-def stopped_truth(u, stiffness, damping, direct, shares, limits):
+STOPPED_TRUTH = """
+#include <math.h>
+#define ELEMENTS 6
+__attribute__((visibility("default")))
+void truth(const double *u, long n, double dt, long steps, double stiffness, double damping, double direct, long elements,
+           const double *shares, const double *limits, double *out) {
+    double h = dt / steps, x = 0.0, v = 0.0, z[ELEMENTS] = {0.0}, spring;
+    for (long i = 0; i + 1 < n; i++) {
+        for (long j = 0; j < steps; j++) {
+            double force = u[i] + (u[i + 1] - u[i]) * (j + 0.5) / steps;
+            x += 0.5 * h * v;
+            spring = direct * x;
+            for (long e = 0; e < elements; e++) {
+                z[e] = fmin(fmax(z[e] + 0.5 * h * v, -limits[e]), limits[e]);
+                spring += shares[e] * z[e];
+            }
+            v = (v * (1.0 - 0.5 * h * damping) + h * (force - stiffness * spring)) / (1.0 + 0.5 * h * damping);
+            x += 0.5 * h * v;
+            for (long e = 0; e < elements; e++) z[e] = fmin(fmax(z[e] + 0.5 * h * v, -limits[e]), limits[e]);
+        }
+        out[i + 1] = x;
+    }
+}
+"""
+
+
+def stopped_truth(program, u, stiffness, damping, direct, shares, limits):
     """Leapfrog over a linearly interpolated force; each stop operator is exact for steps without reversal."""
-    h = DT / STEPS
-    x, v = 0.0, 0.0
-    z = np.zeros(limits.size)
     out = np.zeros(u.size)
-    for i in range(u.size - 1):
-        for j in range(STEPS):
-            force = u[i] + (u[i + 1] - u[i]) * (j + 0.5) / STEPS
-            x += 0.5 * h * v
-            spring = direct * x
-            for e in range(z.size):
-                z[e] = min(max(z[e] + 0.5 * h * v, -limits[e]), limits[e])
-                spring += shares[e] * z[e]
-            v = (v * (1.0 - 0.5 * h * damping) + h * (force - stiffness * spring)) / (1.0 + 0.5 * h * damping)
-            x += 0.5 * h * v
-            for e in range(z.size):
-                z[e] = min(max(z[e] + 0.5 * h * v, -limits[e]), limits[e])
-        out[i + 1] = x
+    doubles = ctypes.POINTER(ctypes.c_double)
+
+    def pointer(values):
+        return np.ascontiguousarray(values, dtype=float).ctypes.data_as(doubles)
+
+    program(
+        pointer(u), ctypes.c_long(u.size), ctypes.c_double(DT), ctypes.c_long(STEPS), ctypes.c_double(stiffness),
+        ctypes.c_double(damping), ctypes.c_double(direct), ctypes.c_long(limits.size), pointer(shares), pointer(limits),
+        out.ctypes.data_as(doubles),
+    )  # fmt: skip
     return out
 
 
@@ -52,9 +73,12 @@ def sweep():
 
 
 @pytest.fixture(scope="module")
-def truths(sweep, axis_values):
+def truths(sweep, axis_values, tmp_path_factory):
+    file = tmp_path_factory.mktemp("truth") / f"truth{library_suffix()}"
+    file.write_bytes(library(c_compilers()[0], {"truth.c": STOPPED_TRUTH}, ["-O2"]))
+    program = ctypes.CDLL(str(file)).truth
     return {
-        name: stopped_truth(sweep, axis_values["k"], axis_values["d"], direct, shares, limits)
+        name: stopped_truth(program, sweep, axis_values["k"], axis_values["d"], direct, shares, limits)
         for name, (_, direct, shares, limits) in CASES.items()
     }
 

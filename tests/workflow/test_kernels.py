@@ -23,7 +23,7 @@ from rigsight.workflow.kernels import prepare_kernels, structures_to_try
 
 cache = Path(sys.argv[1])
 def machine_code():
-    return sorted(path.name for path in cache.rglob("*.nbc"))
+    return sorted(path.name for path in cache.iterdir())
 
 structures = structures_to_try(ELEMENT, [effect_named("quadratic_damping")])
 steps = []

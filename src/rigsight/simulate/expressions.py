@@ -1,17 +1,11 @@
-"""Printing of symbolic equations as Python statements that numba compiles, with shared subexpressions."""
+"""Printing of symbolic equations as Python, and what of them depends on parameters alone."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
-
-
-class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """First argument, kept within plus and minus the second: two instructions, where `clamp` would print six."""
-
-    is_real = True
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -36,10 +30,6 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_positive_part(self, expr: sp.Function) -> str:
         return f"max({self._print(expr.args[0])}, 0.0)"
-
-    def _print_limited(self, expr: sp.Function) -> str:
-        value, half_width = (self._print(argument) for argument in expr.args)
-        return f"min(max({value}, -{half_width}), {half_width})"
 
     def _print_sign(self, expr: sp.sign) -> str:
         return f"sign_of({self._print(expr.args[0])})"
@@ -86,34 +76,3 @@ def hoist_constants(
 
     replaced = [walk(expression) for expression in expressions]
     return replaced, {symbol: expression for expression, symbol in hoisted.items()}
-
-
-def assignments(
-    targets: Sequence[str], expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str], prefix: str
-) -> list[str]:
-    """Return statements that assign expressions to targets, sharing common subexpressions.
-
-    Parameters
-    ----------
-    targets
-        Left-hand sides.
-    expressions
-        Right-hand sides, same length.
-    names
-        Name in the code of each symbol; symbols that are not listed keep their own.
-    prefix
-        Prefix of the names of shared subexpressions, unique in the code around.
-    """
-    printer = KernelPrinter()
-    counter = (sp.Symbol(f"{prefix}{i}", real=True) for i in range(10_000))
-    renamed = [
-        expression.xreplace({s: sp.Symbol(n, real=True) for s, n in names.items()})
-        for expression in expressions
-    ]
-    shared, reduced = sp.cse(renamed, symbols=counter, optimizations=None)
-    lines = [f"{symbol} = {printer.doprint(expression)}" for symbol, expression in shared]
-    lines += [
-        f"{target} = {printer.doprint(expression.evalf() if expression.is_number else expression)}"
-        for target, expression in zip(targets, reduced, strict=True)
-    ]
-    return lines

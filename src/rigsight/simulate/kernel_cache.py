@@ -1,31 +1,47 @@
-"""Source text of a kernel -> compiled module, cached on disk under the hash of that text.
+"""Structure -> compiled kernels, kept on disk under the hash of all that their machine code depends on.
 
-A stale kernel is impossible: the file's name is the hash of all that its machine code depends on in our hands (its complete
-source), its text is compared before use, and numba keys its own cache on that file, its own version and the processor.
+A stale kernel is impossible: the name of a library is the hash of its C text, the compiler, its options and the processor. A
+damaged one is found by a checksum before it is loaded, and made anew.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import importlib.util
 import os
+import platform
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 from rigsight.errors import InputError, MachineError
+from rigsight.simulate.compiler import NO_COMPILER, Compiler, c_compilers, library, library_suffix
+from rigsight.simulate.kernel import Kernel
 from rigsight.simulate.kernel_source import kernel_source
 from rigsight.simulate.structure import Structure
 
 CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
-ENTRY_POINTS = ("simulate_one", "simulate_lanes")
-"""Functions of a kernel module that are called from outside it."""
+FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
+"""Options that follow those of the engine and so replace them, to see whether a result depends on them: ``-O1``."""
+# Vectors are written out where they pay; those that a compiler finds by itself in the few states of one set cost a third.
+# No options that let a compiler take numbers for finite or reorder sums: motions that leave the range of numbers are detected, and
+# results are to differ from compiler to compiler by rounding alone.
+_OPTIONS = (
+    "-std=gnu11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
+    "-fno-tree-slp-vectorize", "-w",
+)  # fmt: skip
+_OWN_PROCESSOR = {
+    "x86_64": "-march=native",
+    "AMD64": "-march=native",
+    "aarch64": "-mcpu=native",
+    "arm64": "-mcpu=native",
+}
+_CHECKSUM_SIZE = 64
 
-_modules: dict[str, ModuleType] = {}
+_kernels: dict[str, Kernel] = {}
+_by_identity: dict[int, tuple[Structure, str]] = {}
 _lock = threading.RLock()
 
 
@@ -56,134 +72,120 @@ def _caches_at_home() -> Path:
         ) from None
 
 
-def kernels(structure: Structure) -> Any:
-    """Return the module of compiled kernels of a structure, generating and loading it if needed.
+def kernel_of(structure: Structure) -> Kernel:
+    """Return the compiled kernels of a structure, compiling them if this machine has not yet done so.
 
     Raises
     ------
     InputError
-        If the cache folder cannot be written.
+        If there is no C compiler.
+    MachineError
+        If the cache folder cannot be written, or the compiler fails.
     """
+    known = _by_identity.get(id(structure))
+    if known is not None and known[0] is structure and known[1] in _kernels:
+        return _kernels[known[1]]
+    text = kernel_source(structure)
+    key = hashlib.sha256(text.encode()).hexdigest()
     with _lock:
-        key = id(structure)
-        source = _sources_by_identity.get(key)
-        if source is None or source[0] is not structure:
-            source = (structure, kernel_source(structure))
-            _sources_by_identity[key] = source
-        text = source[1]
-        name = f"rigsight_kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
-        module = _modules.get(name)
-        if module is None:
-            module = _load(name, _written(name, text))
-            _modules[name] = module
-        return module
+        if key not in _kernels:
+            _kernels[key] = Kernel(_library_file(text), structure)
+        _by_identity[id(structure)] = (structure, key)
+        return _kernels[key]
 
 
-def run_kernel(structure: Structure, function: str, *arguments: Any) -> Any:
-    """Call a function of a structure's kernels, compiling it if this machine has not yet done so.
-
-    Raises
-    ------
-    InputError
-        If the cache folder cannot be written.
-    """
-    module = kernels(structure)
-    try:
-        return getattr(module, function)(*arguments)
-    except (TypeError, AttributeError):
-        raise
-    # Kernels raise nothing themselves: what arrives here is machine code on disk that is damaged or cannot be written.
-    except Exception as error:
-        path = Path(str(module.__file__))
-        try:
-            for file in (path.parent / "__pycache__").glob(f"{path.stem}.*"):
-                file.unlink()
-            with _lock:
-                _modules[path.stem] = _load(path.stem, path)
-            return getattr(_modules[path.stem], function)(*arguments)
-        except Exception:
-            raise MachineError(
-                f"Cannot use the compiled kernels in {path.parent} ({error}). "
-                f"Remove that folder, or set {CACHE_VARIABLE} to one that can be written."
-            ) from error
+def compiled(structure: Structure) -> bool:
+    """Return True if this machine holds the machine code of a structure's kernels already."""
+    known = _by_identity.get(id(structure))
+    if known is not None and known[0] is structure and known[1] in _kernels:
+        return True
+    text = kernel_source(structure)
+    return any(_sound(_path(text, compiler)) for compiler in c_compilers())
 
 
-_sources_by_identity: dict[int, tuple[Structure, str]] = {}
-_listings: dict[Path, tuple[int, dict[str, list[str]]]] = {}
-
-
-def compiled(structure: Structure, functions: Sequence[str] = ENTRY_POINTS) -> bool:
-    """Return True if this machine seems to hold the machine code of these functions of a structure's kernels already.
-
-    A hint: code of another processor or numba version is only found out, and compiled anew, when it is called.
-    """
-    path = Path(str(kernels(structure).__file__))
-    version = f".py{sys.version_info.major}{sys.version_info.minor}"
-    names = _machine_code(path.parent / "__pycache__")
-    return all(
-        any(
-            name.startswith(f"{path.stem}.{function}-") and version in name
-            for name in names.get(path.stem, ())
-        )
-        for function in functions
-    )
-
-
-def _machine_code(folder: Path) -> dict[str, list[str]]:
-    """Return the names of the index files of machine code by module; a folder that has not changed is listed once."""
-    try:
-        changed = folder.stat().st_mtime_ns
-    except OSError:
-        return {}
-    known = _listings.get(folder)
-    if known is None or known[0] != changed:
-        found: dict[str, list[str]] = {}
-        for file in folder.iterdir():
-            if file.suffix == ".nbi":
-                found.setdefault(file.name.partition(".")[0], []).append(file.name)
-        known = _listings[folder] = (changed, found)
-    return known[1]
-
-
-def _written(name: str, text: str) -> Path:
-    """Return the file that holds `text`, written whole or not at all."""
-    folder = cache_folder()
-    path = folder / f"{name}.py"
-    try:
-        if path.is_file() and path.read_text("utf-8") == text:
+def _library_file(text: str) -> Path:
+    """Return a sound library of a C text, with the first compiler that has or can make one."""
+    compilers = c_compilers()
+    if not compilers:
+        raise InputError(NO_COMPILER)
+    for compiler in compilers:
+        path = _path(text, compiler)
+        if _sound(path):
             return path
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=folder, suffix=".tmp")
+    failed: MachineError | None = None
+    for compiler in compilers:
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
+            content = library(compiler, {"kernel.c": text}, _options())
+        except MachineError as error:
+            failed = failed or error
+            continue
+        path = _path(text, compiler)
+        _write(path, content)
+        return path
+    assert failed is not None
+    raise failed
+
+
+def _options() -> tuple[str, ...]:
+    own = _OWN_PROCESSOR.get(platform.machine())
+    return (*_OPTIONS, *((own,) if own else ()), *os.environ.get(FLAGS_VARIABLE, "").split())
+
+
+def _path(text: str, compiler: Compiler) -> Path:
+    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(_options()), _processor())
+    name = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+    return cache_folder() / f"{name}{library_suffix()}"
+
+
+@cache
+def _processor() -> str:
+    """Return what tells this processor from others that cannot run its code."""
+    told = f"{platform.machine()} {platform.processor()}"
+    with contextlib.suppress(OSError):
+        first = Path("/proc/cpuinfo").read_text("utf-8", errors="replace").partition("\n\n")[0]
+        names = (
+            "vendor_id",
+            "cpu family",
+            "model",
+            "model name",
+            "stepping",
+            "flags",
+            "Features",
+            "CPU part",
+        )
+        lines = [line for line in first.splitlines() if line.partition(":")[0].strip() in names]
+        told = "\n".join([told, *lines])
+    return told
+
+
+def _sound(path: Path) -> bool:
+    """Return True for a library that is whole: loading a part of one would end the process."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return False
+    body, checksum = content[:-_CHECKSUM_SIZE], content[-_CHECKSUM_SIZE:]
+    return hashlib.sha256(body).hexdigest().encode() == checksum
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a library whole or not at all; its checksum stands behind it, where loaders do not look."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.write(hashlib.sha256(content).hexdigest().encode())
             Path(part).replace(path)
         except BaseException:
             Path(part).unlink(missing_ok=True)
             raise
     except OSError as error:
+        # Another process was quicker and has it loaded; some systems then let nobody replace it.
+        if _sound(path):
+            return
         raise MachineError(
-            f"Cannot keep compiled kernels in {folder} ({error.strerror}). "
+            f"Cannot keep compiled kernels in {path.parent} ({error.strerror}). "
             f"Set {CACHE_VARIABLE} to a folder that can be written."
         ) from error
-    return path
-
-
-def _load(name: str, path: Path) -> ModuleType:
-    specification = importlib.util.spec_from_file_location(name, path)
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    sys.modules[name] = module
-    try:
-        specification.loader.exec_module(module)
-    except RuntimeError as error:
-        # numba's word for a folder in which it may not put machine code.
-        if "cannot cache" not in str(error):
-            raise
-        del sys.modules[name]
-        raise MachineError(
-            f"Cannot keep compiled kernels in {path.parent} (it cannot be written). "
-            f"Set {CACHE_VARIABLE} to a folder that can be written."
-        ) from error
-    return module

@@ -18,6 +18,10 @@ class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
     is_real = True
     is_nonnegative = True
 
+    def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
+        """Return the slope."""
+        return sp.sign(self.args[0])
+
 
 @dataclass(frozen=True)
 class FrozenStructure:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Place
 from rigsight.simulate.input_hold import HeldInput, hold_input
-from rigsight.simulate.kernel_cache import run_kernel
+from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.structure import Structure
 
 _RAMP_PERIODS = 20.0
@@ -106,10 +106,7 @@ def _settled(
     for wait in range(_WAITS):
         before = state.copy()
         held = hold_input(samples, interval, "foh")
-        out = np.zeros((samples.size, len(structure.computed_outputs)))
-        status = run_kernel(
-            structure, "simulate_one", held.coefficients, interval, 1, True, 0.0, p, state, _TOLERANCE, out
-        )
+        status, _, state = kernel_of(structure).simulate_one(held, p, state, _TOLERANCE, samples.size)
         if status != 0:
             return None
         moved = np.abs(state - before)

@@ -12,8 +12,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.records.record import Record
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
-from rigsight.simulate.kernel_cache import run_kernel
-from rigsight.simulate.kernel_source import LANES
+from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
@@ -134,19 +133,8 @@ def simulate_outputs(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    out = np.zeros((n_samples, len(structure.computed_outputs)))
-    status = run_kernel(
-        structure,
-        "simulate_one",
-        held.coefficients,
-        held.interval,
-        held.per_sample,
-        held.continuous,
-        0.0,
-        p,
-        _state_vector(structure, initial_state),
-        _LOCAL_PER_GLOBAL * accuracy,
-        out,
+    status, out, _ = kernel_of(structure).simulate_one(
+        held, p, _state_vector(structure, initial_state), _LOCAL_PER_GLOBAL * accuracy, n_samples
     )
     if status != 0:
         effects = ", ".join(structure.effect_names) or "no effect"
@@ -183,29 +171,9 @@ def simulate_sets(
     -------
     Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
     """
-    n_sets = p.shape[1]
-    n_states = max(1, len(structure.states))
-    # The last block is filled up with copies of the last set; what they give is cut off.
-    n_padded = -(-n_sets // LANES) * LANES
-    out = np.empty((n_samples, len(structure.computed_outputs), n_padded))
-    for start in range(0, n_padded, LANES):
-        lanes = np.minimum(np.arange(start, start + LANES), n_sets - 1)
-        state = np.zeros((n_states, LANES))
-        state[: initial_states.shape[0]] = initial_states[:, lanes]
-        run_kernel(
-            structure,
-            "simulate_lanes",
-            held.coefficients,
-            held.interval,
-            held.per_sample,
-            substeps,
-            0.0,
-            np.ascontiguousarray(p[:, lanes]),
-            state,
-            out,
-            start,
-        )
-    return as_measured(structure, p, out[:, :, :n_sets], held)
+    steps = np.full(held.coefficients.shape[0] - 1, substeps, dtype=np.intc)
+    out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
+    return as_measured(structure, p, out, held)
 
 
 def choose_substeps(
@@ -247,6 +215,4 @@ def choose_substeps(
 
 
 def _state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
-    vector = np.zeros(max(1, len(structure.states)))
-    vector[: len(structure.states)] = np.asarray(state, dtype=np.float64)[: len(structure.states)]
-    return vector
+    return np.asarray(state, dtype=np.float64)[: max(1, len(structure.states))]

@@ -25,7 +25,7 @@ from rigsight.workflow.results import check_writable, json_text, write_together
 DIAGNOSIS_FILE = "diagnosis.json"
 REPORT_FILE = "report.html"
 DIAGNOSING = "Diagnosing"
-_VERSIONS_OF = ("rigsight", "numpy", "scipy", "numba")
+_VERSIONS_OF = ("rigsight", "numpy", "scipy")
 # Noise floor, re-identified equations and the given simulation, before the candidates.
 _STEPS_BEFORE_CANDIDATES = 3
 
@@ -125,7 +125,7 @@ def diagnose_campaign(
             seed=seed,
             n_jobs=n_jobs,
             progress=stage.finished,
-            prepare=lambda structures: prepare_kernels(structures, n_jobs, listener, for_looks=True),
+            prepare=lambda structures: prepare_kernels(structures, n_jobs, listener),
             memory=memory,
         )
         if keep is not None:

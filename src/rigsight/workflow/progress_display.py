@@ -83,7 +83,7 @@ def _bar() -> Iterator[Listener]:
         speed_estimate_period=_REMEMBERED,
     ) as progress:
         tasks = {}
-        # The first seconds go into importing numba and sympy: say that something happens.
+        # The first seconds go into importing sympy and scipy: say that something happens.
         starting = progress.add_task("Starting", total=None, detail="")
 
         def listener(step: Step) -> None:

@@ -1,0 +1,185 @@
+"""Which C compiler does this machine have, and how does it make a library of a C text?"""
+
+from __future__ import annotations
+
+import errno
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from rigsight.errors import InputError, MachineError
+
+VARIABLE = "CC"
+_COMMON = ("cc", "gcc", "clang")
+_ROOM = 1_000_000
+"""What a compiler needs for its files [bytes]; with less left, the disk is what failed."""
+_SHARED = {
+    "Linux": (".so", ("-shared", "-fPIC", "-fvisibility=hidden")),
+    "Darwin": (".dylib", ("-dynamiclib", "-fPIC", "-fvisibility=hidden")),
+    "Windows": (".dll", ("-shared",)),
+}
+NO_COMPILER = (
+    "No C compiler was found, and simulations are compiled. Install one: 'pip install rigsight[compiler]' (nothing else is "
+    f"needed), or Debian's gcc with 'apt-get install gcc', or name one in the variable {VARIABLE}."
+)
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler.
+
+    Attributes
+    ----------
+    command
+        Program and arguments that stand before all others.
+    identity
+        What changes when the program does: its path, size and time of change.
+    """
+
+    command: tuple[str, ...]
+    identity: str
+
+    @property
+    def name(self) -> str:
+        """The command as people write it."""
+        return shlex.join(self.command)
+
+
+def c_compilers() -> tuple[Compiler, ...]:
+    """Return the C compilers of this machine, best first: the one that the variable CC names alone, or all that are found.
+
+    Raises
+    ------
+    InputError
+        If the variable names a program that does not exist.
+    """
+    return _found(os.environ.get(VARIABLE, ""), os.environ.get("PATH", ""))
+
+
+@lru_cache(maxsize=8)
+def _found(named: str, path: str) -> tuple[Compiler, ...]:
+    if named.strip():
+        try:
+            words = shlex.split(named)
+        except ValueError as error:
+            raise InputError(f"The variable {VARIABLE} is no command ({error}): {named!r}.") from None
+        program = shutil.which(words[0], path=path)
+        if program is None:
+            raise InputError(
+                f"The variable {VARIABLE} names '{words[0]}', which was not found. Name a C compiler there, or unset it."
+            )
+        return (Compiler((program, *words[1:]), _identity(program)),)
+    programs = dict.fromkeys(shutil.which(name, path=path) for name in _COMMON)
+    found = [Compiler((program,), _identity(program)) for program in programs if program is not None]
+    zig = importlib.util.find_spec("ziglang")
+    if zig is not None and zig.origin is not None:
+        found.append(Compiler((sys.executable, "-m", "ziglang", "cc"), _identity(zig.origin)))
+    return tuple(found)
+
+
+def _identity(program: str) -> str:
+    real = Path(program).resolve()
+    try:
+        status = real.stat()
+    except OSError:
+        return str(real)
+    return f"{real} {status.st_size} {status.st_mtime_ns}"
+
+
+def library_suffix() -> str:
+    """Return how the name of a shared library ends on this system.
+
+    Raises
+    ------
+    InputError
+        If no library can be made for it.
+    """
+    return _system()[0]
+
+
+def _system() -> tuple[str, tuple[str, ...]]:
+    system = platform.system()
+    if system not in _SHARED:
+        raise InputError(f"No library can be made for {system}; rigsight runs on {', '.join(_SHARED)}.")
+    return _SHARED[system]
+
+
+def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]) -> bytes:
+    """Return the bytes of a shared library; the same text gives the same bytes with the same compiler.
+
+    Parameters
+    ----------
+    compiler
+        From `c_compilers`.
+    sources
+        File name -> C text; the first is compiled, the others it may include.
+    flags
+        Options of the compiler beside those that make a library.
+
+    Raises
+    ------
+    MachineError
+        If the compiler fails or there is no room for its files.
+    """
+    suffix, shared = _system()
+    try:
+        with tempfile.TemporaryDirectory(prefix="rigsight-", ignore_cleanup_errors=True) as place:
+            for file, text in sources.items():
+                Path(place, file).write_text(text, encoding="utf-8")
+            target = Path(place, f"library{suffix}")
+            command = [*compiler.command, *flags, *shared, "-o", target.name, next(iter(sources)), "-lm"]
+            code, said = _run(command, place)
+            if code == 0 and target.is_file():
+                return target.read_bytes()
+            if shutil.disk_usage(place).free < _ROOM:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), place)
+            first = next(
+                (line for line in said.splitlines() if "error" in line), said.strip() or "no message"
+            )
+    except OSError as error:
+        raise MachineError(
+            f"The C compiler {compiler.name} cannot be run in {tempfile.gettempdir()} ({error.strerror or error}). "
+            "Make room there, or set TMPDIR to a folder with room."
+        ) from error
+    raise MachineError(
+        f"The C compiler {compiler.name} failed: {first.strip()}. "
+        f"Name another one in the variable {VARIABLE}, or install 'rigsight[compiler]'."
+    )
+
+
+def _run(command: Sequence[str], place: str) -> tuple[int, str]:
+    """Run a compiler in a folder that holds its own temporary files too; return its exit code and what it said.
+
+    It runs programs of its own, which end with it when we are interrupted.
+    """
+    temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), place)
+    with subprocess.Popen(
+        command,
+        cwd=place,
+        env={**os.environ, **temporary},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            _, said = process.communicate()
+        except BaseException:
+            if os.name == "nt":
+                process.kill()
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+        return process.returncode, said

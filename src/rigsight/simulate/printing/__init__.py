@@ -1,0 +1,1 @@
+"""Symbolic equations -> text of a language; one file per language."""

@@ -1,0 +1,150 @@
+"""How is a symbolic expression written in C: for one parameter set, and for several side by side?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sympy as sp
+from sympy.printing.c import C99CodePrinter
+
+
+class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """First argument, kept within plus and minus the second: two instructions, where `clamp` would print six."""
+
+    is_real = True
+
+
+class CPrinter(C99CodePrinter):  # type: ignore[misc]
+    """C99 with products for small powers; ``sign_of``, ``positive`` and ``within`` are functions of the file."""
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: ARG002, N802
+        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
+            product = "*".join([self.parenthesize(expr.base, 1000)] * abs(int(expr.exp)))
+            return f"({product})" if expr.exp > 0 else f"(1.0/({product}))"
+        return str(super()._print_Pow(expr))
+
+    def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
+        return repr(float(expr))
+
+    def _print_Integer(self, expr: sp.Integer) -> str:  # noqa: N802
+        # Integers beyond those of C would overflow; a double holds them.
+        return f"{int(expr)}.0" if abs(int(expr)) < 10**15 else repr(float(expr))
+
+    def _print_NumberSymbol(self, expr: sp.Expr) -> str:  # noqa: N802
+        return repr(float(expr))
+
+    _print_Pi = _print_Exp1 = _print_NumberSymbol  # noqa: N815
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return f"sign_of({self._print(expr.args[0])})"
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return f"fabs({self._print(expr.args[0])})"
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return f"positive({self._print(expr.args[0])})"
+
+    def _print_limited(self, expr: sp.Function) -> str:
+        return f"within({', '.join(map(self._print, expr.args))})"
+
+
+class LanePrinter(CPrinter):
+    """The same for vectors: every function is the vector's own, with a ``v_`` in front, and takes vectors alone."""
+
+    def _vector(self, expr: sp.Expr) -> str:
+        text = str(self._print(expr))
+        return f"v_all({text})" if expr.is_number else text
+
+    def _call(self, name: str, *arguments: sp.Expr) -> str:
+        return f"v_{name}({', '.join(map(self._vector, arguments))})"
+
+    def _print_Function(self, expr: sp.Function) -> str:  # noqa: N802
+        return self._call(type(expr).__name__, *expr.args)
+
+    # sympy's C printer knows these by name, and would print the scalar function.
+    _print_sin = _print_cos = _print_tan = _print_asin = _print_acos = _print_atan = _print_atan2 = (
+        _print_Function
+    )
+    _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_exp = _print_log = _print_Function
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: N802
+        if expr.exp == -1:
+            return f"1.0/{self.parenthesize(expr.base, 1000)}"
+        if expr.exp == sp.Rational(1, 2):
+            return self._call("sqrt", expr.base)
+        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
+            return super()._print_Pow(expr, rational)
+        return self._call("pow", expr.base, expr.exp)
+
+    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
+        return self._call("abs", *expr.args)
+
+    def _print_absolute(self, expr: sp.Function) -> str:
+        return self._call("abs", *expr.args)
+
+    def _print_sign(self, expr: sp.sign) -> str:
+        return self._call("sign_of", *expr.args)
+
+    def _print_positive_part(self, expr: sp.Function) -> str:
+        return self._call("positive", *expr.args)
+
+    def _print_limited(self, expr: sp.Function) -> str:
+        return self._call("within", *expr.args)
+
+
+_SCALAR, _LANES = CPrinter(), LanePrinter()
+
+
+def c_expression(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
+    """Return one expression with its symbols renamed."""
+    return str(_SCALAR.doprint(_plain(_renamed(expression, names))))
+
+
+def c_statements(
+    targets: Sequence[str],
+    expressions: Sequence[sp.Expr],
+    names: Mapping[sp.Symbol, str],
+    lanes: bool = False,
+) -> list[str]:
+    """Return C statements that assign expressions to targets, sharing common parts.
+
+    Parameters
+    ----------
+    targets
+        Left-hand sides.
+    expressions
+        Right-hand sides, same length.
+    names
+        Name in the code of each symbol; every symbol must be listed, so that no name of a rig or an effect reaches C.
+    lanes
+        True for vectors of parameter sets.
+
+    Raises
+    ------
+    KeyError
+        If a symbol has no name.
+    """
+    printer: Any = _LANES if lanes else _SCALAR
+    for symbol in set().union(*(expression.free_symbols for expression in expressions)):
+        if symbol not in names:
+            raise KeyError(f"The symbol {symbol} has no name in C.")
+    renamed = [_renamed(expression, names) for expression in expressions]
+    parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
+    shared, reduced = sp.cse(renamed, symbols=parts, optimizations=None)
+    declared = "const lanes {} = {};" if lanes else "const double {} = {};"
+
+    def written(expression: sp.Expr) -> str:
+        text = str(printer.doprint(_plain(expression)))
+        return f"v_all({text})" if lanes and expression.is_number else text
+
+    lines = [declared.format(symbol.name, written(expression)) for symbol, expression in shared]
+    return lines + [f"{target} = {written(e)};" for target, e in zip(targets, reduced, strict=True)]
+
+
+def _renamed(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> sp.Expr:
+    return expression.xreplace({s: sp.Symbol(names[s], real=True) for s in expression.free_symbols})
+
+
+def _plain(expression: sp.Expr) -> sp.Expr:
+    return expression.evalf() if expression.is_number else expression
