@@ -15,7 +15,7 @@ from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP, Coordinates
 from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
-from rigsight.simulate import Structure, choose_substeps, simulate_sets, state_limits
+from rigsight.simulate import Structure, Substeps, choose_substeps, simulate_sets, state_limits
 from rigsight.simulate.input_hold import HeldInput
 
 MOST_SUBSTEPS = 16
@@ -113,7 +113,7 @@ class Problem:
         self.upper = upper
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
-        self.substeps = [MOST_SUBSTEPS] * len(data.records)
+        self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
         self._last: Evaluation | None = None
         self._best = float("inf")
 
@@ -138,13 +138,13 @@ class Problem:
                     MOST_SUBSTEPS,
                 )
             except SimulationError:
-                self.substeps[i] = MOST_SUBSTEPS
+                self.substeps[i] = Substeps(MOST_SUBSTEPS)
 
     def refined(self, theta: NDArray[np.float64]) -> bool:
         """Double the substeps if the cost would then fall further from here; return True if so."""
         before = self.substeps
         within_reach = self._removable(theta)
-        self.substeps = [min(2 * n, MOST_SUBSTEPS) for n in before]
+        self.substeps = [n.with_most(min(2 * n, MOST_SUBSTEPS)) for n in before]
         self._last = None
         if self.substeps != before and self._removable(theta) > within_reach + _WORTH_REFINING:
             self._best = float("inf")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.simulate import Structure
+from rigsight.simulate import Structure, Substeps
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class FitResult:
     covariance
         Shape (n_free, n_free), in units of the parameters.
     substeps
-        Integration steps per sample that were used for each record.
+        Integration steps per piece of the input that were used for each record.
     """
 
     structure: Structure
@@ -53,7 +53,7 @@ class FitResult:
     covariance: NDArray[np.float64]
     residuals: tuple[NDArray[np.float64], ...]
     """Measured minus simulated per record, shape (n_samples, n_outputs), NaN where an output was not measured."""
-    substeps: tuple[int, ...] = ()
+    substeps: tuple[Substeps, ...] = ()
 
     @property
     def weighted_rms(self) -> float:

@@ -31,6 +31,7 @@ from rigsight.identify.separate_states import SeparateStates
 from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
+    Substeps,
     record_input,
     simulate_outputs,
     simulate_sets,
@@ -173,7 +174,7 @@ class GreyBoxFit:
         if substeps is None:
             problem.choose_substeps(theta)
         else:
-            problem.substeps = list(substeps)
+            problem.substeps = [n if isinstance(n, Substeps) else Substeps(n) for n in substeps]
         if not np.isfinite(problem.at(theta).cost):
             return self._failed(coordinates, theta, "The start values cannot be simulated.")
         if theta.size == 0:
@@ -188,7 +189,7 @@ class GreyBoxFit:
                     break
             return theta, bool(solution.status > 0), str(solution.message)
 
-        settings = (max_evaluations, tolerance, problem.substeps)
+        settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))
         outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
         return self._result(problem, *outcome, finish)
 
@@ -237,7 +238,7 @@ class GreyBoxFit:
                     break
             return np.concatenate([own, *problem.places]), success, message
 
-        settings = (max_evaluations, tolerance, [*problem.substeps, most_rounds])
+        settings = (max_evaluations, tolerance, [*map(int, problem.substeps), most_rounds])
         outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
         together = Problem(self.data, coordinates, begin.n_states, problem.upper)
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
@@ -247,12 +248,15 @@ class GreyBoxFit:
         """Return the outcome of a search, from memory if it was done before."""
         known = None if self.memory is None else self.memory.recall(key)
         if known is not None:
-            problem.n_evaluations, problem.substeps = known["evaluations"], list(known["substeps"])
+            problem.n_evaluations = known["evaluations"]
+            problem.substeps = [
+                own.with_most(most) for own, most in zip(problem.substeps, known["substeps"], strict=True)
+            ]
             return np.array(known["theta"]), known["success"], known["message"]
         theta, success, message = search()
         if self.memory is not None:
             outcome = {"theta": theta.tolist(), "success": success, "message": message}
-            steps = {"evaluations": problem.n_evaluations, "substeps": problem.substeps}
+            steps = {"evaluations": problem.n_evaluations, "substeps": list(map(int, problem.substeps))}
             self.memory.remember(key, {**outcome, **steps})
         return theta, success, message
 
@@ -325,7 +329,7 @@ class GreyBoxFit:
             free=coordinates.free,
             covariance=np.full((n, n), np.inf),
             residuals=(),
-            substeps=(MOST_SUBSTEPS,) * len(self.data.records),
+            substeps=(Substeps(MOST_SUBSTEPS),) * len(self.data.records),
         )
 
     def _result(

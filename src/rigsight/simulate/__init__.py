@@ -13,9 +13,11 @@ from rigsight.simulate.simulation import simulate_sets as simulate_sets
 from rigsight.simulate.state_limits import state_limits as state_limits
 from rigsight.simulate.structure import Structure as Structure
 from rigsight.simulate.structure import carried_over as carried_over
+from rigsight.simulate.substeps import Substeps as Substeps
 
 __all__ = [
     "Structure",
+    "Substeps",
     "cache_folder",
     "carried_over",
     "choose_substeps",

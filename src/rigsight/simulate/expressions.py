@@ -76,3 +76,53 @@ def hoist_constants(
 
     replaced = [walk(expression) for expression in expressions]
     return replaced, {symbol: expression for expression, symbol in hoisted.items()}
+
+
+def gathered(expression: sp.Expr, constants: set[sp.Symbol]) -> sp.Expr:
+    """Return an expression as a sum of products with one constant coefficient each, where that takes fewer operations.
+
+    Arguments of functions stay as they are.
+
+    Parameters
+    ----------
+    expression
+        Any expression.
+    constants
+        Symbols whose functions are computed once, before all else.
+    """
+    inner = {
+        atom: sp.Dummy(f"inner{i}", real=True)
+        for i, atom in enumerate(_functions(expression))
+        if atom.free_symbols - constants
+    }
+    outer = sp.expand_mul(expression.xreplace(inner), deep=True)
+    coefficients: dict[sp.Expr, list[sp.Expr]] = {}
+    for term in sp.Add.make_args(outer):
+        fixed, varying = term.as_independent(*(term.free_symbols - constants), as_Add=False)
+        coefficients.setdefault(varying, []).append(fixed)
+    back = {dummy: atom for atom, dummy in inner.items()}
+    products = [sp.Mul(sp.Add(*fixed), varying) for varying, fixed in coefficients.items()]
+    candidate = sp.Add(*products).xreplace(back)
+    return candidate if _operations(candidate, constants) < _operations(expression, constants) else expression
+
+
+def _functions(expression: sp.Expr) -> list[sp.Expr]:
+    """Return the outermost functions and powers in an expression, in a fixed order."""
+    if isinstance(expression, sp.Function) or (expression.is_Pow and not expression.exp.is_Integer):
+        return [expression]
+    found = [atom for argument in expression.args for atom in _functions(argument)]
+    return list(dict.fromkeys(found))
+
+
+def _operations(expression: sp.Expr, constants: set[sp.Symbol]) -> int:
+    """Count the operations that are left once functions of constants are computed; a product that is added costs one."""
+    if not expression.free_symbols - constants:
+        return 0
+    varying = [a for a in expression.args if a.free_symbols - constants]
+    own = len(varying) - 1 + (len(varying) < len(expression.args))
+    inside: int = sum(_operations(argument, constants) for argument in varying)
+    if expression.is_Add:
+        return own + inside - sum(bool(argument.is_Mul) for argument in varying)
+    if expression.is_Pow and expression.exp.is_Integer:
+        return abs(int(expression.exp)) - 1 + inside
+    return inside + (own if expression.is_Mul else min(1, len(expression.args)))

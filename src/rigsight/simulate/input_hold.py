@@ -46,6 +46,11 @@ class HeldInput:
     per_sample: int
     continuous: bool
 
+    @property
+    def n_pieces(self) -> int:
+        """Pieces of the record."""
+        return int(self.coefficients.shape[0]) - 1
+
 
 def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
     """Return the input between its samples.

@@ -49,7 +49,7 @@ class Kernel:
         self._one = loaded.simulate_one
         self._one.restype = _INT
         self._one.argtypes = [
-            _DOUBLES, _LONG, _DOUBLE, _LONG, _INT, _DOUBLE, _DOUBLES, _DOUBLES, _DOUBLE, _DOUBLES, _LONG,
+            _DOUBLES, _LONG, _DOUBLE, _LONG, _INT, _DOUBLE, _DOUBLES, _DOUBLES, _DOUBLE, _DOUBLES, _LONG, _INTS,
         ]  # fmt: skip
         self._lanes = loaded.simulate_lanes
         self._lanes.restype = None
@@ -58,7 +58,13 @@ class Kernel:
         ]  # fmt: skip
 
     def simulate_one(
-        self, held: HeldInput, p: Floats, state: Floats, tolerance: float, n_samples: int
+        self,
+        held: HeldInput,
+        p: Floats,
+        state: Floats,
+        tolerance: float,
+        n_samples: int,
+        steps: NDArray[np.intc] | None = None,
     ) -> tuple[int, Floats, Floats]:
         """Advance one parameter set accurately.
 
@@ -74,6 +80,8 @@ class Kernel:
             Error allowed per step, relative to the largest excursion of each state.
         n_samples
             Samples of the input.
+        steps
+            Where to write how many steps each piece of the input took, shape (n_pieces,).
 
         Returns
         -------
@@ -91,6 +99,7 @@ class Kernel:
         status = self._one(
             c.ctypes.data, c.shape[0] - 1, held.interval, held.per_sample, int(held.continuous), 0.0,
             p.ctypes.data, x.ctypes.data, tolerance, out.ctypes.data, n_samples,
+            None if steps is None else steps.ctypes.data,
         )  # fmt: skip
         return status, out, x[: state.size]
 

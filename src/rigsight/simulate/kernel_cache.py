@@ -26,7 +26,7 @@ CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
 FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
 """Options that follow those of the engine and so replace them, to see whether a result depends on them: ``-O1``."""
 # Vectors are written out where they pay; those that a compiler finds by itself in the few states of one set cost a third.
-# No options that let a compiler take numbers for finite or reorder sums: motions that leave the range of numbers are detected, and
+# No options that let a compiler take numbers for finite or reorder sums: motions beyond the range of numbers are detected, and
 # results are to differ from compiler to compiler by rounding alone.
 _OPTIONS = (
     "-std=gnu11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",

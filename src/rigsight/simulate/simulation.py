@@ -17,6 +17,7 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.structure import Structure
+from rigsight.simulate.substeps import Substeps
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""
@@ -125,8 +126,11 @@ def simulate_outputs(
     initial_state: NDArray[np.float64],
     n_samples: int,
     accuracy: float = DEFAULT_ACCURACY,
+    taken: NDArray[np.intc] | None = None,
 ) -> NDArray[np.float64]:
     """Return the outputs of one parameter set, shape (n_samples, n_outputs).
+
+    Where `taken` is given, shape (n_pieces,), the steps of each piece of the input are written there.
 
     Raises
     ------
@@ -134,7 +138,7 @@ def simulate_outputs(
         If the motion leaves the range of numbers or the model is too stiff.
     """
     status, out, _ = kernel_of(structure).simulate_one(
-        held, p, _state_vector(structure, initial_state), _LOCAL_PER_GLOBAL * accuracy, n_samples
+        held, p, _state_vector(structure, initial_state), _LOCAL_PER_GLOBAL * accuracy, n_samples, taken
     )
     if status != 0:
         effects = ", ".join(structure.effect_names) or "no effect"
@@ -148,7 +152,7 @@ def simulate_sets(
     p: NDArray[np.float64],
     initial_states: NDArray[np.float64],
     n_samples: int,
-    substeps: int,
+    substeps: int | Substeps,
 ) -> NDArray[np.float64]:
     """Simulate many parameter sets side by side.
 
@@ -165,13 +169,15 @@ def simulate_sets(
     n_samples
         Samples of the record.
     substeps
-        Runge-Kutta steps per interval of the input, see `choose_substeps`.
+        Runge-Kutta steps per piece of the input, see `choose_substeps`.
 
     Returns
     -------
     Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
     """
-    steps = np.full(held.coefficients.shape[0] - 1, substeps, dtype=np.intc)
+    steps = Substeps.per_piece(
+        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
+    )
     out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
     return as_measured(structure, p, out, held)
 
@@ -184,8 +190,8 @@ def choose_substeps(
     n_samples: int,
     accuracy: float,
     most: int = _SUBSTEPS[-1],
-) -> int:
-    """Return a small number of substeps whose error against the accurate integrator is below `accuracy`.
+) -> Substeps:
+    """Return few substeps whose error against the accurate integrator is below `accuracy`, fewest where the motion is slow.
 
     Kinks make the error fall with the square of the step; numbers that this rule excludes are not tried.
 
@@ -194,18 +200,20 @@ def choose_substeps(
     SimulationError
         If no number of substeps up to `most` reaches it, or the accurate integrator itself fails.
     """
-    exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5))
+    taken = np.zeros(held.n_pieces, dtype=np.intc)
+    exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
     size = np.std(exact, axis=0) + 1e-300
     state = np.asarray(initial_state, dtype=np.float64)[:, None]
     least = 1.0
     for substeps in (number for number in _SUBSTEPS if number <= most):
         if substeps < least:
             continue
-        fast = simulate_sets(structure, held, p[:, None], state, n_samples, substeps)[:, :, 0]
+        steps = Substeps(substeps, taken)
+        fast = simulate_sets(structure, held, p[:, None], state, n_samples, steps)[:, :, 0]
         with np.errstate(over="ignore", invalid="ignore"):
             error = float(np.max(np.sqrt(np.mean((fast - exact) ** 2, axis=0)) / size))
         if error <= accuracy:
-            return substeps
+            return steps
         if np.isfinite(error):
             least = _CAUTION * substeps * np.sqrt(error / accuracy)
     raise SimulationError(
