@@ -78,7 +78,7 @@ def hoist_constants(
     return replaced, {symbol: expression for expression, symbol in hoisted.items()}
 
 
-def gathered(expression: sp.Expr, constants: set[sp.Symbol]) -> sp.Expr:
+def gathered(expression: sp.Expr, constants: set[sp.Symbol], modes: set[sp.Symbol] | None = None) -> sp.Expr:
     """Return an expression as a sum of products with one constant coefficient each, where that takes fewer operations.
 
     Arguments of functions stay as they are.
@@ -89,10 +89,12 @@ def gathered(expression: sp.Expr, constants: set[sp.Symbol]) -> sp.Expr:
         Any expression.
     constants
         Symbols whose functions are computed once, before all else.
+    modes
+        Signs; a sum of them stays whole, because what it takes away must be exactly zero.
     """
     inner = {
         atom: sp.Dummy(f"inner{i}", real=True)
-        for i, atom in enumerate(_functions(expression))
+        for i, atom in enumerate(_whole(expression, modes or set()))
         if atom.free_symbols - constants
     }
     outer = sp.expand_mul(expression.xreplace(inner), deep=True)
@@ -106,11 +108,13 @@ def gathered(expression: sp.Expr, constants: set[sp.Symbol]) -> sp.Expr:
     return candidate if _operations(candidate, constants) < _operations(expression, constants) else expression
 
 
-def _functions(expression: sp.Expr) -> list[sp.Expr]:
-    """Return the outermost functions and powers in an expression, in a fixed order."""
+def _whole(expression: sp.Expr, modes: set[sp.Symbol]) -> list[sp.Expr]:
+    """Return the outermost functions, powers and sums of modes in an expression, in a fixed order."""
     if isinstance(expression, sp.Function) or (expression.is_Pow and not expression.exp.is_Integer):
         return [expression]
-    found = [atom for argument in expression.args for atom in _functions(argument)]
+    if expression.is_Add and expression.free_symbols and expression.free_symbols <= modes:
+        return [expression]
+    found = [atom for argument in expression.args for atom in _whole(argument, modes)]
     return list(dict.fromkeys(found))
 
 

@@ -72,7 +72,7 @@ class KernelEquations:
         self.frozen: FrozenStructure = freeze(structure)
         fixed = set(structure.parameter_symbols)
         groups: dict[str, Sequence[sp.Expr]] = {
-            "rates": [gathered(rate, fixed) for rate in self.frozen.rates],
+            "rates": [gathered(rate, fixed, set(self.frozen.modes)) for rate in self.frozen.rates],
             "switches": self.frozen.switches,
             "switch_slopes": [self._slope(switch) for switch in self.frozen.switches],
             "holding_slopes": self._holding_slopes(),
