@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from rigsight.effects import effect_named
 from rigsight.errors import SimulationError
 from rigsight.excitation import log_sweep
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.simulate import (
     choose_substeps,
     compose,
@@ -132,18 +132,21 @@ def test_chosen_substeps_reach_the_wish(hysteretic, hysteresis_sets, sweep, trut
     assert max(chosen) <= 16
 
 
-def test_sets_do_not_depend_on_their_neighbors(hysteretic, hysteresis_sets, sweep, make_record):
+@pytest.mark.parametrize("effect", ["bouc_wen_hysteresis", "coulomb_friction", "iwan_hysteresis"])
+def test_sets_do_not_depend_on_their_neighbors(effect, hysteresis_sets, sweep, make_record):
     record = make_record(sweep[:1500])
-    held, p, state = prepared(hysteretic, hysteresis_sets["R"], record)
+    structure = compose(RUNNING_GEAR, [effect_named(effect)])
+    own = {"T_c": 0.02, "x_s": 2e-3, "q": -0.4, "n": 1.0}
+    held, p, state = prepared(structure, {**hysteresis_sets["R"], **own}, record)
     factors = np.random.default_rng(3).uniform(0.8, 1.2, 37)
-    index = hysteretic.names.index("k_c")
+    index = structure.names.index("k_c")
     many = np.repeat(p[:, None], factors.size, axis=1)
     many[index] *= factors
     states = np.repeat(state[:, None], factors.size, axis=1)
-    together = simulate_sets(hysteretic, held, many, states, record.n_samples, 4)
+    together = simulate_sets(structure, held, many, states, record.n_samples, 4)
     assert together.shape == (1500, 2, 37)
     for i in (0, 15, 16, 36):
-        alone = simulate_sets(hysteretic, held, many[:, i : i + 1], states[:, :1], record.n_samples, 4)
+        alone = simulate_sets(structure, held, many[:, i : i + 1], states[:, :1], record.n_samples, 4)
         np.testing.assert_array_equal(together[:, :, i], alone[:, :, 0])
 
 

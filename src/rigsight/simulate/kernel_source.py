@@ -167,7 +167,10 @@ class KernelEquations:
         }
         kept = [limited(gained[i], limit) for i, limit in followers.items()]
         others = {i: limit for i, limit in self._limits.items() if i not in followers}
+        integrated = [i for i in range(len(structure.states)) if i not in self._followed]
         return {
+            "N_INTEGRATED": str(len(integrated)),
+            "INTEGRATED": ", ".join(map(str, integrated)) or "0",
             "LANE_RATES": _body(("now", "x", "q", "r"), _targets("r", len(rates)), rates, names, lanes=True),
             "LANE_OUTPUTS": _body(
                 ("now", "x", "q", "y"),
