@@ -233,12 +233,18 @@ def weighted(
     record: RecordData, out: NDArray[np.float64], step: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return weighted residuals (n,) of the first lane and, of the others, their derivatives (n, n_lanes - 1)."""
-    residuals, derivatives = [], []
-    for i, weight in enumerate(record.weights):
-        if weight > 0.0:
-            residuals.append((record.measured[:, i] - out[:, i, 0]) * weight)
-            derivatives.append((out[:, i, :1] - out[:, i, 1:]) * (weight / step))
-    return np.concatenate(residuals), np.concatenate(derivatives)
+    used = np.flatnonzero(record.weights > 0.0)
+    n_samples, _, n_lanes = out.shape
+    residuals = np.empty(used.size * n_samples)
+    derivatives = np.empty((used.size * n_samples, n_lanes - 1))
+    for place, i in enumerate(used):
+        # In place: these are the largest arrays of a fit, and every copy goes through the memory.
+        rows = slice(place * n_samples, (place + 1) * n_samples)
+        np.subtract(record.measured[:, i], out[:, i, 0], out=residuals[rows])
+        residuals[rows] *= record.weights[i]
+        np.subtract(out[:, i, :1], out[:, i, 1:], out=derivatives[rows])
+        derivatives[rows] *= record.weights[i] / step
+    return residuals, derivatives
 
 
 def compressed(evaluation: Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
