@@ -100,3 +100,16 @@ def test_what_cannot_be_estimated_is_told(second_order, method) -> None:
         method(record.slice(0, 10), "u", "psi", band=None)
     with pytest.raises(InputError, match="has no signal 'y'"):
         method(record, "u", "y")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_lines_that_are_wanted_are_those_of_the_whole(second_order, method) -> None:
+    record = second_order().record(noise=1e-3, rng=np.random.default_rng(4))
+    whole = method(record, "u", "psi")
+    some = whole.omega[10:400:7]
+    found = method(record, "u", "psi", wanted=some)
+    assert np.array_equal(found.omega, some)
+    assert np.array_equal(found.values, whole.values[10:400:7])
+    assert np.array_equal(found.variance, whole.variance[10:400:7])
+    with pytest.raises(InputError, match="any of the frequencies"):
+        method(record, "u", "psi", wanted=some + 1e3)

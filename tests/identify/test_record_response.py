@@ -44,6 +44,14 @@ def test_the_coherence_of_a_linear_rig_is_high(sweep: Record) -> None:
     assert np.median(coherence.coherence) > 0.95
 
 
+def test_no_coherence_is_there_where_nobody_reads_it(sweep: Record) -> None:
+    bare = record_response(sweep, "u", "x", "pt2", hold="foh", with_coherence=False)
+    assert bare.coherence is None
+    assert np.array_equal(
+        bare.response.values, record_response(sweep, "u", "x", "pt2", hold="foh").response.values
+    )
+
+
 def test_a_wider_resolution_is_one(sweep: Record) -> None:
     fine, wide = (record_response(sweep, "u", "x", "pt2", hold="foh", resolution=r) for r in (None, 5.0))
     assert wide.resolution > fine.resolution

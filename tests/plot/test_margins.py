@@ -11,6 +11,7 @@ from rigsight import plot
 from rigsight.diagnose.gap_parts import BandPart, RecordPart, TimePart
 from rigsight.diagnose.result import Stage
 from rigsight.frequency import FrequencyResponse
+from rigsight.plot.drawing import new_figure
 
 STAGES: dict[Stage, str] = {
     "before": "given simulation", "reidentified": "re-identified", "after": "with effects"
@@ -106,13 +107,8 @@ def test_all_letters_stand_inside_and_apart(draw, size: float) -> None:
 
 
 def test_a_figure_can_be_written_twice_and_stays_laid_out() -> None:
-    figure = plot.ranking(diagnosis=_nothing_ranked(), names=[])
+    figure = new_figure(4.0, 3.0)
+    figure.subplots().set_xlabel("time [s]")
     first = plot.svg_text(figure, "a")
     assert figure.get_layout_engine() is not None
     assert plot.svg_text(figure, "a") == first
-
-
-def _nothing_ranked():
-    from types import SimpleNamespace
-
-    return SimpleNamespace(candidates=(), effects=(), ambiguous_with=())

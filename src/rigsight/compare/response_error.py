@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
+from rigsight.frequency.signal_pair import among
 from rigsight.identify.record_response import Method, record_response
 from rigsight.identify.transfer_form import Order
 from rigsight.metrics import rms
@@ -142,22 +143,30 @@ def simulated_response(
     InputError
         If the simulation does not excite any of these lines, or the estimator cannot read it.
     """
-    whole = _response(simulated, path, method, 0.0)
-    return whole.at(_among(whole.omega, measured.omega), "of those measured")
+    whole = _response(simulated, path, method, 0.0, measured.omega)
+    return whole.at(among(whole.omega, measured.omega), "of those measured")
 
 
-def _response(record: Record, path: SignalPath, method: Method, least_clearness: float) -> FrequencyResponse:
+def _response(
+    record: Record,
+    path: SignalPath,
+    method: Method,
+    least_clearness: float,
+    wanted: NDArray[np.float64] | None = None,
+) -> FrequencyResponse:
     # A measured source is smooth between its samples, whatever the input does.
     hold: Hold = record.hold if path.is_commanded else "band_limited"
     return record_response(
-        record, path.source, path.response, path.order, method, hold=hold, least_clearness=least_clearness
+        record,
+        path.source,
+        path.response,
+        path.order,
+        method,
+        hold=hold,
+        least_clearness=least_clearness,
+        with_coherence=False,
+        wanted=wanted,
     ).response
-
-
-def _among(omega: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which frequencies are lines of the other response; both come from records of the same length."""
-    nearest = wanted[np.clip(np.searchsorted(wanted, omega), 1, wanted.size - 1) - np.array([[1], [0]])]
-    return np.asarray(np.min(np.abs(nearest - omega), axis=0) <= 1e-6 * omega)
 
 
 def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) -> ResponseError:
@@ -171,8 +180,8 @@ def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) ->
     InputError
         If they have no line in common.
     """
-    one = measured.at(_among(measured.omega, simulated.omega), "in common with the simulation")
-    other = simulated.at(_among(simulated.omega, measured.omega), "in common with the measurement")
+    one = measured.at(among(measured.omega, simulated.omega), "in common with the simulation")
+    other = simulated.at(among(simulated.omega, measured.omega), "in common with the measurement")
     rescaled = measured.method.startswith("thesis")
     phase = one.phase - other.phase if rescaled else np.angle(other.values * np.conj(one.values))
     with np.errstate(divide="ignore"):

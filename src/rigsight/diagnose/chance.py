@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 
@@ -78,7 +78,7 @@ def fitted_in_windows(
             return model
         return _fitted(bench, linear, model) if model.names in nearest else _scored(bench, model)
 
-    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(model) for model in singles))
+    return side_by_side(one, singles, n_jobs, bench.threads)
 
 
 def _nearest(singles: Sequence[Scored]) -> list[Scored]:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from rigsight.diagnose.first_look import (
     LOOK_ACCURACY,
@@ -20,6 +20,7 @@ from rigsight.diagnose.first_look import (
     mean_square,
     widened,
 )
+from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import restart_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -93,7 +94,7 @@ def fit_candidates(
             progress(found.newest)
         return scored
 
-    models = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in looks))
+    models = side_by_side(one, looks, n_jobs, bench.threads)
     return refine(bench, models, n_jobs)
 
 
@@ -108,14 +109,16 @@ def _looks(
     names = {effect.name for effect in effects}
     done: dict[str, Look] = {}
     waiting = list(effects)
+
+    def one(parents: Mapping[str, FitResult], effect: Effect) -> Look:
+        return look_at(bench, (effect,), linear.fit, parents, regression)
+
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]
         ready = ready or waiting
         waiting = [effect for effect in waiting if effect not in ready]
         parents = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
-        looks = Parallel(n_jobs=n_jobs, prefer="threads")(
-            delayed(look_at)(bench, (effect,), linear.fit, parents, regression) for effect in ready
-        )
+        looks = side_by_side(partial(one, parents), ready, n_jobs, bench.threads)
         done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
     return [done[effect.name] for effect in effects]
 
@@ -161,7 +164,7 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
             return model
         return bench.score(model.effects, result)
 
-    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(model) for model in models))
+    return side_by_side(one, models, n_jobs, bench.threads)
 
 
 def followed(bench: Workbench, look: Look, promising: bool, finish: bool = True) -> Scored:

@@ -23,7 +23,7 @@ from rigsight.diagnose.windows import Windowing
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitMemory, characteristic_scales, linear_start
+from rigsight.identify import FitMemory, IdleThreads, characteristic_scales, linear_start
 from rigsight.simulate import Structure
 
 _SIGNIFICANT = 3.0
@@ -157,7 +157,7 @@ def _singly(
     say: Callable[[str], None],
     memory: FitMemory | None,
 ) -> _Singly:
-    bench = _bench(task, noise, windowing, memory)
+    bench = _bench(task, noise, windowing, memory, IdleThreads(n_jobs))
     linear = fit_linear(bench, bench.start)
     if not linear.residuals:
         raise SimulationError(
@@ -196,7 +196,7 @@ def _cut(task: Task, noise: Mapping[str, float], models: _Singly, n_jobs: int) -
     """Return the models in windows of a few cycles."""
     output = task.rig.outputs[0].name
     windowing = Windowing.by_cycles(output, noise[output])
-    bench = _bench(task, noise, windowing, models.bench.memory)
+    bench = _bench(task, noise, windowing, models.bench.memory, models.bench.threads)
     linear = fit_linear(bench, models.linear.fit.values)
     singles = fitted_in_windows(bench, linear, models.singles, n_jobs)
     before = _before(task, bench, linear) if linear.residuals else models.before
@@ -210,7 +210,11 @@ def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
 
 
 def _bench(
-    task: Task, noise: Mapping[str, float], windowing: Windowing, memory: FitMemory | None
+    task: Task,
+    noise: Mapping[str, float],
+    windowing: Windowing,
+    memory: FitMemory | None,
+    threads: IdleThreads,
 ) -> Workbench:
     start = _start(task)
     fitted = windowing.cut(task.estimation)
@@ -225,6 +229,7 @@ def _bench(
         start=start,
         modelled=task.modelled,
         memory=memory,
+        threads=threads,
     )
 
 

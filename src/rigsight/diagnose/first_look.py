@@ -16,9 +16,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import start_values, with_own_values
 from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Workbench
@@ -203,7 +203,7 @@ def widened(
         return replace(look, fits=_on_whole_records(bench, look.structure, look.free, look.fits, substeps))
 
     near = [look for look in looks if look.nearest <= _NEAR * lowest]
-    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(look) for look in near))
+    return side_by_side(one, near, n_jobs, bench.threads)
 
 
 def looked_again(

@@ -16,10 +16,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from rigsight.diagnose.characterize import finished, followed, refine
 from rigsight.diagnose.first_look import Look, look_at, widened
+from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure, carried_over
@@ -214,7 +214,7 @@ def _more_general(
         (wide,) = widened(bench, [look], substeps=pair.fit.substeps)
         return followed(bench, wide, promising=wide.cost <= pair.fit.cost, finish=False)
 
-    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(swap) for swap in swaps))
+    return side_by_side(one, swaps, n_jobs, bench.threads)
 
 
 def _alike(one: Scored, other: Scored) -> bool:
@@ -251,13 +251,13 @@ def _pairs(
     def one(effect: Effect) -> Look:
         return look_at(bench, (*parent.effects, effect), base, {}, substeps=steps(effect))
 
-    looks = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(effect) for effect in partners))
+    looks = side_by_side(one, partners, n_jobs, bench.threads)
     near = min((look.nearest for look in looks), default=float("inf"))
 
     def wide(look: Look) -> list[Look]:
         return widened(bench, [look], substeps=steps(look.effects[-1]), lowest=near)
 
-    found = Parallel(n_jobs=n_jobs, prefer="threads")(delayed(wide)(look) for look in looks)
+    found = side_by_side(wide, looks, n_jobs, bench.threads)
     looks = sorted(itertools.chain.from_iterable(found), key=_cost)[:_BOTH_WAYS]
 
     def other_way(found: Look) -> Look:
@@ -269,7 +269,7 @@ def _pairs(
         (wider,) = widened(bench, [turned], substeps=substeps)
         return min(found, replace(wider, effects=found.effects), key=_cost)
 
-    looks = list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(other_way)(found) for found in looks))
+    looks = side_by_side(other_way, looks, n_jobs, bench.threads)
     lowest = min((found.cost for found in looks), default=float("inf"))
     worth = min(_WORTH_FOLLOWING * base.cost, _NEAR_THE_BEST * lowest)
     promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
@@ -277,11 +277,7 @@ def _pairs(
     def follow(found: Look) -> Scored:
         return followed(bench, found, promising=True, finish=False)
 
-    return list(
-        Parallel(n_jobs=n_jobs, prefer="threads")(
-            delayed(follow)(found) for found in promising[:_MOST_FOLLOWED]
-        )
-    )
+    return side_by_side(follow, promising[:_MOST_FOLLOWED], n_jobs, bench.threads)
 
 
 def _cost(found: Look) -> float:

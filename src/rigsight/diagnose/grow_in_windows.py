@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from joblib import Parallel, delayed
-
 from rigsight.diagnose.chance import scored_in_windows
 from rigsight.diagnose.first_look import looked_from
+from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 
@@ -44,7 +43,7 @@ def pairs_in_windows(
     def one(pair: Scored) -> Scored:
         return _fitted(bench, windows, linear, pair)
 
-    return list(Parallel(n_jobs=n_jobs, prefer="threads")(delayed(one)(pair) for pair in nearest))
+    return side_by_side(one, nearest, n_jobs, bench.threads)
 
 
 def _fitted(bench: Workbench, windows: Workbench, linear: Scored, pair: Scored) -> Scored:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
-from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit
+from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
@@ -78,6 +78,8 @@ class Workbench:
         Effects that the simulation in question has already; every candidate is added to them.
     memory
         Where the outcomes of fits are kept.
+    threads
+        Who helps with the records of a fit.
     """
 
     rig: Rig
@@ -90,6 +92,7 @@ class Workbench:
     start: Mapping[str, float] = field(default_factory=dict)
     modelled: tuple[Effect, ...] = ()
     memory: FitMemory | None = None
+    threads: IdleThreads = field(default_factory=IdleThreads)
 
     @property
     def period(self) -> float:
@@ -100,7 +103,7 @@ class Workbench:
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
     ) -> GreyBoxFit:
         """Return the fit of a structure to records, with the bench's scales and noise."""
-        return GreyBoxFit(structure, records, self.scales, self.noise, accuracy, self.memory)
+        return GreyBoxFit(structure, records, self.scales, self.noise, accuracy, self.memory, self.threads)
 
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
         """Return the equations of the simulation in question with effects added."""

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.frequency.frequency_response import FrequencyResponse
 from rigsight.frequency.signal_pair import (
+    among,
     check_resolution,
     excited,
     hold_response,
@@ -47,6 +48,7 @@ def local_polynomial_response(
     transient: bool = True,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
+    wanted: NDArray[np.float64] | None = None,
 ) -> FrequencyResponse:
     """Return the frequency response with a polynomial of the frequency fitted around each line.
 
@@ -70,6 +72,8 @@ def local_polynomial_response(
         input that was commanded (see `hold_response`).
     band
         Limits [rad/s]; None takes all that the source excites.
+    wanted
+        Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
 
     Returns
     -------
@@ -89,7 +93,7 @@ def local_polynomial_response(
     well, ``transient=False`` is better still; without rest it is biased, and its variance does not tell.
     """
     return _local_response(
-        record, source, response, order, 0, bandwidth, transient, hold, band, "local polynomial"
+        record, source, response, order, 0, bandwidth, transient, hold, band, wanted, "local polynomial"
     )
 
 
@@ -103,6 +107,7 @@ def local_rational_response(
     transient: bool = True,
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
+    wanted: NDArray[np.float64] | None = None,
 ) -> FrequencyResponse:
     """Return the frequency response with a rational function of the frequency fitted around each line.
 
@@ -126,6 +131,8 @@ def local_rational_response(
         input that was commanded (see `hold_response`).
     band
         Limits [rad/s]; None takes all that the source excites.
+    wanted
+        Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
 
     Returns
     -------
@@ -145,7 +152,7 @@ def local_rational_response(
     the variance may be several times too small.
     """
     return _local_response(
-        record, source, response, order, order, bandwidth, transient, hold, band, "local rational"
+        record, source, response, order, order, bandwidth, transient, hold, band, wanted, "local rational"
     )
 
 
@@ -159,6 +166,7 @@ def _local_response(
     transient: bool,
     hold: Hold,
     band: tuple[float, float] | None,
+    wanted: NDArray[np.float64] | None,
     method: str,
 ) -> FrequencyResponse:
     if order < 0:
@@ -181,6 +189,12 @@ def _local_response(
         )
     smoothed = np.convolve(np.abs(U) ** 2, np.ones(width) / width, mode="same")
     lines = np.flatnonzero(excited(omega, smoothed, band, f"{what}: the source '{source}'"))
+    if wanted is not None:
+        lines = lines[among(omega[lines], wanted)]
+        if not lines.size:
+            raise InputError(
+                f"{what} does not excite any of the frequencies at which its response is wanted."
+            )
     parts = [
         _solve(U, Y, lines[start : start + _CHUNK], half, order, poles, transient)
         for start in range(0, lines.size, _CHUNK)

@@ -55,6 +55,20 @@ def line_frequencies(n_samples: int, dt: float) -> NDArray[np.float64]:
     return np.asarray(lines * (2.0 * math.pi / (n_samples * dt)), dtype=np.float64)
 
 
+def among(omega: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which frequencies are lines of another spectrum of records of the same length, shape (n_frequencies,).
+
+    Parameters
+    ----------
+    omega
+        Angular frequencies [rad/s], shape (n_frequencies,).
+    wanted
+        Those of the other spectrum, ascending, shape (n_wanted,).
+    """
+    nearest = wanted[np.clip(np.searchsorted(wanted, omega) - np.array([[1], [0]]), 0, wanted.size - 1)]
+    return np.asarray(np.min(np.abs(nearest - omega), axis=0) <= 1e-6 * omega)
+
+
 def hold_response(omega: NDArray[np.float64], dt: float, hold: Hold) -> NDArray[np.complex128]:
     """Return how a hold changes the ratio of sampled signals, shape (n_frequencies,).
 

@@ -20,6 +20,7 @@ from rigsight.identify.hysteresis import calibrate_to_records as calibrate_to_re
 from rigsight.identify.hysteresis import calibrate_to_responses as calibrate_to_responses
 from rigsight.identify.hysteresis import derived_quantities as derived_quantities
 from rigsight.identify.hysteresis import loop_area as loop_area
+from rigsight.identify.idle_threads import IdleThreads as IdleThreads
 from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
@@ -44,6 +45,7 @@ __all__ = [
     "FitMemory",
     "FitResult",
     "GreyBoxFit",
+    "IdleThreads",
     "JointFit",
     "KindFit",
     "LoopArea",

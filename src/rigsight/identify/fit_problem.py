@@ -6,17 +6,22 @@ one are its lanes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP, Coordinates
+from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
 from rigsight.simulate import Structure, Substeps, choose_substeps, simulate_sets, state_limits
 from rigsight.simulate.input_hold import HeldInput
+
+Result = TypeVar("Result")
 
 MOST_SUBSTEPS = 16
 """A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
@@ -66,6 +71,8 @@ class FitData:
         Characteristic size of each state, shape (n_states, 1).
     accuracy
         Relative accuracy of the simulations.
+    threads
+        Who helps with the records.
     """
 
     structure: Structure
@@ -73,6 +80,11 @@ class FitData:
     limited: NDArray[np.bool_]
     unlimited_sizes: NDArray[np.float64]
     accuracy: float
+    threads: IdleThreads = field(default_factory=IdleThreads)
+
+    def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
+        """Return what a function makes of the number of each record, in their order."""
+        return self.threads.results(one, [record.record.n_samples for record in self.records])
 
     def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
@@ -126,19 +138,24 @@ class Problem:
     def choose_substeps(self, theta: NDArray[np.float64]) -> None:
         """Choose the substeps of each record from the accuracy wish at these coordinates."""
         p = self.coordinates.to_parameters(theta[: self.n_free])
-        for i, (record, state) in enumerate(zip(self.data.records, self.states(theta), strict=True)):
+        states = self.states(theta)
+
+        def chosen(index: int) -> Substeps:
+            record = self.data.records[index]
             try:
-                self.substeps[i] = choose_substeps(
+                return choose_substeps(
                     self.data.structure,
                     record.held,
                     p,
-                    state,
+                    states[index],
                     record.record.n_samples,
                     self.data.accuracy,
                     MOST_SUBSTEPS,
                 )
             except SimulationError:
-                self.substeps[i] = Substeps(MOST_SUBSTEPS)
+                return Substeps(MOST_SUBSTEPS)
+
+        self.substeps = self.data.of_each_record(chosen)
 
     def refined(self, theta: NDArray[np.float64]) -> bool:
         """Double the substeps if the cost would then fall further from here; return True if so."""
@@ -182,13 +199,20 @@ class Problem:
             return self._last
         n = theta.size
         normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
-        for index, (residual, derivative) in enumerate(self.sensitivities(theta)):
+        sensitivity = self._sensitivity(theta)
+
+        def products(index: int) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+            residual, derivative = sensitivity(index)
+            with np.errstate(over="ignore", invalid="ignore"):
+                return float(residual @ residual), derivative.T @ derivative, derivative.T @ residual
+
+        for index, (squares, square, projection) in enumerate(self.data.of_each_record(products)):
             columns = self._columns(index)
             # A diverging simulation overflows here; that is what the check below is for.
             with np.errstate(over="ignore", invalid="ignore"):
-                cost += float(residual @ residual)
-                normal[np.ix_(columns, columns)] += derivative.T @ derivative
-                gradient[columns] += derivative.T @ residual
+                cost += squares
+                normal[np.ix_(columns, columns)] += square
+                gradient[columns] += projection
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
         self._best = min(self._best, cost)
@@ -204,6 +228,12 @@ class Problem:
         self, theta: NDArray[np.float64]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
+        return self.data.of_each_record(self._sensitivity(theta))
+
+    def _sensitivity(
+        self, theta: NDArray[np.float64]
+    ) -> Callable[[int], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return what makes the sensitivities of a record, given its number."""
         shifts = np.where(theta + STEP > self.upper, -STEP, STEP)
         base = self.coordinates.to_parameters(theta[: self.n_free])
         shifted = []
@@ -213,8 +243,9 @@ class Problem:
             shifted.append(self.coordinates.to_parameters(moved))
         p = np.column_stack([base, *shifted, *[base] * self.n_states])
         sizes = self.data.state_sizes(p)
-        results = []
-        for index, record in enumerate(self.data.records):
+
+        def one(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            record = self.data.records[index]
             columns = self._columns(index)
             step = shifts[columns]
             places = np.repeat(theta[columns[self.n_free :], None], p.shape[1], axis=1)
@@ -225,20 +256,27 @@ class Problem:
                 out = simulate_sets(
                     self.data.structure, record.held, p, x0, record.record.n_samples, self.substeps[index]
                 )
-                results.append(weighted(record, out, step))
-        return results
+                return weighted(record, out, step)
+
+        return one
 
 
 def weighted(
     record: RecordData, out: NDArray[np.float64], step: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return weighted residuals (n,) of the first lane and, of the others, their derivatives (n, n_lanes - 1)."""
-    residuals, derivatives = [], []
-    for i, weight in enumerate(record.weights):
-        if weight > 0.0:
-            residuals.append((record.measured[:, i] - out[:, i, 0]) * weight)
-            derivatives.append((out[:, i, :1] - out[:, i, 1:]) * (weight / step))
-    return np.concatenate(residuals), np.concatenate(derivatives)
+    used = np.flatnonzero(record.weights > 0.0)
+    n_samples, _, n_lanes = out.shape
+    residuals = np.empty(used.size * n_samples)
+    derivatives = np.empty((used.size * n_samples, n_lanes - 1))
+    for place, i in enumerate(used):
+        # In place: these are the largest arrays of a fit, and every copy goes through the memory.
+        rows = slice(place * n_samples, (place + 1) * n_samples)
+        np.subtract(record.measured[:, i], out[:, i, 0], out=residuals[rows])
+        residuals[rows] *= record.weights[i]
+        np.subtract(out[:, i, :1], out[:, i, 1:], out=derivatives[rows])
+        derivatives[rows] *= record.weights[i] / step
+    return residuals, derivatives
 
 
 def compressed(evaluation: Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,8 +1,7 @@
 """Output-error fit of a structure's parameters, initial states included, to any number of records at once.
 
-The residuals and their derivatives come from one call of the side-by-side integrator per record: the current parameters and
-every shifted one are its lanes. The optimizer is scipy's bounded trust-region least squares, fed with an equivalent
-compressed problem: it only uses J^T J, J^T r and r^T r, so a square root of J^T J stands for the tall Jacobian.
+The optimizer is scipy's bounded trust-region least squares, fed with an equivalent compressed problem: it only uses J^T J, J^T r
+and r^T r, so a square root of J^T J stands for the tall Jacobian.
 
 References
 ----------
@@ -27,6 +26,7 @@ from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit_problem import MOST_SUBSTEPS, FitData, Problem, RecordData
 from rigsight.identify.fit_result import FitResult
+from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.separate_states import SeparateStates
 from rigsight.records.record import Record
 from rigsight.simulate import (
@@ -49,7 +49,6 @@ _STATE_RANGE = 20.0
 _FIRST_SUBSTEPS = 4
 _FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
 """Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
-
 
 _Outcome = tuple[NDArray[np.float64], bool, str]
 """Coordinates and places where a search ended, whether it converged, and the optimizer's words."""
@@ -87,6 +86,8 @@ class GreyBoxFit:
         Relative accuracy of the simulations; the number of substeps follows from it.
     memory
         Where outcomes are kept; a fit that was done before is not done again, and comes out the same.
+    threads
+        Who helps with the records; None for the calling thread alone.
     """
 
     def __init__(
@@ -97,6 +98,7 @@ class GreyBoxFit:
         output_noise: Mapping[str, float],
         accuracy: float = DEFAULT_ACCURACY,
         memory: FitMemory | None = None,
+        threads: IdleThreads | None = None,
     ) -> None:
         self.structure = structure
         self.memory = memory
@@ -110,6 +112,7 @@ class GreyBoxFit:
             limited=np.array([equation.limit is not None for equation in structure.equations], dtype=bool),
             unlimited_sizes=np.array(sizes).reshape(-1, 1),
             accuracy=accuracy,
+            threads=threads or IdleThreads(),
         )
         self._problem: list[Any] = []
         if memory is not None:
@@ -344,11 +347,7 @@ class GreyBoxFit:
         covariance = np.full((n_free, n_free), np.nan)
         if finish:
             try:
-                residuals = tuple(
-                    d.measured
-                    - simulate_outputs(self.structure, d.held, p, s, d.record.n_samples, self.accuracy)
-                    for d, s in zip(self.data.records, states, strict=True)
-                )
+                residuals = tuple(self.data.of_each_record(lambda i: self._left(i, p, states[i])))
             except SimulationError as error:
                 return self._failed(coordinates, theta, str(error))
             cost = float(
@@ -374,6 +373,13 @@ class GreyBoxFit:
             covariance=covariance,
             residuals=residuals,
             substeps=tuple(problem.substeps),
+        )
+
+    def _left(self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return measured minus accurately simulated outputs of a record."""
+        d = self.data.records[index]
+        return d.measured - simulate_outputs(
+            self.structure, d.held, p, state, d.record.n_samples, self.accuracy
         )
 
 

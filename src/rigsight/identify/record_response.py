@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.errors import InputError, check_option
 from rigsight.frequency import (
@@ -56,7 +57,7 @@ class RecordResponse:
     narrowest
         Half-power width of the narrowest peak that the method follows at this resolution [rad/s].
     coherence
-        H1 with its coherence from segments of the same record; None where the record is too short for it.
+        H1 with its coherence from segments of the same record; None where it is not wanted or the record is too short for it.
     """
 
     response: FrequencyResponse
@@ -76,6 +77,8 @@ def record_response(
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
     least_clearness: float = _CLEAR,
+    with_coherence: bool = True,
+    wanted: NDArray[np.float64] | None = None,
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -98,6 +101,10 @@ def record_response(
         Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
     least_clearness
         Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
+    with_coherence
+        False where nobody reads the coherence: it takes as long as a third of a local model.
+    wanted
+        Frequencies [rad/s] that somebody reads; a local method leaves out other lines. None for all.
 
     Raises
     ------
@@ -108,7 +115,7 @@ def record_response(
     periodic, note = _mean_period(record)
     span = periodic.n_samples * periodic.dt
     line = 2.0 * math.pi / span
-    coherence = _coherence(record, source, response, hold)
+    coherence = _coherence(record, source, response, hold) if with_coherence else None
     shared = 1.0
     if method == "thesis":
         found, width = _thesis(periodic, source, response, order), line
@@ -120,7 +127,13 @@ def record_response(
         local = local_rational_response if method == "local_rational" else local_polynomial_response
         bandwidth = resolution or lines * line
         found = local(
-            periodic, source, response, bandwidth=bandwidth, transient=periodic is record, hold=hold
+            periodic,
+            source,
+            response,
+            bandwidth=bandwidth,
+            transient=periodic is record,
+            hold=hold,
+            wanted=wanted,
         )
         width, shared = line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
         found = _clear(found, lines, least_clearness)

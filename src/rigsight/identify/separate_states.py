@@ -74,7 +74,7 @@ class SeparateStates(Problem):
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
         p = self.coordinates.to_parameters(theta)
-        settled = [self._settled(i, p, place, _FEW_STEPS)[0] for i, place in enumerate(self.places)]
+        settled = self.data.of_each_record(lambda i: self._settled(i, p, self.places[i], _FEW_STEPS)[0])
         n = theta.size
         normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # a diverging simulation overflows here
@@ -94,15 +94,19 @@ class SeparateStates(Problem):
         """Let limited states try other places, and return the cost that is left."""
         self._last = None
         p = self.coordinates.to_parameters(theta)
-        total = 0.0
-        for i, place in enumerate(self.places):
+
+        def best(index: int) -> tuple[NDArray[np.float64], float]:
+            place = self.places[index]
             starts = [place]
             if np.any(self.data.limited):
                 starts += [np.where(self.data.limited, share, place) for share in _PLACES]
-            tried = [self._settled(i, p, start, _MANY_STEPS) for start in starts]
-            self.places[i], cost = min(tried, key=lambda found: found[1])
-            total += cost
-        return total
+            tried = [self._settled(index, p, start, _MANY_STEPS) for start in starts]
+            return min(tried, key=lambda found: found[1])
+
+        found = self.data.of_each_record(best)
+        for index, (place, _) in enumerate(found):
+            self.places[index] = place
+        return sum((cost for _, cost in found), start=0.0)
 
     def _settled(
         self, index: int, p: NDArray[np.float64], place: NDArray[np.float64], most: int

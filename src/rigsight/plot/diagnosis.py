@@ -24,6 +24,7 @@ from rigsight.plot.drawing import (
     plain_log_ticks,
     set_margins,
     shown_in,
+    text_width,
 )
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 _WIDTH = 5.4
 """Inch; on a phone, where it is scaled to the screen, letters stay readable."""
+_NAMES = 9.0
+"""Size of letters beside bars [points]."""
 _DETAIL_PERIODS = 5.0
 _DETAIL_SHARE = 1.0 / 12.0
 _DETAIL_MIN_SAMPLES = 60
@@ -120,7 +123,7 @@ def gap_budget(
         False where no simulation was given: the waterfall then starts at the identified equations.
     """
     outputs = list(diagnosis.gap)
-    figure = new_figure(_WIDTH, 0.45 + 1.75 * max(1, len(outputs)))
+    figure = new_figure(_WIDTH, 0.45 + 1.75 * max(1, len(outputs)), layout=None)
     axes = figure.subplots(max(1, len(outputs)), 1, squeeze=False)[:, 0]
     for ax, output in zip(axes, outputs, strict=False):
         gap = diagnosis.gap[output]
@@ -154,6 +157,8 @@ def gap_budget(
         ax.grid(axis="x")
         ax.set_axisbelow(True)
     axes[-1].set_xlabel("gap [% of the measured RMS]")
+    names = ["Given simulation", "Re-identified", after_label]
+    set_margins(figure, 0.14 + text_width(names, _NAMES), 0.1, 0.48, 0.42, between=(0.0, 0.66))
     return figure
 
 
@@ -183,7 +188,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         Candidates drawn, best first.
     """
     candidates = diagnosis.candidates[:limit]
-    figure = new_figure(_WIDTH, 0.95 + 0.27 * max(1, len(candidates)))
+    figure = new_figure(_WIDTH, 0.85 + 0.27 * max(1, len(candidates)), layout=None)
     ax = figure.subplots()
     finite = [c.excess for c in candidates if np.isfinite(c.excess) and c.excess > 0.0]
     left, right = min([1.0, *finite]) / 1.04, max([1.5, *finite])
@@ -211,6 +216,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     ax.grid(axis="x")
     ax.set_axisbelow(True)
     ax.set_xlabel("RMS left over / noise floor (dashed: 1, perfect)")
+    set_margins(figure, 0.14 + text_width(names[: len(candidates)], _NAMES), 0.1, 0.48, 0.08)
     return figure
 
 
@@ -222,7 +228,6 @@ def comparison(
     window: slice | None = None,
     after_label: str = "after",
     stages: Mapping[Stage, str] | None = None,
-    marked: slice | None = None,
 ) -> Figure:
     """Draw measured against simulated, by default given and after, with the residuals below.
 
@@ -240,8 +245,6 @@ def comparison(
         What the simulation after the diagnosis is called in the legend.
     stages
         What is drawn instead of given and after, with its name in the legend.
-    marked
-        Samples to mark with a bar in a drawing of the whole record.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -259,11 +262,11 @@ def comparison(
     figure = new_figure(width, height, layout=None)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     set_margins(figure, 0.66, 0.14, 0.46, 0.34, between=(0.0, 0.15))
-    line(top, *_printed(t, measured * factor), MEASURED, "measured", linewidth=2.6, alpha=0.55)
+    line(top, *printed(t, measured * factor), MEASURED, "measured", linewidth=2.6, alpha=0.55)
     for stage, error in errors.items():
         look = STAGE_STYLES[stage]
-        line(top, *_printed(t, (measured + error) * factor), label=names[stage], linewidth=1.0, **look)
-        line(bottom, *_printed(t, error * error_factor), color=look["color"], linewidth=0.8)
+        line(top, *printed(t, (measured + error) * factor), label=names[stage], linewidth=1.0, **look)
+        line(bottom, *printed(t, error * error_factor), color=look["color"], linewidth=0.8)
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), None)
     if floor is not None and np.isfinite(floor):
         bottom.axhspan(
@@ -279,18 +282,11 @@ def comparison(
         ax.xaxis.set_major_locator(MaxNLocator(4 if window else 9))
     if not window:
         figure.legend(loc="upper left", ncols=3, fontsize=8.5, handlelength=2.2, columnspacing=1.4)
-    if marked is not None:
-        _mark_detail(top, trace, marked)
     return figure
 
 
-def _printed(
+def printed(
     t: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a line over time with as many points as paper shows; where it is not finite, there is a gap."""
     return envelope(t, np.where(np.isfinite(values), values, np.nan), _BINS)
-
-
-def _mark_detail(ax: Axes, trace: Trace, window: slice) -> None:
-    ax.axvspan(
-        trace.t[window.start], trace.t[window.stop - 1], ymin=0.0, ymax=0.025, color=FLOOR, linewidth=0
-    )

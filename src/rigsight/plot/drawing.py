@@ -7,7 +7,7 @@ their last reference.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
@@ -66,6 +66,8 @@ STYLE: dict[Any, Any] = {
 _PREFIXES = {6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
 _PREFIXED = ("rad", "m", "N", "N m", "A", "V", "Pa", "W", "K")
 _ENVELOPE_BINS = 600
+_POINTS = 72.0
+"""In an inch."""
 _LABEL = 0.17
 """From the edge of a figure to where the label of an axis ends [inch]."""
 
@@ -151,10 +153,8 @@ def envelope(
     return t[keep], values[keep]
 
 
-def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
-    """Label decades and, where they are few, numbers between, as people write them; scientific notation beyond 10^4."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
+def log_ticks(left: float, right: float) -> tuple[list[float], list[str]]:
+    """Return decades and, where they are few, numbers between, as people write them; scientific notation beyond 10^5."""
     decades = range(int(np.floor(np.log10(left))), int(np.ceil(np.log10(right))) + 1)
     span = np.log10(right / left)
     multiples = (1, 1.1, 1.2, 1.5, 2, 3, 5) if span < 0.7 else ((1, 2, 5) if span < 2.5 else (1,))
@@ -162,9 +162,17 @@ def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
     ticks = [tick for tick in ticks if left <= tick <= 1.15 * right]
     step = max(1, len(ticks) // 8)
     ticks = ticks[::step]
+    return ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks]
+
+
+def plain_log_ticks(ax: Axes, left: float, right: float) -> None:
+    """Label a logarithmic axis by `log_ticks`."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    ticks, labels = log_ticks(left, right)
     ax.xaxis.set_major_locator(FixedLocator(ticks))
     ax.xaxis.set_minor_locator(NullLocator())
-    ax.set_xticks(ticks, [f"{tick:g}" if tick < 1e5 else f"1e{int(np.log10(tick))}" for tick in ticks])
+    ax.set_xticks(ticks, labels)
 
 
 def line(
@@ -233,6 +241,16 @@ def set_margins(
     for ax in figure.axes:
         ax.yaxis.set_label_coords((_LABEL - left) / each_width, 0.5)
         ax.xaxis.set_label_coords(0.5, (_LABEL - bottom) / (ax.get_position().height * height))
+
+
+def text_width(texts: Iterable[str], size: float) -> float:
+    """Return the width of the longest of some texts [inch] in letters of this size [points]."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(family=STYLE["font.family"], size=size)
+    widths = (text_to_path.get_text_width_height_descent(text, font, ismath=False)[0] for text in texts)
+    return max(widths, default=0.0) / _POINTS
 
 
 def svg_text(figure: Figure, key: str) -> str:

@@ -123,7 +123,7 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "
     figure = new_figure(width, height, layout=None)
     axes = figure.subplots(1, len(columns), squeeze=False)[0]
     set_margins(figure, 0.72, 0.12, 0.48, 0.35 + 0.2 * legend_rows, between=(0.75, 0.0))
-    colors = dict(zip(labels, _colors(len(labels)), strict=True))
+    colors = dict(zip(labels, amplitude_colors(len(labels)), strict=True))
     for ax, panels in zip(axes, columns, strict=True):
         values = []
         for panel in panels:
@@ -167,7 +167,8 @@ def thinned(measured: FrequencyResponse, most_lines: int = _MOST_LINES) -> Frequ
     return measured.at(kept)
 
 
-def _colors(count: int) -> list[str]:
+def amplitude_colors(count: int) -> list[str]:
+    """Return as many colors in order, from the smallest amplitude to the largest."""
     from matplotlib.colors import LinearSegmentedColormap, to_hex
 
     scale = LinearSegmentedColormap.from_list("amplitudes", _FACES)
@@ -233,10 +234,15 @@ def _phase(ax: Axes, panel: Panel) -> None:
 
 
 def limit(ax: Axes, values: NDArray[np.float64]) -> None:
-    """Let a few wild lines, or a band that reaches zero, not press the rest of the curve flat."""
+    """Give an axis the limits of `seen`."""
+    ax.set_ylim(*seen(values))
+
+
+def seen(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return limits at which a few wild lines, or a band that reaches zero, do not press the rest of the curve flat."""
     low, high = np.percentile(values[np.isfinite(values)], [0.5, 100.0])
     margin = 0.08 * max(high - low, 3.0)
-    ax.set_ylim(low - margin, high + margin)
+    return float(low - margin), float(high + margin)
 
 
 def log_axis(ax: Axes, responses: Sequence[FrequencyResponse]) -> None:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 _WIDTH = 5.4
 _LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
 """Room for labels and ticks, and for a line of a legend [inch]."""
+_STATES_HEIGHT = 3.0
+_BAR_ROOM = 0.84
+"""Room beside a map for the bar that tells its colors, with numbers and label [inch]."""
 _DASHES = (0, (4, 2))
 _PERCENT = 100.0
 _SHADES = 15
@@ -229,8 +232,9 @@ def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
         Symbol of the displacement.
     """
     with_force = any(np.isfinite(part.force_mean) for part in parts)
-    figure = new_figure(_WIDTH, 3.0)
+    figure = new_figure(_WIDTH, _STATES_HEIGHT, layout=None)
     axes = figure.subplots(1, 2 if with_force else 1, squeeze=False, sharey=True)[0]
+    set_margins(figure, 0.7, _BAR_ROOM, 0.46, 0.3, between=(_BAR_ROOM + 0.12, 0.0))
     _plane(axes[0], parts, [_PERCENT * part.reidentified for part in parts], "viridis", False, "error [%]")
     axes[0].set_title(f"error of {output}")
     if with_force:
@@ -285,7 +289,9 @@ def _plane(
     ax.set_ylim(min(p.v_low for p in parts), max(p.v_high for p in parts))
     ax.locator_params(nbins=5)
     ax.set_facecolor("#f1f3f4")
-    bar = ax.figure.colorbar(collection, ax=ax, shrink=0.9, pad=0.02)
+    box = ax.get_position()
+    beside = ax.figure.add_axes((box.x1 + 0.07 / _WIDTH, box.y0, 0.11 / _WIDTH, box.height))
+    bar = ax.figure.colorbar(collection, cax=beside)
     bar.set_label(label)
     bar.outline.set_visible(False)
     bar.ax.tick_params(color=MEASURED)

@@ -22,8 +22,9 @@ from rigsight.report.charts import (
     curve_names,
     points_per_curve,
 )
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.figures import PageFigure
 from rigsight.report.quantities import gap_percent
+from rigsight.report.record_drawings import time_drawing, with_unit
 from rigsight.report.response_charts import response_chart
 from rigsight.report.responses import PathResponse
 from rigsight.report.sections import output_label
@@ -128,7 +129,7 @@ def _time_chart(
     floor = next((f.std for f in diagnosis.noise_floors if f.output == output), math.nan)
     panels = [
         ChartPanel(
-            _with_unit(output, scale.unit),
+            with_unit(output, scale.unit),
             3,
             [
                 _curve("measured", trace, measured * scale.factor, most_points),
@@ -137,7 +138,7 @@ def _time_chart(
             cap=(scale.factor * (low - span), scale.factor * (high + span)),
         ),
         ChartPanel(
-            _with_unit("error", error_scale.unit),
+            with_unit("error", error_scale.unit),
             2,
             [_curve(s, trace, errors[s] * error_scale.factor, most_points) for s in stages],
             cap=(-2.0 * span * error_scale.factor, 2.0 * span * error_scale.factor),
@@ -178,10 +179,6 @@ def _time_chart(
     )
 
 
-def _with_unit(name: str, unit: str) -> str:
-    return name if unit in ("", "1") else f"{name} [{unit}]"
-
-
 def _curve(of: str, trace: Trace, values: NDArray[np.float64], most_points: int) -> Curve:
     x, y = plot.envelope(trace.t, np.where(np.isfinite(values), values, np.nan), most_points // 2)
     return Curve(of, x, y)
@@ -198,25 +195,23 @@ def _drawings(
     drawn = _stages_drawn(diagnosis)
     has_detail = trace.role == diagnosis.scored_on or plot.step_window(trace, output) is not None
     what = f"{output_label(diagnosis, output)}, record {trace.record}"
-    whole = page_figure(
-        plot.comparison(
-            diagnosis,
-            trace,
-            output,
-            stages=drawn,
+    whole = PageFigure(
+        f"{key}-whole",
+        time_drawing(
+            diagnosis, trace, output, drawn, f"{key}-whole",
+            f"Measured and simulated {what}, {' and '.join(drawn.values())}, with the errors below.",
             marked=window if has_detail else None,
         ),
-        f"{key}-whole",
-        f"Measured and simulated {what}, {' and '.join(drawn.values())}, with the errors below.",
         "The black bar marks the detail." if has_detail else "",
-    )
+    )  # fmt: skip
     if not has_detail:
         return (whole,)
     span = f"{detail.low:.4g} s to {detail.high:.4g} s"
-    near = page_figure(
-        plot.comparison(diagnosis, trace, output, window, stages=drawn),
+    near = PageFigure(
         f"{key}-detail",
-        f"Detail of {what} from {span}.",
+        time_drawing(
+            diagnosis, trace, output, drawn, f"{key}-detail", f"Detail of {what} from {span}.", window=window
+        ),
         sentence_case(f"{detail.title.removeprefix('Show ')}: {span}."),
     )
     return whole, near

@@ -7,18 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight import plot
 from rigsight.diagnose.result import STAGES, Diagnosis, Stage
 from rigsight.frequency import FrequencyResponse
-from rigsight.plot.drawing import STAGE_STYLES
 from rigsight.plot.frequency_responses import TWO_SIDED, decibel, thinned
 from rigsight.report.charts import Chart, ChartPanel, Curve, chart_data, curve_names
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.figures import PageFigure
+from rigsight.report.record_drawings import beside, overlaid_drawing, response_drawing
 from rigsight.report.responses import PathResponse
 from rigsight.report.wording import sentence_case, told_unit
 
-_PRINTED_LINES = 200
-"""Lines of a response in a static drawing."""
 _BELOW = 3.0
 """Decibel below the lowest measured line that are still shown, and above the highest."""
 
@@ -71,19 +68,12 @@ def response_chart(record: str, response: PathResponse, names: Mapping[str, str]
         ),
     ]
     title = f"Frequency response {path} on record {record}, measured and simulated"
-    drawing = plot.model_responses(
-        [
-            plot.ResponsesPanel(
-                path,
-                thinned(response.measured, _PRINTED_LINES),
-                {names[stage]: thinned(response.simulated[stage], _PRINTED_LINES) for stage in stages},
-            )
-        ],
-        {names[stage]: STAGE_STYLES[stage] for stage in stages},
+    drawing = response_drawing(
+        path, response, {stage: names[stage] for stage in stages}, f"{key}-drawing", f"{title}. {said}"
     )
     return Chart(
         key,
-        (page_figure(drawing, f"{key}-drawing", f"{title}. {said}", f"{title}."),),
+        (PageFigure(f"{key}-drawing", drawing, f"{title}."),),
         chart_data(title, ("\u03c9", "rad/s"), panels, names, log=True),
         f"Frequency response {path}, measured and simulated by the same estimator; the band is the 95 % interval of the "
         f"measured one. {said}",
@@ -121,17 +111,11 @@ def amplitude_figures(
 def _overlaid(
     labeled: list[tuple[str, PathResponse]], stage: Stage, name: str, arrow: str, key: str
 ) -> PageFigure:
-    panels = [
-        plot.Panel(
-            sentence_case(name), thinned(response.measured, _PRINTED_LINES), _dashed(response, stage), label
-        )
-        for label, response in labeled
-    ]
     told = ", ".join(f"{response.decibel[stage]:.2g} dB at {label}" for label, response in labeled)
-    return page_figure(
-        plot.overlaid_responses([panels], "simulated"),
+    alt = f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {told}."
+    return PageFigure(
         key,
-        f"Magnitude of {arrow} at each amplitude, measured against {name}. RMS distance: {told}.",
+        overlaid_drawing(sentence_case(name), labeled, stage, key, alt),
         f"Measured (solid) against {name} (dashed). RMS distance: {told}.",
     )
 
@@ -154,11 +138,6 @@ def _by_amplitude(
                 labels.append(label if again == 1 else f"{label} ({again})")
                 found.append((labels[-1], response))
     return found
-
-
-def _dashed(response: PathResponse, stage: Stage) -> plot.FittedCurve:
-    curve = thinned(response.simulated[stage], _PRINTED_LINES)
-    return plot.FittedCurve(curve.omega, curve.values, np.zeros(curve.omega.size), stage)
 
 
 def _band(measured: FrequencyResponse, middle: NDArray[np.float64], *, degrees: bool) -> list[Curve]:
@@ -185,6 +164,4 @@ def _phase(
     stage: Stage, simulated: FrequencyResponse, omega: NDArray[np.float64], phase: NDArray[np.float64]
 ) -> Curve:
     curve = thinned(simulated)
-    near = np.interp(curve.omega, omega, phase)
-    # The branch next to the measured phase: a turn of 360 degrees is no difference.
-    return Curve(stage, curve.omega, near + (np.degrees(curve.phase) - near + 180.0) % 360.0 - 180.0)
+    return Curve(stage, curve.omega, beside(curve, omega, phase))

@@ -55,7 +55,14 @@ def windowed_response(
         hold = window.hold if path.is_commanded else "band_limited"
         try:
             found = record_response(
-                window, path.source, path.response, path.order, method, hold=hold, least_clearness=0.0
+                window,
+                path.source,
+                path.response,
+                path.order,
+                method,
+                hold=hold,
+                least_clearness=0.0,
+                with_coherence=False,
             ).response
         except InputError as error:
             problem = f" {error}"

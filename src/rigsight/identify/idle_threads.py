@@ -1,0 +1,91 @@
+"""Which threads help with the records of one fit? Those that no other fit keeps busy.
+
+Candidates are fitted side by side as long as there are as many of them as jobs. Before the first and after the last of them, and
+where one takes far longer than the others, the jobs that are left take a share of the records of a fit that runs: simulations
+do not hold the interpreter. What is computed, and the order in which it is summed, is the same with any number of jobs.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+
+class IdleThreads:
+    """The threads of a number of jobs.
+
+    Parameters
+    ----------
+    n_jobs
+        Threads that may compute at the same time, the one that asks among them.
+    """
+
+    def __init__(self, n_jobs: int = 1) -> None:
+        self._n_jobs = n_jobs
+        self._lock = threading.Lock()
+        self._busy = 0
+        # Threads are started when they are first needed, and end with their last reference.
+        self._pool = ThreadPoolExecutor(n_jobs - 1) if n_jobs > 1 else None
+
+    @contextmanager
+    def one_busy(self) -> Iterator[None]:
+        """Count the thread that calls as busy: it works on a fit of its own beside others."""
+        with self._lock:
+            self._busy += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._busy -= 1
+
+    def results(self, one: Callable[[int], Result], sizes: Sequence[int]) -> list[Result]:
+        """Return what a function makes of each of some numbers ``0, 1, ...``, in their order.
+
+        Parameters
+        ----------
+        one
+            Called for each number, by any thread.
+        sizes
+            How much work each is, in any unit.
+        """
+        free = self._borrowed(len(sizes) - 1)
+        if not free or self._pool is None:
+            return [one(index) for index in range(len(sizes))]
+        try:
+            own, *others = _shares(sizes, 1 + free)
+            waiting = [self._pool.submit(_each, one, share) for share in others]
+            found = dict(_each(one, own))
+            for helped in waiting:
+                found.update(helped.result())
+        finally:
+            with self._lock:
+                self._busy -= free
+        return [found[index] for index in range(len(sizes))]
+
+    def _borrowed(self, most: int) -> int:
+        """Count as many idle threads as busy as can help, and return their number."""
+        with self._lock:
+            # A thread that was not counted is the only one that works.
+            free = max(0, min(most, self._n_jobs - max(1, self._busy)))
+            self._busy += free
+        return free
+
+
+def _each(one: Callable[[int], Result], numbers: Sequence[int]) -> list[tuple[int, Result]]:
+    return [(index, one(index)) for index in numbers]
+
+
+def _shares(sizes: Sequence[int], count: int) -> list[list[int]]:
+    """Return numbers in shares of about the same size: the largest first, each to who has least."""
+    shares: list[list[int]] = [[] for _ in range(count)]
+    loads = [0] * count
+    for index in sorted(range(len(sizes)), key=lambda i: -sizes[i]):
+        least = loads.index(min(loads))
+        shares[least].append(index)
+        loads[least] += sizes[index]
+    return shares
