@@ -64,15 +64,15 @@ class FitData:
         Which states cannot leave a range, shape (n_states,).
     unlimited_sizes
         Characteristic size of each state, shape (n_states, 1).
-    accuracy
-        Relative accuracy of the simulations.
+    accuracies
+        Relative accuracy of the simulations of each record.
     """
 
     structure: Structure
     records: tuple[RecordData, ...]
     limited: NDArray[np.bool_]
     unlimited_sizes: NDArray[np.float64]
-    accuracy: float
+    accuracies: tuple[float, ...]
 
     def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
@@ -134,7 +134,7 @@ class Problem:
                     p,
                     state,
                     record.record.n_samples,
-                    self.data.accuracy,
+                    self.data.accuracies[i],
                     MOST_SUBSTEPS,
                 )
             except SimulationError:
