@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.hysteresis import LOOPS
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
 from rigsight.identify import FitResult, GreyBoxFit
@@ -159,12 +159,13 @@ class Bench:
         own |= candidate.inner
         own |= {name: share * coefficient for name, share in candidate.linear.items()}
         found: dict[str, float] = {}
-        if effect.name in LOOPS:
+        if is_loop(effect):
+            assert effect.elastic_share is not None
             stiffness = self.rig.motion.stiffness.name
             without = max(values[stiffness], _SMALL * coefficient)
             total = without + max(coefficient, _SMALL * without)
             found[stiffness] = total
-            own["a"] = without / total
+            own[effect.elastic_share] = without / total
         for parameter in effect.parameters:
             if parameter.name in candidate.linear and parameter.lower == 0.0:
                 # A resisting force that the regression turns round is one that is hardly there.
