@@ -136,7 +136,7 @@ def candidates(
     sign = -1.0 if driven else 1.0
     plain = [effect for effect in effects if _is_plain(effect)]
     found = []
-    for effect, column in zip(plain, _library_columns(plain, motions, rows, scales), strict=True):
+    for effect, column in zip(plain, _library_columns(plain, motions, rows), strict=True):
         found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
     for effect in effects:
         if effect in plain:
@@ -192,7 +192,7 @@ def _is_plain(effect: Effect) -> bool:
 
 
 def _library_columns(
-    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows, scales: Mapping[str, float]
+    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows
 ) -> list[NDArray[np.float64]]:
     """Return the columns of the terms without inner parameters, as a pysindy library gives them on [x, x']."""
     if not effects:
@@ -205,17 +205,12 @@ def _library_columns(
         library_functions=[_term(effect) for effect in effects],
         function_names=[_constant_name(effect.name) for effect in effects],
     )
-    # On numbers near one, and back to SI by the dimension of the coefficient.
-    sizes = [
-        characteristic_value(e.parameters[0].dimension, {**scales, "force": 1.0, "drive": 1.0})
-        for e in effects
-    ]
     columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
     for motion in motions:
-        points = np.column_stack([motion.x / scales["x"], motion.v * scales["time"] / scales["x"]])
-        values = np.asarray(library.fit_transform(points))
-        for i, size in enumerate(sizes):
-            columns[i].append(rows.of(values[:, i] / size))
+        # In SI, as a sine is none of the angle in other units; every regression brings its columns to one length itself.
+        values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
+        for i in range(len(effects)):
+            columns[i].append(rows.of(np.ascontiguousarray(values[:, i])))
     return [np.concatenate(parts) for parts in columns]
 
 
