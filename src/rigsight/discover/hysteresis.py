@@ -38,6 +38,7 @@ _TIMES_SPECIAL = (1.0, 1.5, 2.0)
 _SUBSTEPS = 2
 _RUNAWAY = 1e6
 """Loop in units of the displacement beyond which its shape is unstable, and no column."""
+_STARTS = 3
 _REFINEMENTS = 40
 _STEP = 1e-3
 """In the logarithm, or in a power: it moves the column by more than the integrator's error."""
@@ -200,10 +201,9 @@ def best_loop(
     sign = -1.0 if driven else 1.0
     columns = sign * columns_at(grid)
     shares = [_share(projected, columns[:, i]) for i in range(len(grid))]
-    first = int(np.argmax(shares))
-    if shares[first] <= 0.0:
+    starts = _apart(grid, shares)
+    if not starts:
         return None
-    kept = grid[first][n_refined:]
 
     rest = projected.rest_of(projected.target)
 
@@ -213,32 +213,45 @@ def best_loop(
         column = projected.rest_of(column)
         return np.asarray(rest - column * (column @ rest) / max(float(column @ column), 1e-300))
 
-    seen: dict[bytes, NDArray[np.float64]] = {}
+    def refined(start: Point) -> Loop:
+        kept = start[n_refined:]
+        seen: dict[bytes, NDArray[np.float64]] = {}
 
-    def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what is left at a point and at a step along each axis: a few loops cost as much as one."""
-        key = theta.tobytes()
-        if key not in seen:
-            seen.clear()
-            steps = np.vstack([np.zeros(n_refined), _STEP * np.eye(n_refined)])
-            points = [(*map(float, theta + step), *kept) for step in steps]
-            near = columns_at(points)
-            seen[key] = np.column_stack([left(near[:, i]) for i in range(len(points))])
-        return seen[key]
+        def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            """Return what is left at a point and at a step along each axis: a few loops cost as much as one."""
+            key = theta.tobytes()
+            if key not in seen:
+                seen.clear()
+                steps = np.vstack([np.zeros(n_refined), _STEP * np.eye(n_refined)])
+                points = [(*map(float, theta + step), *kept) for step in steps]
+                near = columns_at(points)
+                seen[key] = np.column_stack([left(near[:, i]) for i in range(len(points))])
+            return seen[key]
 
-    start = np.array(grid[first][:n_refined])
+        def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(around(theta)[:, 0])
 
-    def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(around(theta)[:, 0])
+        def slopes(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            near = around(theta)
+            return np.asarray((near[:, 1:] - near[:, :1]) / _STEP)
 
-    def slopes(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        near = around(theta)
-        return np.asarray((near[:, 1:] - near[:, :1]) / _STEP)
+        first = np.array(start[:n_refined])
+        solution = least_squares(here, first, jac=slopes, bounds=bounds, ftol=1e-6, max_nfev=_REFINEMENTS)
+        point = (*map(float, solution.x), *kept)
+        column = sign * columns_at([point])[:, 0]
+        return Loop(shape.values(point, scales), column, _share(projected, column))
 
-    solution = least_squares(here, start, jac=slopes, bounds=bounds, ftol=1e-6, max_nfev=_REFINEMENTS)
-    point = (*map(float, solution.x), *kept)
-    column = sign * columns_at([point])[:, 0]
-    return Loop(shape.values(point, scales), column, _share(projected, column))
+    return max(map(refined, starts), key=lambda loop: loop.share)
+
+
+def _apart(grid: Sequence[Point], shares: Sequence[float]) -> list[Point]:
+    """Return the best points of a grid, each of another size: a slider may be taken for its neighbor."""
+    found: list[Point] = []
+    for index in np.argsort(shares)[::-1]:
+        point = grid[int(index)]
+        if shares[index] > 0.0 and all(point[0] != other[0] for other in found):
+            found.append(point)
+    return found[:_STARTS]
 
 
 def _share(projected: Projected, column: NDArray[np.float64]) -> float:
