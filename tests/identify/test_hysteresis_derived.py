@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.optimize import brentq
 
 from rigsight.effects import effect_named
+from rigsight.effects.symbols import deflection_rate
 from rigsight.errors import InputError
 from rigsight.identify import FitResult
 from rigsight.identify.hysteresis import derived_quantities, loop_area
+from rigsight.identify.hysteresis.derived import saturation_level
 from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.simulate import compose, parameter_vector
 
@@ -129,6 +133,18 @@ def test_the_scale_of_z_is_part_of_the_saturation() -> None:
     found = derived_quantities(fit, [], SCALES, np.random.default_rng(0))
     assert found.saturation is not None
     assert found.saturation.value == pytest.approx(math.sqrt(4.0 / 50.0))
+
+
+def test_the_saturation_follows_from_whatever_rate_is_declared() -> None:
+    (z,) = BOUC_WEN.states
+    beta, gamma = sp.symbols("beta gamma", real=True)
+    other = replace(
+        BOUC_WEN, states=(replace(z, rate=deflection_rate * (3 - beta * z.symbol**2 - gamma * z.symbol**2)),)
+    )
+    level = saturation_level(other)
+    assert level is not None
+    assert float(level.subs({beta: 10.0, gamma: 2.0})) == pytest.approx(0.5)
+    assert saturation_level(replace(BOUC_WEN, states=(replace(z, rate=deflection_rate),))) is None
 
 
 def test_iwan_hysteresis_has_a_loop_but_no_pair() -> None:

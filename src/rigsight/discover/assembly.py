@@ -11,7 +11,7 @@ import numpy as np
 from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.doubts import doubts, warnings_of
 from rigsight.discover.equations import equations
-from rigsight.discover.hysteresis import ForceEquation
+from rigsight.discover.force_law import ForceEquation
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
 from rigsight.discover.task import Task

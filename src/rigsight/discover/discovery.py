@@ -12,7 +12,7 @@ import numpy as np
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
-from rigsight.discover.hysteresis import LOOPS
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import Candidate, candidates, offered_effects
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, own_terms, rows_of
@@ -185,7 +185,7 @@ def _distinct(
     dropped: set[int] = set()
     for i, j, _ in alike(projected, columns, _SAME_COLUMN):
         # A loop may turn into friction or damping, not the other way round: the simpler term stands for it.
-        loops = [library[k].name in LOOPS for k in (i, j)]
+        loops = [is_loop(library[k].effect) for k in (i, j)]
         first, second = (j, i) if loops == [True, False] else (i, j)
         if first not in dropped and second not in dropped:
             dropped.add(second)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.discover.bench import Trial
-from rigsight.discover.hysteresis import LOOP, ForceEquation
+from rigsight.discover.force_law import ForceEquation
 from rigsight.discover.result import Coefficient, Term
 from rigsight.discover.selection import STRONG, Selection, criterion
 from rigsight.discover.task import Task
@@ -27,7 +27,6 @@ _SAME_RATE = 1e-6
 """Relative difference of sample times that come from columns of time."""
 _NEAR = 1.5
 """Factor of the held-out error within which another equation is nearly as good."""
-_FORCE_TERMS_OF = {"beta": "|x'| |F|^(n-1) F", "gamma": "x' |F|^n"}
 
 
 def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, same: Sequence[str]) -> str:
@@ -117,12 +116,16 @@ def warnings_of(
         )
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
     if force is not None:
+        fitted = {p.name for p in force.law.effect.parameters if p.fitted}
         blind = [
-            parameter for parameter, term in _FORCE_TERMS_OF.items() if force.inclusion.get(term, 0.0) < _SURE
+            parameter
+            for term, parameter in force.law.parameters.items()
+            if parameter in fitted and force.inclusion.get(term, 0.0) < _SURE
         ]
         if blind:
             found.append(
-                f"The regressed equation of the hysteretic force does not show {' and '.join(blind)} of {LOOP} for sure; "
+                f"The regressed equation of the hysteretic force does not show {' and '.join(blind)} of "
+                f"{force.law.effect.name} for sure; "
                 f"{'its' if len(blind) == 1 else 'their'} value comes from the free-run fit alone."
             )
     return tuple(found)

@@ -9,7 +9,8 @@ import numpy as np
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.hysteresis import LOOP, LOOPS, ForceEquation, force_equation
+from rigsight.discover.force_law import ForceEquation, ForceLaw, force_equation
+from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import candidates, torque_along
 from rigsight.discover.motion import Motion
 from rigsight.discover.own_regression import own_regression, own_terms
@@ -58,8 +59,8 @@ def inclusion(
     library = [bench.candidates[name] for name in names]
     if shift:
         # The loop does not know where rest is.
-        loops = [candidate for candidate in library if candidate.name in LOOPS]
-        effects = [candidate.effect for candidate in library if candidate.name not in LOOPS]
+        loops = [candidate for candidate in library if is_loop(candidate.effect)]
+        effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
         library = loops + candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
     again = replace(
         bench,
@@ -80,10 +81,11 @@ def regressed_force(
 ) -> ForceEquation | None:
     """Regress the equation of the hysteretic force that the polished model leaves as a residual of the measured motion."""
     rig, values = bench.rig, {**dict(final.structure.fixed), **final.values}
-    loops = [effect for effect in final.structure.effects if effect.name == LOOP]
-    if not loops or not rig.is_driven:
+    laws = [law for law in map(ForceLaw.of, final.structure.effects) if law is not None]
+    if not laws or not rig.is_driven:
         return None
-    others = [e for e in final.structure.effects if e.name != LOOP]
+    law = laws[0]
+    others = [effect for effect in final.structure.effects if effect is not law.effect]
     if any(effect.torque is None for effect in others):
         return None
     motion = rig.motion
@@ -91,7 +93,9 @@ def regressed_force(
     def number(expression: sp.Expr) -> float:
         return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
 
-    without_memory = values[final.structure.parameter_name(loops[0], "a")] * number(motion.stiffness)
+    own_values = final.structure.values_of(law.effect, values)
+    assert law.effect.elastic_share is not None
+    without_memory = own_values[law.effect.elastic_share] * number(motion.stiffness)
     shift = _rest_shift(bench, final)
     forces = []
     for own in motions:
@@ -104,8 +108,7 @@ def regressed_force(
         for effect in others:
             force -= torque_along(effect, final.structure.values_of(effect, values), own)
         forces.append(force)
-    n = values[final.structure.parameter_name(loops[0], "n")]
-    return force_equation(motions, rows, forces, n, rng)
+    return force_equation(law, motions, rows, forces, own_values, rng)
 
 
 def _ancestors(bench: Bench, name: str) -> set[str]:

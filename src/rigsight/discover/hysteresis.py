@@ -1,97 +1,143 @@
-"""Is there a hidden force with memory, and which equation does it obey?
+"""Is there a hidden force with memory? The states of a loop follow from the measured motion alone, so it is a column.
 
-Two looks at the same question. First the loop: the states of a Bouc-Wen element or of Iwan's sliders follow from the measured
-motion alone, so either is one column of the library, with the shape of the loop found by variable projection. Then the force:
-what the drive leaves after inertia, damping and the spring without memory is the hysteretic force F itself, and its own
-equation ``F' = a_1 x' - a_2 |x'| |F|^(n-1) F - a_3 x' |F|^n`` is regressed like any other; that says which of its terms
-the records show. Two derivatives of a noisy displacement make the second look blind long before the first.
+Any effect that puts states in the place of the spring's deflection is such a loop. What stands inside it is read from its
+declaration and found by variable projection: a grid outside, linear regression inside, and a descent from the best point.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rigsight.discover.motion import Motion
-from rigsight.discover.regression import Projected, inclusion_probabilities
+from rigsight.discover.regression import Projected
 from rigsight.discover.weak_form import Rows
-from rigsight.effects import effect_named
+from rigsight.effects import Effect, SumAndDifference
+from rigsight.effects import symbols as canonical
+from rigsight.parameters import Parameter
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose, simulate_sets
 from rigsight.simulate.input_hold import hold_motion
+from rigsight.units import characteristic_value
 
-LOOP = "bouc_wen_hysteresis"
-"""The hysteresis whose force has an equation of its own."""
-FORCE_TERMS = ("x'", "|x'| |F|^(n-1) F", "x' |F|^n", "F", "x")
-"""Terms offered to the equation of the hysteretic force; the last two are a force that relaxes and one without memory."""
-_SATURATIONS = np.geomspace(0.3, 100.0, 7)
-_SKEWS = np.geomspace(0.3, 300.0, 6)
-_EXPONENTS = (1.0, 1.5, 2.0)
-_REACHES = np.geomspace(0.1, 30.0, 9)
-_POWERS = (-1.0, -0.6, -0.3, 0.0, 0.3, 0.6)
+_POINTS = 7
+"""Of the grid along each coordinate: decades of sizes lie less than a factor of three apart."""
+_LEAST_SIZE = 0.1
+_WITHIN = (3.0, 0.1)
+"""Factors inside the range of a size from which the grid begins and at which it ends: at its ends a loop is a spring, or none."""
+_OF_POWERS = 0.5
+"""Share of its range that the grid of a power spans, about its middle."""
+_TIMES_SPECIAL = (1.0, 1.5, 2.0)
+"""Where a parameter with a special value is looked at; it stays at the best of them."""
 _SUBSTEPS = 2
 _RUNAWAY = 1e6
 """Loop in units of the displacement beyond which its shape is unstable, and no column."""
+_STARTS = 3
 _REFINEMENTS = 40
 _STEP = 1e-3
-"""In the logarithm: it moves the column by more than the integrator's error."""
-
+"""In the logarithm, or in a power: it moves the column by more than the integrator's error."""
 
 Point = tuple[float, ...]
-"""Coordinates of a loop's shape: two that are refined, then those that stay as the grid has them."""
+"""Coordinates of a loop's shape: those that are refined, then those that stay as the grid has them."""
+
+
+def is_loop(effect: Effect) -> bool:
+    """Return True for a spring of which a share has a memory that the deflection alone drives."""
+    known = {canonical.deflection, canonical.deflection_rate}
+    known |= {sp.Symbol(p.name, real=True) for p in effect.parameters} | {s.symbol for s in effect.states}
+    return (
+        effect.spring is not None
+        and effect.elastic_share is not None
+        and bool(effect.states)
+        and all(state.rate.free_symbols <= known for state in effect.states)
+    )
 
 
 @dataclass(frozen=True)
 class LoopShape:
-    """How the shape of one kind of loop is searched for.
+    """The coordinates in which the shape of a loop is searched for, as its effect declares them.
+
+    Sum and difference of a pair, and what is searched logarithmically, are sizes, whose logarithm is moved; of what remains,
+    parameters with a special value stay at points of the grid.
 
     Attributes
     ----------
-    grid
-        Points to look at first.
-    lowest, highest
-        Bounds of the two refined coordinates.
-    values
-        Inner parameters of the effect at a point, for a displacement of a given size.
+    pairs
+        Parameters that are moved as sum and difference.
+    single
+        Parameters that are moved alone.
+    kept
+        Parameters that stay at points of the grid, with their special values.
+    dimensions
+        Dimension text of each parameter.
     """
 
-    grid: tuple[Point, ...]
-    lowest: tuple[float, float]
-    highest: tuple[float, float]
-    values: Callable[[Point, float], dict[str, float]]
+    pairs: tuple[SumAndDifference, ...]
+    single: tuple[Parameter, ...]
+    kept: tuple[tuple[str, float], ...]
+    dimensions: Mapping[str, str]
+
+    @classmethod
+    def of(cls, effect: Effect) -> LoopShape:
+        """Read the coordinates from a declaration."""
+        paired = {name for pair in effect.searched_as for name in (pair.first, pair.second)}
+        inside = [p for p in effect.parameters if p.fitted and p.name not in {effect.elastic_share, *paired}]
+        return cls(
+            pairs=effect.searched_as,
+            single=tuple(p for p in inside if p.name not in effect.special_cases),
+            kept=tuple(
+                (p.name, effect.special_cases[p.name]) for p in inside if p.name in effect.special_cases
+            ),
+            dimensions={p.name: p.dimension for p in effect.parameters},
+        )
+
+    @property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest value of each refined coordinate."""
+        sizes = [r for pair in self.pairs for r in (pair.sum_range, pair.difference_range)]
+        ranges = [_logarithms(r) for r in sizes]
+        ranges += [_logarithms(p.search) if p.logarithmic else p.search for p in self.single]
+        low, high = np.array(ranges).T
+        return low, high
+
+    @property
+    def grid(self) -> list[Point]:
+        """Points to look at first."""
+        sized = [True] * (2 * len(self.pairs)) + [p.logarithmic for p in self.single]
+        axes: list[Sequence[float]] = []
+        for low, high, is_size in zip(*self.bounds, sized, strict=True):
+            if is_size:
+                first, last = (edge + float(np.log(f)) for edge, f in zip((low, high), _WITHIN, strict=True))
+            else:
+                half = _OF_POWERS * (high - low) / 2.0
+                first, last = (low + high) / 2.0 - half, (low + high) / 2.0 + half
+            axes.append([float(value) for value in np.linspace(first, last, _POINTS)])
+        axes += [[times * special for times in _TIMES_SPECIAL] for _, special in self.kept]
+        return list(itertools.product(*axes))
+
+    def values(self, point: Point, scales: Mapping[str, float]) -> dict[str, float]:
+        """Return the inner parameters at a point, whose sizes are in units of what the records show."""
+        first_kept = 2 * len(self.pairs) + len(self.single)
+        found = dict(zip((name for name, _ in self.kept), point[first_kept:], strict=True))
+        for index, pair in enumerate(self.pairs):
+            power = 1.0 if pair.exponent is None else found[pair.exponent]
+            unit = characteristic_value(self.dimensions[pair.first], scales)
+            total, difference = (float(np.exp(c) * unit) ** power for c in point[2 * index : 2 * index + 2])
+            found[pair.first], found[pair.second] = (total + difference) / 2.0, (total - difference) / 2.0
+        for parameter, coordinate in zip(self.single, point[2 * len(self.pairs) : first_kept], strict=True):
+            size = float(np.exp(coordinate)) if parameter.logarithmic else coordinate
+            found[parameter.name] = size * characteristic_value(parameter.dimension, scales)
+        return found
 
 
-def _bouc_wen_values(point: Point, x_size: float) -> dict[str, float]:
-    """Return beta, gamma, n of (log sum, log difference, n) in units of the displacement."""
-    n = point[2]
-    total, difference = np.exp(point[0]) ** n / x_size**n, np.exp(point[1]) ** n / x_size**n
-    return {"beta": (total + difference) / 2.0, "gamma": (total - difference) / 2.0, "n": n}
-
-
-def _iwan_values(point: Point, x_size: float) -> dict[str, float]:
-    """Return x_s, q of (log reach in units of the displacement, q)."""
-    return {"x_s": float(np.exp(point[0])) * x_size, "q": point[1]}
-
-
-LOOPS: Mapping[str, LoopShape] = {
-    LOOP: LoopShape(
-        tuple((np.log(s), np.log(d), n) for n in _EXPONENTS for s in _SATURATIONS for d in _SKEWS),
-        (np.log(_SATURATIONS[0] / 3), np.log(_SKEWS[0] / 3)),
-        (np.log(1e3), np.log(2e3)),
-        _bouc_wen_values,
-    ),
-    "iwan_hysteresis": LoopShape(
-        tuple((np.log(reach), power) for reach in _REACHES for power in _POWERS),
-        (np.log(_REACHES[0] / 3), -2.0),
-        (np.log(3 * _REACHES[-1]), 2.0),
-        _iwan_values,
-    ),
-}
-"""The effects that put a loop in the place of the spring, which share ``a`` of the stiffness has no part in."""
+def _logarithms(limits: tuple[float, float]) -> tuple[float, float]:
+    return float(np.log(max(limits[0], _LEAST_SIZE))), float(np.log(limits[1]))
 
 
 @dataclass(frozen=True)
@@ -101,9 +147,9 @@ class Loop:
     Attributes
     ----------
     values
-        Inner parameters of the effect: beta, gamma, n of Bouc-Wen; x_s, q of Iwan.
+        Inner parameters of the effect.
     column
-        Rows of the loop's own deflection (z, or the mean of the sliders') of all records, shape (n_rows,).
+        Rows of the loop's own deflection of all records, shape (n_rows,).
     share
         Share of what the rig's own terms leave that the loop explains.
     """
@@ -113,44 +159,51 @@ class Loop:
     share: float
 
 
-def loop_structure(effect: str = LOOP) -> Structure:
+def loop_structure(effect: Effect) -> Structure:
     """Return the element whose force is the loop itself: a spring of stiffness 1, all of it with memory."""
-    return compose(RIGS["element"], [effect_named(effect)])
+    return compose(RIGS["element"], [effect])
 
 
 def best_loop(
-    effect: str, motions: Sequence[Motion], rows: Rows, projected: Projected, x_size: float, driven: bool
+    effect: Effect,
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    driven: bool,
 ) -> Loop | None:
     """Return the loop that explains most of what the rig's own terms leave, None where none explains anything.
 
     Parameters
     ----------
     effect
-        Kind of loop, one of `LOOPS`.
+        The effect, one of which `is_loop` says so.
     motions
         Of all records.
     rows
         How signals become rows.
     projected
         The rig's own terms (its spring among them: it takes the part without memory).
-    x_size
-        Size of the displacement.
+    scales
+        Size of each base quantity.
     driven
         True if the acceleration is regressed, false if the force is.
     """
-    shape = LOOPS[effect]
+    shape = LoopShape.of(effect)
     structure = loop_structure(effect)
+    grid, bounds = shape.grid, shape.bounds
+    n_refined = bounds[0].size
 
     def columns_at(points: Sequence[Point]) -> NDArray[np.float64]:
-        return _columns(structure, motions, rows, [shape.values(p, x_size) for p in points], x_size)
+        shapes = [shape.values(point, scales) for point in points]
+        return _columns(structure, effect, motions, rows, shapes, scales["x"])
 
     sign = -1.0 if driven else 1.0
-    columns = sign * columns_at(shape.grid)
-    shares = [_share(projected, columns[:, i]) for i in range(len(shape.grid))]
-    first = int(np.argmax(shares))
-    if shares[first] <= 0.0:
+    columns = sign * columns_at(grid)
+    shares = [_share(projected, columns[:, i]) for i in range(len(grid))]
+    starts = _apart(grid, shares)
+    if not starts:
         return None
-    kept = shape.grid[first][2:]
 
     rest = projected.rest_of(projected.target)
 
@@ -160,37 +213,45 @@ def best_loop(
         column = projected.rest_of(column)
         return np.asarray(rest - column * (column @ rest) / max(float(column @ column), 1e-300))
 
-    seen: dict[bytes, NDArray[np.float64]] = {}
+    def refined(start: Point) -> Loop:
+        kept = start[n_refined:]
+        seen: dict[bytes, NDArray[np.float64]] = {}
 
-    def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what is left at a point and at a step along each axis: three loops cost as much as one."""
-        key = theta.tobytes()
-        if key not in seen:
-            seen.clear()
-            points = [
-                (*theta, *kept),
-                (theta[0] + _STEP, theta[1], *kept),
-                (theta[0], theta[1] + _STEP, *kept),
-            ]
-            near = columns_at(points)
-            seen[key] = np.column_stack([left(near[:, i]) for i in range(len(points))])
-        return seen[key]
+        def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            """Return what is left at a point and at a step along each axis: a few loops cost as much as one."""
+            key = theta.tobytes()
+            if key not in seen:
+                seen.clear()
+                steps = np.vstack([np.zeros(n_refined), _STEP * np.eye(n_refined)])
+                points = [(*map(float, theta + step), *kept) for step in steps]
+                near = columns_at(points)
+                seen[key] = np.column_stack([left(near[:, i]) for i in range(len(points))])
+            return seen[key]
 
-    start = np.array(shape.grid[first][:2])
+        def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(around(theta)[:, 0])
 
-    def here(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(around(theta)[:, 0])
+        def slopes(theta: NDArray[np.float64]) -> NDArray[np.float64]:
+            near = around(theta)
+            return np.asarray((near[:, 1:] - near[:, :1]) / _STEP)
 
-    def slopes(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        near = around(theta)
-        return np.asarray((near[:, 1:] - near[:, :1]) / _STEP)
+        first = np.array(start[:n_refined])
+        solution = least_squares(here, first, jac=slopes, bounds=bounds, ftol=1e-6, max_nfev=_REFINEMENTS)
+        point = (*map(float, solution.x), *kept)
+        column = sign * columns_at([point])[:, 0]
+        return Loop(shape.values(point, scales), column, _share(projected, column))
 
-    solution = least_squares(
-        here, start, jac=slopes, bounds=(shape.lowest, shape.highest), ftol=1e-6, max_nfev=_REFINEMENTS
-    )
-    point = (*map(float, solution.x), *kept)
-    column = sign * columns_at([point])[:, 0]
-    return Loop(shape.values(point, x_size), column, _share(projected, column))
+    return max(map(refined, starts), key=lambda loop: loop.share)
+
+
+def _apart(grid: Sequence[Point], shares: Sequence[float]) -> list[Point]:
+    """Return the best points of a grid, each of another size: a slider may be taken for its neighbor."""
+    found: list[Point] = []
+    for index in np.argsort(shares)[::-1]:
+        point = grid[int(index)]
+        if shares[index] > 0.0 and all(point[0] != other[0] for other in found):
+            found.append(point)
+    return found[:_STARTS]
 
 
 def _share(projected: Projected, column: NDArray[np.float64]) -> float:
@@ -203,14 +264,18 @@ def _share(projected: Projected, column: NDArray[np.float64]) -> float:
 
 def _columns(
     structure: Structure,
+    effect: Effect,
     motions: Sequence[Motion],
     rows: Rows,
     shapes: Sequence[Mapping[str, float]],
     x_size: float,
 ) -> NDArray[np.float64]:
     """Return the rows of several loops' deflections, shape (n_rows, n_loops)."""
-    fixed = {"d": 0.0, "k": 1.0, "force_off": 0.0, "A": 1.0, "a": 0.0}
-    values = [{**fixed, **inner} for inner in shapes]
+    motion_of_element = structure.rig.motion
+    fixed = {p.name: 0.0 for p in structure.rig.parameters} | {motion_of_element.stiffness.name: 1.0}
+    fixed |= {p.name: p.default for p in effect.parameters if p.default is not None}
+    assert effect.elastic_share is not None
+    values = [{**fixed, effect.elastic_share: 0.0, **inner} for inner in shapes]
     p = np.array([[v[name] for v in values] for name in structure.names])
     blocks = []
     for motion in motions:
@@ -221,75 +286,3 @@ def _columns(
             z = np.where(np.abs(z) < _RUNAWAY * x_size, z, np.nan)
         blocks.append(np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(shapes))]))
     return np.concatenate(blocks)
-
-
-@dataclass(frozen=True)
-class ForceEquation:
-    """The regressed equation of the hysteretic force.
-
-    Attributes
-    ----------
-    coefficients, inclusion
-        By term of `FORCE_TERMS` [SI].
-    n
-        The exponent taken.
-    share
-        Share of the force's rate that the equation explains.
-    """
-
-    coefficients: Mapping[str, float]
-    inclusion: Mapping[str, float]
-    n: float
-    share: float
-
-
-def force_equation(
-    motions: Sequence[Motion],
-    rows: Rows,
-    forces: Sequence[NDArray[np.float64]],
-    n: float,
-    rng: np.random.Generator,
-) -> ForceEquation:
-    """Regress the equation of the hysteretic force.
-
-    Parameters
-    ----------
-    motions
-        Of all records.
-    rows
-        How signals become rows.
-    forces
-        Per record the hysteretic force, shape (n_samples,).
-    n
-        Exponent.
-    rng
-        Source of the ensemble.
-    """
-    target, columns = [], []
-    for motion, force in zip(motions, forces, strict=True):
-        power = np.abs(force) ** n
-        signals = (
-            motion.v,
-            -np.abs(motion.v) * power * np.sign(force),
-            -motion.v * power,
-            -force,
-            motion.x,
-        )
-        target.append(rows.rate_of(force, motion.dt))
-        columns.append(np.column_stack([rows.of(signal) for signal in signals]))
-    matrix = np.concatenate(columns)
-    rate = np.concatenate(target)
-    # Nothing is projected out but a constant rate, which no force can have for long.
-    projected = Projected(np.ones((rate.size, 1)), rate, rate.size * rows.independent_share(1))
-    inclusion = inclusion_probabilities(projected, matrix, rng)
-    taken = inclusion >= 0.5
-    coefficients = np.zeros(len(FORCE_TERMS))
-    share = 0.0
-    if np.any(taken):
-        coefficients[taken], share = projected.explained(matrix[:, taken])
-    return ForceEquation(
-        dict(zip(FORCE_TERMS, map(float, coefficients), strict=True)),
-        dict(zip(FORCE_TERMS, map(float, inclusion), strict=True)),
-        n,
-        share,
-    )

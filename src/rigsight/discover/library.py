@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
-from rigsight.discover.hysteresis import LOOPS, best_loop
+from rigsight.discover.driven_states import is_filter, states_along
+from rigsight.discover.hysteresis import best_loop, is_loop
 from rigsight.discover.monomials import MONOMIALS
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected
@@ -34,7 +34,6 @@ from rigsight.units import characteristic_value
 _GRID = 10
 _LEAST_SHARE = 0.02
 _MOST_SHARE = 3.0
-_LAG = "actuator_lag"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +66,9 @@ class Candidate:
 def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
     """Return the effects that a regression can hold as terms on this rig.
 
-    A state has no signal of its own along a measured motion; loops and lag are the exceptions, because theirs follow from
-    motion and input.
+    A state has no signal of its own along a measured motion; loops, and what filters the drive, are the exceptions, because
+    theirs follow from motion and input. A torque of states is none: a mass that rides along would explain the acceleration by
+    the acceleration.
     """
     changes_spring = [e for e in (*CATALOGUE, *MONOMIALS) if e.spring is not None or e.deflection is not None]
     return [
@@ -76,7 +76,7 @@ def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
         for effect in (*CATALOGUE, *MONOMIALS)
         if rig.offers(effect)
         and (has_spring or effect not in changes_spring)
-        and (effect.name in (*LOOPS, _LAG) or _is_static(effect))
+        and (is_loop(effect) or _filters_drive(effect) or _is_static(effect))
     ]
 
 
@@ -101,6 +101,11 @@ def _is_static(effect: Effect) -> bool:
         and any(part is not None for part in known)
         and all(part is None or part.free_symbols <= symbols for part in known)
     )
+
+
+def _filters_drive(effect: Effect) -> bool:
+    """Return True for a drive that follows the input through states of its own."""
+    return effect.place is Place.ACTUATOR and effect.drive is not None and is_filter(effect)
 
 
 def candidates(
@@ -131,14 +136,14 @@ def candidates(
     sign = -1.0 if driven else 1.0
     plain = [effect for effect in effects if _is_plain(effect)]
     found = []
-    for effect, column in zip(plain, _library_columns(plain, motions, rows, scales), strict=True):
+    for effect, column in zip(plain, _library_columns(plain, motions, rows), strict=True):
         found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
     for effect in effects:
         if effect in plain:
             continue
         best = (
             _loop(effect, motions, rows, projected, scales, driven)
-            if effect.name in LOOPS
+            if is_loop(effect)
             else _best_inner(effect, motions, rows, projected, scales, sign)
         )
         if best is not None:
@@ -154,7 +159,7 @@ def _loop(
     scales: Mapping[str, float],
     driven: bool,
 ) -> Candidate | None:
-    loop = best_loop(effect.name, motions, rows, projected, scales["x"], driven)
+    loop = best_loop(effect, motions, rows, projected, scales, driven)
     return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
 
@@ -187,7 +192,7 @@ def _is_plain(effect: Effect) -> bool:
 
 
 def _library_columns(
-    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows, scales: Mapping[str, float]
+    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows
 ) -> list[NDArray[np.float64]]:
     """Return the columns of the terms without inner parameters, as a pysindy library gives them on [x, x']."""
     if not effects:
@@ -200,17 +205,12 @@ def _library_columns(
         library_functions=[_term(effect) for effect in effects],
         function_names=[_constant_name(effect.name) for effect in effects],
     )
-    # On numbers near one, and back to SI by the dimension of the coefficient.
-    sizes = [
-        characteristic_value(e.parameters[0].dimension, {**scales, "force": 1.0, "drive": 1.0})
-        for e in effects
-    ]
     columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
     for motion in motions:
-        points = np.column_stack([motion.x / scales["x"], motion.v * scales["time"] / scales["x"]])
-        values = np.asarray(library.fit_transform(points))
-        for i, size in enumerate(sizes):
-            columns[i].append(rows.of(values[:, i] / size))
+        # In SI, as a sine is none of the angle in other units; every regression brings its columns to one length itself.
+        values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
+        for i in range(len(effects)):
+            columns[i].append(rows.of(np.ascontiguousarray(values[:, i])))
     return [np.concatenate(parts) for parts in columns]
 
 
@@ -261,16 +261,14 @@ def _signals(
     if effect.delay is not None:
         time = motion.dt * np.arange(motion.u.size)
         return [motion.u - np.interp(time - next(iter(inner.values())), time, motion.u)]
-    if effect.name == _LAG:
-        pole = float(np.exp(-motion.dt / next(iter(inner.values()))))
-        lagged = lfilter([1.0 - pole], [1.0, -pole], motion.u - motion.u[0]) + motion.u[0]
-        return [motion.u - np.asarray(lagged)]
     if effect.torque is not None:
         return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
     if effect.deflection is not None:
         return [_evaluated(effect.deflection, inner, motion) - motion.x]
     assert effect.drive is not None
-    return [motion.u - _evaluated(effect.drive, inner, motion)]
+    defaults = {p.name: p.default for p in effect.parameters if p.default is not None}
+    states = states_along(effect, {**defaults, **inner}, motion) if effect.states else {}
+    return [motion.u - _evaluated(effect.drive, {**inner, **states}, motion)]
 
 
 def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
@@ -279,7 +277,9 @@ def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) ->
     return _evaluated(effect.torque, values, motion)
 
 
-def _evaluated(expression: sp.Expr, inner: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+def _evaluated(
+    expression: sp.Expr, inner: Mapping[str, float | NDArray[np.float64]], motion: Motion
+) -> NDArray[np.float64]:
     function = _compiled(expression, tuple(inner))
     return np.broadcast_to(function(motion.x, motion.v, motion.u, *inner.values()), motion.x.shape).astype(
         np.float64

@@ -9,8 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Effect, SumAndDifference
 from rigsight.errors import InputError
 from rigsight.identify.coordinates import Coordinates
@@ -68,9 +70,10 @@ class DerivedQuantities:
     pairs
         Sum and difference of each pair that the effects search so, in this order.
     saturation
-        z_max = (A / (beta + gamma))^(1/n) of a Bouc-Wen spring, None for effects without it.
+        Where the state of a spring with memory comes to rest while it is loaded on and on, z_max = (A / (beta + gamma))^(1/n) of
+        a Bouc-Wen spring; None for effects without it.
     saturation_in_words
-        What the sign of beta + gamma says about the saturation; empty without a Bouc-Wen spring.
+        What the sign of the pair's sum (beta + gamma) says about the saturation; empty without one.
     loop_areas
         Energy per cycle at each amplitude.
     """
@@ -123,9 +126,10 @@ def derived_quantities(
             _derived(f"{first} + {second}", unit, of(first) + of(second), determined),
             _derived(f"{first} - {second}", unit, of(first) - of(second), determined),
         ]
-        if pair.exponent is not None:
-            scale, exponent = (of(structure.parameter_name(effect, name)) for name in ("A", pair.exponent))
-            reached = _saturation(scale, of(first) + of(second), exponent)
+        level = saturation_level(effect)
+        if level is not None:
+            own = {p.name: of(structure.parameter_name(effect, p.name)) for p in effect.parameters}
+            reached = _saturation(level, own)
             saturation = _derived("z_max", structure.rig.units["x"], reached, determined)
             words = _in_words(saturation, f"{first} + {second}")
     hysteretic = any(effect.spring is not None for effect in structure.effects)
@@ -248,11 +252,29 @@ def _pairs(structure: Structure) -> list[tuple[Effect, SumAndDifference]]:
     return [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
 
 
-def _saturation(
-    scale: NDArray[np.float64], total: NDArray[np.float64], exponent: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    bounded = total > 0.0
-    return np.where(bounded, (scale / np.where(bounded, total, 1.0)) ** (1.0 / exponent), np.inf)
+def saturation_level(effect: Effect) -> sp.Expr | None:
+    """Return where the state of a spring with memory rests while its deflection grows on and on, in terms of its parameters.
+
+    None for an effect without such a spring, of several states, or whose state has no such level (or several).
+    """
+    if effect.spring is None or len(effect.states) != 1 or effect.states[0].limit is not None:
+        return None
+    (state,) = effect.states
+    level = sp.Symbol("level", positive=True)
+    # Solved for positive parameters, of whose roots sympy knows the sign; the formula holds for others as far as it is real.
+    own = {sp.Symbol(p.name, real=True): sp.Symbol(p.name, positive=True) for p in effect.parameters}
+    loading = state.rate.xreplace({canonical.deflection_rate: sp.Integer(1), state.symbol: level, **own})
+    roots = sp.solve(loading, level) if loading.has(level) else []
+    levels = [root for root in roots if root.is_positive]
+    return levels[0].xreplace({there: here for here, there in own.items()}) if len(levels) == 1 else None
+
+
+def _saturation(level: sp.Expr, own: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the level for values of the parameters, infinite where there is none."""
+    reached = sp.lambdify([sp.Symbol(name, real=True) for name in own], level, "numpy")
+    with np.errstate(all="ignore"):
+        found = np.asarray(reached(*own.values()), dtype=np.float64)
+    return np.where(np.isfinite(found) & (found > 0.0), found, np.inf)
 
 
 def _in_words(saturation: Derived, total: str) -> str:

@@ -1,0 +1,66 @@
+"""The equation of a hysteretic force comes from the rate that its effect declares."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from rigsight.discover.force_law import ForceLaw, force_equation
+from rigsight.discover.hysteresis import is_loop
+from rigsight.discover.motion import Motion
+from rigsight.discover.weak_form import Rows
+from rigsight.effects import CATALOGUE, effect_named
+from rigsight.effects.symbols import deflection_rate
+from rigsight.records import Record
+
+BOUC_WEN = effect_named("bouc_wen_hysteresis")
+(Z,) = BOUC_WEN.states
+A, beta = sp.symbols("A beta", real=True)
+DAHL = replace(
+    BOUC_WEN,
+    name="dahl_hysteresis",
+    states=(replace(Z, rate=A * deflection_rate - beta * sp.Abs(deflection_rate) * Z.symbol**3),),
+)
+"""A law of another form, which no file of the catalogue declares."""
+
+
+def test_the_terms_are_those_of_the_declared_rate() -> None:
+    law = ForceLaw.of(BOUC_WEN)
+    assert law is not None
+    assert list(law.terms) == ["x'", "|x'| |F|^(n-1) F", "x' |F|^n", "F", "x"]
+    assert law.parameters == {"x'": "A", "|x'| |F|^(n-1) F": "beta", "x' |F|^n": "gamma"}
+
+
+def test_only_a_force_of_one_free_state_has_a_law() -> None:
+    assert [effect.name for effect in CATALOGUE if is_loop(effect)] == [
+        "bouc_wen_hysteresis",
+        "iwan_hysteresis",
+    ]
+    assert [effect.name for effect in CATALOGUE if ForceLaw.of(effect)] == ["bouc_wen_hysteresis"]
+
+
+def test_another_declaration_is_regressed_without_new_code() -> None:
+    law = ForceLaw.of(DAHL)
+    assert law is not None
+    # A force of that law, driven back and forth at a rising amplitude.
+    dt, fine = 1e-3, 20
+    t = dt / fine * np.arange(8000 * fine)
+    v = (0.5 + 0.2 * t) * np.cos(5.0 * t)
+    x = np.cumsum(v) * dt / fine
+    stiffness, softening = 40.0, 0.02
+    force = np.zeros_like(t)
+    for i in range(1, t.size):
+        rate = stiffness * v[i - 1] - softening * abs(v[i - 1]) * force[i - 1] ** 3
+        force[i] = force[i - 1] + dt / fine * rate
+    x, v, force = x[::fine], v[::fine], force[::fine]
+    force += np.random.default_rng(0).normal(scale=1e-3 * np.std(force), size=force.size)
+    record = Record(name="run", dt=dt, signals={"u": x}, units={})
+    motion = Motion(record, x, v, np.gradient(v, dt), x, x)
+    found = force_equation(law, [motion], Rows.weak(0.1, dt), [force], {"n": 1.0}, np.random.default_rng(0))
+    shown = {name for name, share in found.inclusion.items() if share > 0.9}
+    assert shown == {"x'", "|x'| F^3"}
+    assert found.coefficients["x'"] == pytest.approx(stiffness, rel=0.02)
+    assert found.coefficients["|x'| F^3"] == pytest.approx(softening, rel=0.02)
