@@ -11,6 +11,8 @@ from sympy.printing.latex import LatexPrinter as SympyLatexPrinter
 from rigsight.simulate.printing.names import GREEK, ShownName, named
 from rigsight.simulate.printing.shown import ShownEquation
 
+_DIGITS = 6
+"""Of numbers that stand in an effect's equation; those of parameters stand beside it."""
 _ACCENTS = ("", r"\dot", r"\ddot")
 
 
@@ -28,7 +30,7 @@ def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]
     right = " ".join(f"{sign} {printer.expression(term)}".strip() for sign, term in equation.signed_terms)
     if equation.limit is not None:
         state, half_width = map(printer.expression, equation.limit)
-        right += rf",\quad \left|{state}\right| \le {half_width}"
+        right += rf",\quad \left|{state}\right| \leq {half_width}"
     return printer.expression(equation.left), right
 
 
@@ -67,6 +69,9 @@ class LatexPrinter(SympyLatexPrinter):  # type: ignore[misc]
     def expression(self, expression: sp.Expr) -> str:
         """Return an expression of named symbols."""
         return str(self.doprint(named(expression, self._names)))
+
+    def _print_Float(self, expr: sp.Float) -> str:  # noqa: N802
+        return str(super()._print_Float(sp.Float(expr, _DIGITS)))
 
     def _print_late(self, expression: sp.Expr) -> str:
         signal, delay = map(self._print, expression.args)
