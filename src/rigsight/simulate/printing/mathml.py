@@ -59,10 +59,10 @@ class MathMLPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
         if name is None:
             return super()._print_Symbol(sym, style)
         shown = super()._print_Symbol(sp.Symbol(name.letter), style)
-        if name.below:
-            shown = self._element("msub", shown, self._below(name.below, style))
         if name.dots:
             shown = self._element("mover", shown, self._text("mo", _DOTS[name.dots]))
+        if name.below:
+            shown = self._element("msub", shown, self._below(name.below, style))
         return shown
 
     def _below(self, words: tuple[str, ...], style: str) -> Any:
