@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.identify.equation_error import solve_in_frequency, spectra_of
 from rigsight.records.record import Record
-from rigsight.rigs import RIGS, ROLLING, Rig, evaluated
+from rigsight.rigs import AXIS, RIGS, ROLLING, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _OUTPUTS = frozenset(signal.name for rig in RIGS.values() if rig.is_driven for signal in rig.outputs)
@@ -89,7 +89,7 @@ def _running_gear(rig: Rig, records: Sequence[Record], constants: Mapping[str, f
 
 
 def _axis(records: Sequence[Record], constants: Mapping[str, float], no_spring: bool) -> dict[str, float]:
-    gain = constants["gain"]
+    gain = evaluated(AXIS.motion.drive_gain, constants)
     inertia, damping, stiffness = second_order(records, "u", "x", gain, no_spring)
     x_mean = float(np.mean([np.mean(r["x"]) for r in records]))
     u_mean = float(np.mean([np.mean(r["u"]) for r in records]))

@@ -21,7 +21,7 @@ from rigsight.identify.transfer_form import Order
 from rigsight.identify.transfer_function import fit_frequency_response
 from rigsight.identify.transfer_step import fit_step
 from rigsight.records.record import Hold, Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 
 _SURE = 0.1
 """Relative standard error of a line from which it is no evidence of a peak."""
@@ -120,7 +120,7 @@ def _motion(
     def physical(fit: TransferFit) -> PhysicalEstimates:
         if rig.downstream:
             return yaw_parameters(fit, constants)
-        gain = abs(constants["gain"])
+        gain = abs(evaluated(rig.motion.drive_gain, constants))
         return springless_parameters(fit, gain) if no_spring else axis_parameters(fit, gain)
 
     order: Order = "pt1" if no_spring else "pt2"
