@@ -1,6 +1,7 @@
 """What the simulation computes of a structure at one instant: the only place that the test of shown equations asks.
 
-The frozen equations as they are printed as code; a kernel that gives its own `rates` takes their place here.
+The frozen equations as they are printed as code: exact at any instant. The compiled kernel, which tells no rates, is asked by
+what it moves in a moment, in a test of its own.
 """
 
 from __future__ import annotations

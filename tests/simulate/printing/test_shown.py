@@ -15,6 +15,8 @@ from rigsight.effects import CATALOGUE, effect_named
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.equation_tree import late
+from rigsight.simulate.input_hold import HeldInput
+from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.printing.names import output_symbol, rate_symbol
 from rigsight.simulate.printing.shown import ShownEquation, shown_equations
 from rigsight.simulate.structure import INPUT, TIME
@@ -37,6 +39,8 @@ CASES = [
     if all(RIGS[rig].offers(effect_named(name)) for name in names)
 ]
 _INSTANTS = 12
+_MOMENT = 1e-6
+"""Step of the compiled kernel [s]; the rates here change by about their size in a second."""
 
 
 class Reader:
@@ -56,6 +60,14 @@ class Reader:
             place = rng.choice([-1.0 - 1e-9, 1.0 + 1e-9, rng.uniform(-0.9, 0.9)])
             self.numbers[state] = place * self.value(half_width, self.now)
         self._amplitude, self._frequency = rng.normal(), rng.uniform(0.5, 2.0)
+
+    def rest_at_ends(self) -> None:
+        """Put what is beyond an end of its range, by no more than rounding, exactly there."""
+        for equation in self._equations.values():
+            if equation.limit is not None:
+                state, half_width = equation.limit
+                end = self.value(half_width, self.now)
+                self.numbers[state] = min(max(self.numbers[state], -end), end)
 
     def source(self, time: float) -> float:
         return float(self._amplitude * math.sin(self._frequency * time))
@@ -163,6 +175,33 @@ def test_what_is_shown_is_what_is_simulated(simulated_instant, rig: str, names: 
         for i, (name, value) in enumerate(instant.outputs.items()):
             read_at = reader.now + (instant.measured_late if i == 0 else 0.0)
             assert reader.output(name, read_at) == pytest.approx(value, rel=1e-9, abs=1e-12), name
+
+
+@pytest.mark.parametrize(("rig", "names"), CASES, ids=["+".join([rig, *names]) for rig, names in CASES])
+def test_the_compiled_kernel_moves_as_shown(rig: str, names: Sequence[str]) -> None:
+    """Over a step so short that nothing but the rates at its start matters."""
+    structure = compose(RIGS[rig], [effect_named(name) for name in names])
+    kernel = kernel_of(structure)
+    rng = np.random.default_rng(6)
+    for _ in range(3):
+        reader = Reader(structure, rng)
+        reader.rest_at_ends()
+        value, rate = reader.source(reader.now), reader.source_rate(reader.now)
+        if structure.rig.is_driven:
+            # So that it does not matter when a delayed input was sent.
+            rate = 0.0
+            reader.source = lambda _, value=value: value
+        held = HeldInput(np.tile([value, rate, 0.0, 0.0], (2, 1)), _MOMENT, 1, continuous=True)
+        p = np.array([reader.numbers[symbol] for symbol in structure.parameter_symbols])
+        start = np.array([reader.numbers[state] for state in structure.states])
+        status, out, end = kernel.simulate_one(held, p, start, 1e-10, 2)
+        assert status == 0
+        for state, moved in zip(structure.states, (end - start) / _MOMENT, strict=True):
+            assert moved == pytest.approx(reader.rate(state), rel=1e-4, abs=1e-4), state
+        late = 0.0 if structure.measured_late is None else reader.value(structure.measured_late, reader.now)
+        for i, signal in enumerate(structure.rig.outputs):
+            shown = reader.output(signal.name, reader.now + (late if i == 0 else 0.0))
+            assert out[0, i] == pytest.approx(shown, rel=1e-9, abs=1e-12), signal.name
 
 
 @pytest.mark.parametrize("rig", RIGS)
