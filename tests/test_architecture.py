@@ -39,3 +39,15 @@ def test_the_lock_pins_every_package_and_names_no_place(lock: str) -> None:
         assert "==" in line
         assert "://" not in line
         assert "file:" not in line
+
+
+def test_every_language_is_printed_in_one_place() -> None:
+    """Two printers of one language would in time print two equations."""
+    printers = {
+        str(module.relative_to(ROOT / "src" / "rigsight").as_posix())
+        for module in MODULES
+        if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
+    }
+    elsewhere = {name for name in printers if not name.startswith("simulate/printing/")}
+    # These are about to move: the kernel's own, the C export's, and the text and LaTeX of a discovered equation.
+    assert elsewhere <= {"simulate/expressions.py", "export/languages.py", "discover/equations.py"}

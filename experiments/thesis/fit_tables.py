@@ -30,7 +30,7 @@ from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep
 from rigsight.identify.hysteresis import SpectralRatio
 from rigsight.records import Record
-from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure, compose, parameter_vector, record_input, simulate_sets
 
@@ -92,7 +92,7 @@ RIVALS = (
 def table_magnitude(published: PublishedSet) -> Array:
     """Return the magnitude of a published PT2 [rad/A] at `OMEGA`."""
     J_z, k_c, k_d = (published.parameters[name] for name in ("J_z", "k_c", "k_d"))
-    drive = published.constants["b"] * published.constants["k_tau"] / published.constants["r_0"]
+    drive = evaluated(RUNNING_GEAR.motion.drive_gain, published.constants)
     return np.asarray(np.abs(drive / (k_c - J_z * OMEGA**2 + 1j * k_d * OMEGA)))
 
 

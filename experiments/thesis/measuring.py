@@ -27,6 +27,7 @@ from rigsight.identify import (
 from rigsight.identify.record_response import record_response
 from rigsight.metrics import rms
 from rigsight.records import Record
+from rigsight.rigs import ROLLING, evaluated
 
 PAIRS = (("u", "psi"), ("psi", "y"))
 CUTS = {"psi": 80.0, "y": 30.0}
@@ -71,7 +72,7 @@ def thesis_sweep_values(record: Record) -> Values:
     )
     values = {**yaw_parameters(yaw, CONSTANTS).values, **lateral_parameters(lateral, CONSTANTS).values}
     values["psi_off"] = float(np.mean(record["psi"]))
-    values["y_off"] = float(np.mean(record["y"])) - 2.0 * values["l_0"] * values["psi_off"]
+    values["y_off"] = float(np.mean(record["y"])) - evaluated(ROLLING.static_gain, values) * values["psi_off"]
     return without_errors(values)
 
 
@@ -81,7 +82,9 @@ def thesis_step_values(record: Record) -> Values:
     values = {**yaw_parameters(yaw, CONSTANTS).values, **lateral_parameters(lateral, CONSTANTS).values}
     before = record.t < STEP_START
     values["psi_off"] = float(np.mean(record["psi"][before]))
-    values["y_off"] = float(np.mean(record["y"][before])) - 2.0 * values["l_0"] * values["psi_off"]
+    values["y_off"] = (
+        float(np.mean(record["y"][before])) - evaluated(ROLLING.static_gain, values) * values["psi_off"]
+    )
     return without_errors(values)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep, log_sweep, step
 from rigsight.records import Kind, Record
-from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, simulate
 from rigsight.workflow.virtual_rig import VirtualRig
@@ -31,7 +31,7 @@ STEP_START, STEP_TIME, STEP_AMPLITUDE = 180.0, 200.0, 0.6
 SEED = 1
 
 CONSTANTS = dict(VirtualRig().truth.constants)
-DRIVE = CONSTANTS["b"] * CONSTANTS["k_tau"] / CONSTANTS["r_0"]
+DRIVE = evaluated(RUNNING_GEAR.motion.drive_gain, CONSTANTS)
 """Torque per current [N m/A]."""
 DISTURBANCE = 0.01
 """Standard deviation of the torque disturbance, as a current that is not recorded [A]: 0.008 N m."""

@@ -46,7 +46,28 @@ def test_every_effect_has_equations_on_every_rig_that_offers_it(diagnosis: Diagn
             assert len(found) == 2, effect.name
             _, (title, equations) = found.items()
             assert title == sentence_case(effect_label(effect.name))
-            assert len(equations) == 1 + len(effect.states)
+            own_rates = {state.rate for state in effect.states} & {state.symbol for state in effect.states}
+            assert len(equations) == 1 + len(effect.states) - len(own_rates), effect.name
+
+
+def test_a_state_that_is_the_rate_of_another_is_shown_with_a_dot(diagnosis: Diagnosis) -> None:
+    found = groups(diagnosis, "axis", [effect_named("flexible_mode")])["Flexible mode"]
+    assert found[1].startswith("q ¨ =")
+    assert "− q ˙" in found[1]
+
+
+def test_two_effects_whose_symbols_are_alike_are_told_apart(diagnosis: Diagnosis) -> None:
+    found = groups(diagnosis, "axis", [effect_named("backlash"), effect_named("bouc_wen_hysteresis")])
+    assert found["Backlash"][1].startswith("z ˙ backlash =")
+    assert found["Bouc-Wen hysteresis"][1].startswith("z ˙ Bouc-Wen hysteresis =")
+
+
+def test_delays_stand_where_the_simulation_has_them(diagnosis: Diagnosis) -> None:
+    chosen = [effect_named(name) for name in ("input_dead_zone", "input_delay", "sensor_lag", "sensor_delay")]
+    found = groups(diagnosis, "axis", chosen)
+    assert found["Input delay"] == ["u input delay = u ( t − T d )"]
+    assert found["Sensor delay"] == ["x sensor delay = x sensor lag ( t − T s )"]
+    assert found["Axis"][-1] == "x measured = x sensor delay"
 
 
 def test_the_linear_rig_is_the_thesis_s(diagnosis: Diagnosis) -> None:
@@ -75,7 +96,7 @@ def test_effects_are_chained_along_the_signal_path_whatever_their_order(diagnosi
     play, loop = first["Free play"], first["Bouc-Wen hysteresis"]
     assert play[0].startswith("x spring, free play =")
     assert "k c x spring, free play" in loop[0], "the hysteresis sees what the play leaves"
-    assert "x spring, free play ˙" in loop[1]
+    assert "x ˙ spring, free play" in loop[1]
     assert "u input saturation" in first["Running gear"][0]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.blind.waveforms import Multisine, Step, Sweep, Waveform, samples
 from rigsight.records import Hold, Kind, Record, Role
-from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
+from rigsight.rigs import AXIS, RUNNING_GEAR, Rig, evaluated
 
 DT = 5e-3
 """Sample time of all records [s]."""
@@ -38,14 +38,16 @@ class LinearRig:
         Constants and parameters by name.
     omega
         Natural frequency [rad/s].
-    drive_gain
-        Force per unit of the input.
     """
 
     rig: Rig
     values: dict[str, float]
     omega: float
-    drive_gain: float
+
+    @property
+    def drive_gain(self) -> float:
+        """Force per unit of the input."""
+        return evaluated(self.rig.motion.drive_gain, self.values)
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> Li
             "c_y": rng.uniform(0.88, 0.99),
             "y_off": rng.normal(scale=2e-4),
         }
-        return LinearRig(rig, values, omega, _GEAR["b"] * _GEAR["k_tau"] / _GEAR["r_0"])
+        return LinearRig(rig, values, omega)
     mass = math.exp(rng.uniform(-2.0, 2.0))
     omega = rng.uniform(7.0, 20.0)
     small, wide = math.exp(rng.uniform(math.log(0.003), math.log(0.7))), rng.uniform(*_WIDE)
@@ -119,7 +121,7 @@ def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> Li
         "x_off": rng.normal(scale=0.02 * size),
         "force_off": 0.0,
     }
-    return LinearRig(rig, values, omega, gain)
+    return LinearRig(rig, values, omega)
 
 
 def draw_experiments(linear: LinearRig, rng: np.random.Generator) -> tuple[Experiment, ...]:

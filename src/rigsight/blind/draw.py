@@ -28,7 +28,7 @@ from rigsight.effects import Effect
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
 from rigsight.records import Record
-from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 
@@ -201,7 +201,8 @@ class _Bench:
     def _rest(self, effects: Sequence[Effect], rng: np.random.Generator | None) -> NDArray[np.float64]:
         """Return the states of the plant at rest; the phase of what pulsates is anything."""
         values = self.linear.values
-        rest = values.get("psi_off", values.get("x_off", 0.0))
+        rig = self.linear.rig
+        rest = evaluated(rig.motion.rest, values)
         structure = compose(self.linear.rig, effects)
         sensors = {s.symbol.name for e in effects if e.measured is not None for s in e.states}
         state = np.zeros(len(structure.states))
@@ -209,8 +210,8 @@ class _Bench:
         for i, (name, dimension) in enumerate(
             zip(structure.state_names, structure.state_dimensions, strict=True)
         ):
-            if name == "y":
-                state[i] = values["y_off"] + 2.0 * values["l_0"] * rest
+            if rig.lateral is not None and name == rig.lateral.symbol.name:
+                state[i] = values["y_off"] + evaluated(rig.lateral.static_gain, values) * rest
             elif name.rpartition(".")[2] in sensors:
                 state[i] = rest
             elif dimension == "" and rng is not None:

@@ -12,6 +12,7 @@ from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
+from rigsight.rigs import evaluated
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
@@ -88,9 +89,7 @@ def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iter
     own = structure.values_of(effect, fit.values)
     for start in effect.starts:
         if start.parent == effect.name:
-            moved = {
-                n: float(f.subs({s: own[s.name] for s in f.free_symbols})) for n, f in start.values.items()
-            }
+            moved = {name: evaluated(formula, own) for name, formula in start.values.items()}
             yield with_own_values(structure, effect, fit, moved)
 
 
@@ -127,7 +126,7 @@ def _evaluated(
     }
     inertia = bench.rig.motion.inertia
     if inertia is not None:
-        numbers[canonical.m] = float(inertia.subs({s: values[s.name] for s in inertia.free_symbols}))
+        numbers[canonical.m] = evaluated(inertia, values)
     result = {}
     for name, formula in formulas.items():
         own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
-import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.diagnose.bands import spectrum
@@ -21,7 +20,7 @@ from rigsight.diagnose.gap_parts import StatePart
 from rigsight.diagnose.result import STAGES, Trace
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.metrics import rms
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _CELLS = 9
@@ -119,7 +118,9 @@ def _motion(bench: Workbench, values: Mapping[str, float], trace: Trace) -> _Mot
     if own is None:
         force, noise = np.full(residual.size, _NOTHING), _NOTHING
     else:
-        m, d, k = (_number(e, values) for e in (rig.motion.inertia, rig.motion.damping, rig.motion.stiffness))
+        m, d, k = (
+            evaluated(e, values) for e in (rig.motion.inertia, rig.motion.damping, rig.motion.stiffness)
+        )
         smooth = _filtered(own, residual)
         rate = np.gradient(smooth, trace.dt)
         force = m * np.gradient(rate, trace.dt) + d * rate + k * smooth
@@ -158,11 +159,6 @@ def _cells(values: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.fl
 def _finite_mean(values: NDArray[np.float64]) -> float:
     finite = values[np.isfinite(values)]
     return float(np.mean(finite)) if finite.size else _NOTHING
-
-
-def _number(expression: sp.Expr | None, values: Mapping[str, float]) -> float:
-    assert expression is not None
-    return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
 
 
 def _units(rig: Rig) -> dict[str, str]:

@@ -9,7 +9,6 @@ import sympy as sp
 from rigsight.export.at_rest import state_at_rest
 from rigsight.export.description import filled, header_lines, indented
 from rigsight.export.equations import Exported
-from rigsight.export.languages import PYTHON
 from rigsight.export.python_function import (
     code_names,
     parameter_entries,
@@ -17,6 +16,7 @@ from rigsight.export.python_function import (
     unpacked_parameters,
     unpacked_states,
 )
+from rigsight.simulate.printing.python import PYTHON
 
 _KINKS = "Its equations have kinks, which a solver of variable step crosses unseen: keep max_step short of the events."
 _SMOOTH = "Its equations are smooth."

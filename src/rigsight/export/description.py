@@ -5,25 +5,15 @@ from __future__ import annotations
 from importlib.metadata import version
 from typing import Any
 
-import sympy as sp
-from sympy.printing.str import StrPrinter
-
 from rigsight.export.equations import Exported
 from rigsight.simulate.input_hold import Hold
+from rigsight.simulate.printing.text import text
 
 HOLDS: dict[Hold, str] = {
     "zoh": "the input is constant from each sample to the next",
     "foh": "the input is linear between samples",
 }
 MOTION_HOLD = "the motion is the cubic through values and rates at both ends of a sample time"
-
-
-class _TextPrinter(StrPrinter):  # type: ignore[misc]
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"max({self._print(expr.args[0])}, 0)"
-
-    def _print_Float(self, expr: sp.Float) -> str:  # noqa: N802
-        return f"{float(expr):.6g}"
 
 
 def hold_text(exported: Exported) -> str:
@@ -38,26 +28,20 @@ def made_by(source: str) -> str:
 
 def equation_lines(exported: Exported) -> list[str]:
     """Return the equations in plain text, one a line, in the names of the export."""
-    names: dict[sp.Symbol, str] = exported.names()
-
-    def text(expression: sp.Expr) -> str:
-        renamed = expression.xreplace({s: sp.Symbol(name, real=True) for s, name in names.items()})
-        return str(_TextPrinter().doprint(renamed)).replace("**", "^")
-
-    structure = exported.structure
+    structure, names = exported.structure, exported.names()
     lines = []
     if structure.delay is not None:
         name = exported.inputs[0].name
-        lines.append(f"{name} arrives {text(structure.delay)} late")
+        lines.append(f"{name} arrives {text(structure.delay, names)} late")
     for state, equation in zip(exported.states, structure.equations, strict=True):
-        line = f"{state.name}' = {text(equation.rate)}"
+        line = f"{state.name}' = {text(equation.rate, names)}"
         if equation.limit is not None:
-            line += f", abs({state.name}) <= {text(equation.limit)}: it rests at the end it is driven against"
+            line += f", abs({state.name}) <= {text(equation.limit, names)}: it rests at the end it is driven against"
         lines.append(line)
     for i, (output, expression) in enumerate(zip(exported.outputs, structure.outputs, strict=True)):
-        line = f"output {output.name} [{output.unit}] = {text(expression)}"
+        line = f"output {output.name} [{output.unit}] = {text(expression, names)}"
         if i == 0 and structure.measured_late is not None:
-            line += f", read {text(structure.measured_late)} late"
+            line += f", read {text(structure.measured_late, names)} late"
         lines.append(line)
     if exported.frozen.friction_mode is not None:
         lines.append(f"dry friction holds {exported.states[_velocity(exported)].name} at zero while it can")
@@ -97,8 +81,8 @@ def header_lines(exported: Exported, source: str, *, with_parameters: bool = Tru
 
 def filled(template: str, fragments: dict[str, Any]) -> str:
     """Return a template with its marks ``<<NAME>>`` replaced."""
-    for key, text in fragments.items():
-        template = template.replace(f"<<{key}>>", str(text))
+    for key, fragment in fragments.items():
+        template = template.replace(f"<<{key}>>", str(fragment))
     return template
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.kinks import FrozenStructure, freeze
@@ -51,8 +52,7 @@ def internal_step(model: Model) -> float:
     rest = np.zeros(len(structure.states))
     if structure.rig.is_driven:
         known = dict(zip(structure.names, p, strict=True))
-        motion_rest = structure.rig.motion.rest
-        rest[0] = float(motion_rest.subs({s: known[s.name] for s in motion_rest.free_symbols}))
+        rest[0] = evaluated(structure.rig.motion.rest, known)
     step = LONGEST
     for modes in _sides(frozen):
         jacobian = np.zeros((rest.size, rest.size))

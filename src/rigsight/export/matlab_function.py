@@ -9,9 +9,9 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
-from rigsight.export.languages import MATLAB
 from rigsight.export.precomputed import equations_of
 from rigsight.export.python_function import min_steps
+from rigsight.simulate.printing.matlab import MATLAB
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
 _DRIVE_PIECES = """function c = input_pieces(dt, {inputs})

@@ -7,7 +7,7 @@ import re
 from rigsight.export.at_rest import state_at_rest
 from rigsight.export.description import header_lines
 from rigsight.export.equations import Exported, Quantity
-from rigsight.export.languages import MODELICA
+from rigsight.simulate.printing.modelica import MODELICA
 from rigsight.simulate.structure import INPUT
 
 

@@ -10,8 +10,8 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text, indented
 from rigsight.export.equations import Exported
 from rigsight.export.internal_step import is_linear
-from rigsight.export.languages import PYTHON
 from rigsight.export.precomputed import equations_of
+from rigsight.simulate.printing.python import PYTHON
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
 
 MIN_STEPS = 4

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from rigsight.identify.covariance import propagated_covariance
-from rigsight.identify.physical import PhysicalEstimates, yaw_parameters
+from rigsight.identify.physical import PhysicalEstimates, check_fit, motion_parameters
 from rigsight.identify.transfer_fit import TransferFit
-
-_NAMES = {"k_c": "k", "J_z": "m", "k_d": "d"}
+from rigsight.rigs import AXIS
 
 
 def axis_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:
@@ -26,14 +25,9 @@ def axis_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:
     InputError
         If the fit is no PT2, or its gain is not positive.
     """
-    # The yaw equation with its drive b k_tau / r_0 in the place of the gain.
-    yaw = yaw_parameters(fit, {"b": gain, "k_tau": 1.0, "r_0": 1.0})
-    return PhysicalEstimates(
-        names=tuple(_NAMES[name] for name in yaw.names),
-        values={_NAMES[name]: value for name, value in yaw.values.items()},
-        covariance=yaw.covariance,
-        method=f"gain, break frequency and damping of the {fit.method}",
-    )
+    check_fit(fit, "pt2", "axis", "x / u")
+    method = f"gain, break frequency and damping of the {fit.method}"
+    return motion_parameters(AXIS, fit, {AXIS.motion.drive_gain.name: gain}, None, method)
 
 
 def springless_parameters(fit: TransferFit, gain: float) -> PhysicalEstimates:

@@ -17,6 +17,7 @@ from scipy.stats import norm
 
 from rigsight.errors import InputError
 from rigsight.identify.physical import LEVEL
+from rigsight.rigs import ROLLING, evaluated
 from rigsight.rigs.running_gear import creep_factor
 
 PLAUSIBLE = 0.3
@@ -167,7 +168,7 @@ def creep_error_of_sine(
     l_0, omega_b
         Distance [m] and break frequency [rad/s].
     """
-    common = 2.0 * l_0 * omega_b / (omega**2 + omega_b**2)
+    common = evaluated(ROLLING.static_gain, {"l_0": l_0}) * omega_b / (omega**2 + omega_b**2)
     per_sine = y_noise * math.sqrt(2.0 / n_samples) / psi_amplitude
     return per_sine / (common * omega_b), per_sine / (common * omega)
 

@@ -19,7 +19,7 @@ from rigsight.effects import symbols as canonical
 from rigsight.identify.equation_error import Spectra, Term, solve_in_frequency, spectra_of
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
 
@@ -80,8 +80,7 @@ class EffectRegression:
         ]
 
     def _number(self, expression: sp.Expr | None) -> float:
-        assert expression is not None
-        return float(expression.subs({s: self._values[s.name] for s in expression.free_symbols}))
+        return evaluated(expression, self._values)
 
     def start(self, effect: Effect) -> dict[str, float] | None:
         """Return values of rig and effect parameters to start from, None where the effect has no signal of its own."""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.identify.equation_error import solve_in_frequency, spectra_of
 from rigsight.records.record import Record
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import AXIS, RIGS, ROLLING, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _OUTPUTS = frozenset(signal.name for rig in RIGS.values() if rig.is_driven for signal in rig.outputs)
@@ -50,7 +50,7 @@ def linear_start(
         If the records do not move the rig.
     """
     if rig.name == "running_gear":
-        found = _running_gear(records, constants)
+        found = _running_gear(rig, records, constants)
     elif rig.name == "axis":
         found = _axis(records, constants, no_spring=known.get("k") == 0.0)
     else:
@@ -63,8 +63,8 @@ def linear_start(
     return {**clipped, **known}
 
 
-def _running_gear(records: Sequence[Record], constants: Mapping[str, float]) -> dict[str, float]:
-    gain = constants["b"] * constants["k_tau"] / constants["r_0"]
+def _running_gear(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> dict[str, float]:
+    gain = evaluated(rig.motion.drive_gain, constants)
     inertia, damping, stiffness = second_order(records, "u", "psi", gain)
     psi_mean = float(np.mean([np.mean(r["psi"]) for r in records]))
     u_mean = float(np.mean([np.mean(r["u"]) for r in records]))
@@ -83,12 +83,13 @@ def _running_gear(records: Sequence[Record], constants: Mapping[str, float]) -> 
         found["c_y"] = slope / constants["v"]
         found["l_0"] = slope / (2.0 * rate)
         y_mean = float(np.mean([np.mean(r["y"]) for r in with_y]))
-        found["y_off"] = y_mean - 2.0 * found["l_0"] * float(np.mean([np.mean(r["psi"]) for r in with_y]))
+        at_rest = evaluated(ROLLING.static_gain, found)
+        found["y_off"] = y_mean - at_rest * float(np.mean([np.mean(r["psi"]) for r in with_y]))
     return found
 
 
 def _axis(records: Sequence[Record], constants: Mapping[str, float], no_spring: bool) -> dict[str, float]:
-    gain = constants["gain"]
+    gain = evaluated(AXIS.motion.drive_gain, constants)
     inertia, damping, stiffness = second_order(records, "u", "x", gain, no_spring)
     x_mean = float(np.mean([np.mean(r["x"]) for r in records]))
     u_mean = float(np.mean([np.mean(r["u"]) for r in records]))

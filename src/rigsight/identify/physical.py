@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 from scipy.stats import norm
 
@@ -18,6 +19,7 @@ from rigsight.errors import InputError
 from rigsight.identify.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.records.record import Record
+from rigsight.rigs import ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
 
 LEVEL = 0.95
 """Confidence level of intervals where none is given."""
@@ -88,27 +90,49 @@ def yaw_parameters(
     InputError
         If the fit is no PT2, or its gain is not positive.
     """
-    _check(fit, "pt2", "yaw", "psi / u")
+    check_fit(fit, "pt2", "yaw", "psi / u")
+    return motion_parameters(RUNNING_GEAR, fit, constants, constant_errors, f"(2.21) from the {fit.method}")
+
+
+def motion_parameters(
+    rig: Rig,
+    fit: TransferFit,
+    constants: Mapping[str, float],
+    constant_errors: Mapping[str, float] | None,
+    method: str,
+) -> PhysicalEstimates:
+    """Return stiffness, inertia and damping of a rig from the PT2 of its motion.
+
+    Parameters
+    ----------
+    rig
+        A rig whose stiffness, inertia and damping are one parameter each.
+    fit
+        PT2 from its input to its displacement.
+    constants
+        Those of its drive.
+    constant_errors
+        Standard errors of constants, by name; missing ones count as exact.
+    method
+        What the estimates are said to come from.
+    """
     gain, omega_b, zeta = (fit.values[name] for name in ("gain", "omega_b", "zeta"))
-    drive = constants["b"] * constants["k_tau"] / constants["r_0"]
-    k_c = drive / gain
-    J_z = k_c / omega_b**2
-    k_d = 2.0 * zeta * J_z * omega_b
-    # Rows: d ln parameter / d ln (gain, omega_b, zeta, b, k_tau, r_0).
-    powers = np.array(
-        [
-            [-1.0, 0.0, 0.0, 1.0, 1.0, -1.0],
-            [-1.0, -2.0, 0.0, 1.0, 1.0, -1.0],
-            [-1.0, -1.0, 1.0, 1.0, 1.0, -1.0],
-        ]
-    )
+    motion = rig.motion
+    assert motion.inertia is not None
+    slopes = relative_slopes(motion.drive_gain, constants)
+    stiffness = evaluated(motion.drive_gain, constants) / gain
+    inertia = stiffness / omega_b**2
+    damping = 2.0 * zeta * inertia * omega_b
+    # Rows: d ln parameter / d ln (gain, omega_b, zeta, constants of the drive).
+    of_fit = np.array([[-1.0, 0.0, 0.0], [-1.0, -2.0, 0.0], [-1.0, -1.0, 1.0]])
+    of_drive = np.tile(list(slopes.values()), (3, 1))
     return _propagated(
-        {"k_c": k_c, "J_z": J_z, "k_d": k_d},
-        powers,
-        np.array([gain, omega_b, zeta, *(constants[name] for name in ("b", "k_tau", "r_0"))]),
+        {motion.stiffness.name: stiffness, motion.inertia.name: inertia, motion.damping.name: damping},
+        np.hstack([of_fit, of_drive]),
+        np.array([gain, omega_b, zeta, *(constants[name] for name in slopes)]),
         fit.covariance_of("gain", "omega_b", "zeta"),
-        [(constant_errors or {}).get(name, 0.0) for name in ("b", "k_tau", "r_0")],
-        f"(2.21) from the {fit.method}",
+        [(constant_errors or {}).get(name, 0.0) for name in slopes],
+        method,
     )
 
 
@@ -140,7 +164,7 @@ def lateral_parameters(
     InputError
         If the fit is no PT1, its gain is not positive, or the known length is not.
     """
-    _check(fit, "pt1", "lateral", "y / psi")
+    check_fit(fit, "pt1", "lateral", "y / psi")
     gain, omega_b, speed = fit.values["gain"], fit.values["omega_b"], constants["v"]
     speed_error = (constant_errors or {}).get("v", 0.0)
     if known_l_0 is None:
@@ -163,7 +187,31 @@ def lateral_parameters(
     return _propagated(values, powers, inputs, covariance, errors, f"{how} from the {fit.method}")
 
 
-def _check(fit: TransferFit, order: str, which: str, ratio: str) -> None:
+def static_lateral(l_0: float) -> tuple[float, float]:
+    """Return the lateral displacement per yaw angle at rest [m/rad], and its derivative with respect to l_0."""
+    gain = ROLLING.static_gain
+    (length,) = gain.free_symbols
+    numbers = {length.name: l_0}
+    return evaluated(gain, numbers), evaluated(sp.diff(gain, length), numbers)
+
+
+def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:
+    """Refuse a fit of another order, or one whose gain says that a signal counts the other way round.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    order
+        Order that is needed.
+    which, ratio
+        What is wanted of it, and of which signals, in words.
+
+    Raises
+    ------
+    InputError
+        If the order is another or the gain is not positive.
+    """
     if fit.form.order != order:
         raise InputError(
             f"The {which} parameters need a {order.upper()} ({ratio}), got a {fit.form.order.upper()}."
@@ -240,9 +288,10 @@ def offsets(
     y_mean, y_error = _mean(record["y"][inside])
     pushed = u_mean * (static_gain or 0.0)
     psi_off = psi_mean - pushed
-    # (2.27) with the stationary yaw angle: what the current pushes moves y too, by 2 l_0 per radian.
-    y_off = y_mean - 2.0 * l_0 * psi_mean
-    chain = np.array([[1.0, 0.0, 0.0], [-2.0 * l_0, 1.0, -2.0 * psi_mean]])
+    # (2.27) with the stationary yaw angle: what the current pushes moves y too.
+    per_radian, per_length = static_lateral(l_0)
+    y_off = y_mean - per_radian * psi_mean
+    chain = np.array([[1.0, 0.0, 0.0], [-per_radian, 1.0, -per_length * psi_mean]])
     covariance = chain @ np.diag(np.square([psi_error, y_error, l_0_error])) @ chain.T
     values = {"psi_off": psi_off, "y_off": y_off}
     return PhysicalEstimates(tuple(values), values, covariance, f"(2.26), (2.27) from {what}")

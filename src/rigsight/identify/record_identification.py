@@ -14,14 +14,14 @@ from rigsight.identify.axis_parameters import axis_parameters, springless_parame
 from rigsight.identify.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.driven_offsets import driven_offsets
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.physical import PhysicalEstimates, lateral_parameters, yaw_parameters
+from rigsight.identify.physical import PhysicalEstimates, lateral_parameters, static_lateral, yaw_parameters
 from rigsight.identify.record_response import Method, RecordResponse, record_response
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.identify.transfer_form import Order
 from rigsight.identify.transfer_function import fit_frequency_response
 from rigsight.identify.transfer_step import fit_step
 from rigsight.records.record import Hold, Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 
 _SURE = 0.1
 """Relative standard error of a line from which it is no evidence of a peak."""
@@ -120,7 +120,7 @@ def _motion(
     def physical(fit: TransferFit) -> PhysicalEstimates:
         if rig.downstream:
             return yaw_parameters(fit, constants)
-        gain = abs(constants["gain"])
+        gain = abs(evaluated(rig.motion.drive_gain, constants))
         return springless_parameters(fit, gain) if no_spring else axis_parameters(fit, gain)
 
     order: Order = "pt1" if no_spring else "pt2"
@@ -331,10 +331,13 @@ def _step_offsets(
     if lateral is not None and lateral.fit is not None and lateral.physical is not None:
         l_0, l_0_error = lateral.physical.values["l_0"], lateral.physical.standard_errors["l_0"]
         names.append("y_off")
-        values["y_off"] = lateral.fit.values["offset"] - 2.0 * l_0 * at_rest
+        per_radian, per_length = static_lateral(l_0)
+        values["y_off"] = lateral.fit.values["offset"] - per_radian * at_rest
         own = fit.standard_errors["offset"]
-        error = math.hypot(lateral.fit.standard_errors["offset"], 2.0 * l_0 * own, 2.0 * at_rest * l_0_error)
-        shared = -2.0 * l_0 * own**2
+        error = math.hypot(
+            lateral.fit.standard_errors["offset"], per_radian * own, per_length * at_rest * l_0_error
+        )
+        shared = -per_radian * own**2
         covariance = np.array([[variance, shared], [shared, error**2]])
     return PhysicalEstimates(tuple(names), values, covariance, "rest before the step, (2.26) and (2.27)")
 

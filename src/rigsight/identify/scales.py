@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _MOST = 98.0
@@ -37,9 +37,10 @@ def characteristic_scales(
         return _prescribed(rig, records)
     displacement = _size([record[rig.outputs[0].name] for record in records])
     drive_input = _size([record[rig.inputs[0].name] for record in records])
-    number = _evaluator(values)
-    gain = abs(number(rig.motion.drive_gain))
-    stiffness, inertia = number(rig.motion.stiffness), number(rig.motion.inertia)
+    motion = rig.motion
+    gain, stiffness, inertia = (
+        evaluated(part, values) for part in (motion.drive_gain, motion.stiffness, motion.inertia)
+    )
     omega = np.sqrt(stiffness / inertia) if stiffness > 0.0 else _typical_omega(rig, records)
     spring = stiffness * displacement if stiffness > 0.0 else inertia * omega**2 * displacement
     length = 1.0
@@ -49,7 +50,7 @@ def characteristic_scales(
     return {
         "x": displacement,
         "input": drive_input,
-        "drive": gain * drive_input,
+        "drive": abs(gain) * drive_input,
         "force": float(spring),
         "time": float(1.0 / omega),
         "length": length,
@@ -69,13 +70,6 @@ def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
         "input": displacement,
         "length": displacement,
     }
-
-
-def _evaluator(values: Mapping[str, float]):  # type: ignore[no-untyped-def]
-    def number(expression):  # type: ignore[no-untyped-def]
-        return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
-
-    return number
 
 
 def _size(signals: Sequence[NDArray[np.float64]]) -> float:

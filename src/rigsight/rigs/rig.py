@@ -71,6 +71,11 @@ class Lateral:
     gain: sp.Expr
     feedback: sp.Expr
 
+    @property
+    def static_gain(self) -> sp.Expr:
+        """Displacement from rest at which a unit of the motion is all turned back."""
+        return 1 / self.feedback
+
 
 @dataclass(frozen=True)
 class Rig:

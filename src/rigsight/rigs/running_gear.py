@@ -23,6 +23,16 @@ speed, r_0, b, k_tau = sp.symbols("v r_0 b k_tau", positive=True)
 J_z, k_c, k_d, l_0, c_y = sp.symbols("J_z k_c k_d l_0 c_y", positive=True)
 psi_off, y_off = sp.symbols("psi_off y_off", real=True)
 
+_from_rest, _feedback = y - y_off, 1 / (2 * l_0)
+ROLLING = Lateral(
+    symbol=y,
+    displacement=_from_rest,
+    creepage=psi - _from_rest * _feedback,
+    gain=speed * c_y,
+    feedback=_feedback,
+)
+"""The lateral displacement of the running gear."""
+
 RUNNING_GEAR = Rig(
     name="running_gear",
     summary="Motor current drives the yaw angle, the yaw angle the lateral displacement of a roller-rig axle.",
@@ -80,13 +90,7 @@ RUNNING_GEAR = Rig(
         bias=sp.Integer(0),
         inertia=J_z,
     ),
-    lateral=Lateral(
-        symbol=y,
-        displacement=y - y_off,
-        creepage=psi - (y - y_off) / (2 * l_0),
-        gain=speed * c_y,
-        feedback=1 / (2 * l_0),
-    ),
+    lateral=ROLLING,
     units={"x": "rad", "force": "N m", "input": "A", "time": "s", "length": "m"},
     dynamics_name="yaw_dynamics",
 )

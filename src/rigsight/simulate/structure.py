@@ -1,15 +1,17 @@
-"""Which equations a rig with a tuple of effects has: states, rates, outputs and delay as symbols."""
+"""What a rig with a tuple of effects is for a simulation: its parameters, its equations, and these without definitions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import sympy as sp
 
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
+from rigsight.simulate.equation_tree import EquationTree, late, rate_within
 
 INPUT = sp.Symbol("input_value", real=True)
 INPUT_RATE = sp.Symbol("input_rate", real=True)
@@ -28,9 +30,7 @@ class StateEquation:
     @property
     def limited_rate(self) -> sp.Expr:
         """The rate, zero while the state is driven against an end of its range."""
-        if self.limit is None:
-            return self.rate
-        return self.rate * (1 - sp.sign(self.symbol * sp.sign(self.rate) - self.limit)) / 2
+        return rate_within(self.symbol, self.rate, self.limit)
 
 
 @dataclass(frozen=True)
@@ -45,16 +45,8 @@ class Structure:
         Effect parameters written into the equations as numbers.
     parameters, parameter_symbols
         Constants, rig parameters and effect parameters with units, and their symbols; names are unique.
-    equations
-        The states with their rates, dimensions and limits.
-    outputs
-        The rig's outputs as expressions.
-    delay
-        Time by which the input arrives late, or None.
-    measured_late
-        Time by which the first output is measured late, or None.
-    velocity_index
-        Index of the velocity of the moving mass among the states, None where the motion is prescribed.
+    tree
+        The equations: named definitions, motion, states and outputs. What follows from it here holds no definitions.
     """
 
     rig: Rig
@@ -62,11 +54,48 @@ class Structure:
     fixed: tuple[tuple[str, float], ...]
     parameters: tuple[Parameter, ...]
     parameter_symbols: tuple[sp.Symbol, ...]
-    equations: tuple[StateEquation, ...]
-    outputs: tuple[sp.Expr, ...]
-    delay: sp.Expr | None
-    measured_late: sp.Expr | None
-    velocity_index: int | None
+    tree: EquationTree
+
+    @cached_property
+    def equations(self) -> tuple[StateEquation, ...]:
+        """The states with their rates, dimensions and limits: coordinates, velocities, then the others."""
+        tree, motion = self.tree, self.tree.motion
+        rate_dimension = f"{motion.dimension} time^-1"
+        coordinates = zip(motion.coordinates, motion.velocities, strict=True)
+        velocities = zip(motion.velocities, motion.accelerations, strict=True)
+        return (
+            *(StateEquation(symbol, rate, motion.dimension) for symbol, rate in coordinates),
+            *(StateEquation(symbol, tree.flattened(rate), rate_dimension) for symbol, rate in velocities),
+            *(
+                StateEquation(state.symbol, tree.flattened(state.rate), state.dimension, state.limit)
+                for state in tree.states
+            ),
+        )
+
+    @cached_property
+    def outputs(self) -> tuple[sp.Expr, ...]:
+        """The rig's outputs as expressions."""
+        return tuple(self.tree.flattened(sp.Add(*output.terms)) for output in self.tree.outputs)
+
+    @cached_property
+    def delay(self) -> sp.Expr | None:
+        """Time by which the input arrives late, or None."""
+        arriving = [
+            self.tree.lateness(d.symbol) for d in self.tree.definitions if isinstance(d.expression, late)
+        ]
+        delays = [delay for source, delay in arriving if source == INPUT]
+        return delays[-1] if delays else None
+
+    @cached_property
+    def measured_late(self) -> sp.Expr | None:
+        """Time by which the first output is measured late, or None."""
+        reading = sp.Add(*self.tree.outputs[0].terms)
+        return self.tree.lateness(reading)[1]
+
+    @property
+    def velocity_index(self) -> int | None:
+        """Index of the velocity of the moving mass among the states, None where the motion is prescribed."""
+        return len(self.tree.motion.coordinates) or None
 
     @property
     def names(self) -> tuple[str, ...]:

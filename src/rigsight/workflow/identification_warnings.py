@@ -10,6 +10,7 @@ from rigsight.identify.identification import JointIdentification, RecordIdentifi
 from rigsight.identify.record_identification import MISFIT, input_peak
 from rigsight.identify.record_response import driven_band
 from rigsight.records import Record
+from rigsight.rigs import evaluated
 from rigsight.workflow.campaign import Campaign
 
 _TOLERANCE = 0.02
@@ -44,10 +45,7 @@ def _resonance(campaign: Campaign, joint: JointIdentification) -> float | None:
     motion, values = campaign.rig.motion, joint.fit.fit.values
     if motion.inertia is None:
         return None
-    stiffness, inertia = (
-        float(part.subs({symbol: values[symbol.name] for symbol in part.free_symbols}))
-        for part in (motion.stiffness, motion.inertia)
-    )
+    stiffness, inertia = (evaluated(part, values) for part in (motion.stiffness, motion.inertia))
     return math.sqrt(stiffness / inertia) if stiffness > 0.0 else None
 
 

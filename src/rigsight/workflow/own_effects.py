@@ -18,6 +18,7 @@ from rigsight.discover.monomials import known_terms
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.records.ordinary_file import file_size
+from rigsight.simulate.printing.text import text
 from rigsight.workflow.effect_declaration import declaration_faults, equations
 from rigsight.workflow.effect_promises import broken_promises
 from rigsight.workflow.progress import Listener, Stage, silent
@@ -111,12 +112,11 @@ def equation_text(effect: Effect) -> str:
         "measured": "measured = {}",
         "measured_late": "measured = reading(t - {})",
     }
-    lines = [told[field].format(expression) for field, expression in equations(effect).items()]
+    lines = [told[field].format(text(expression, {})) for field, expression in equations(effect).items()]
     for state in effect.states:
-        limit = "" if state.limit is None else f" within +-{state.limit}"
-        lines.append(f"{state.symbol}' = {state.rate}{limit}")
-    text = ", ".join(lines).replace("**", "^").replace("*", " ")
-    return textwrap.shorten(text, _LONGEST_EQUATION, placeholder=" ...")
+        limit = "" if state.limit is None else f" within +-{text(state.limit, {})}"
+        lines.append(f"{state.symbol}' = {text(state.rate, {})}{limit}")
+    return textwrap.shorten(", ".join(lines).replace("*", " "), _LONGEST_EQUATION, placeholder=" ...")
 
 
 def _message(own: OwnEffect, faults: Sequence[str]) -> str:

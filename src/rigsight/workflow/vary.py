@@ -18,6 +18,7 @@ from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_
 from rigsight.parameters import Parameter
 from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
+from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state, simulate
 from rigsight.simulate.input_hold import hold_input
 from rigsight.simulate.model import Model
@@ -239,9 +240,8 @@ def _natural_frequency(model: Model, amplitude: float) -> float:
     """
     motion = model.structure.rig.motion
     drive, stiffness, inertia, rest = (
-        float(e.subs({s: model.values[s.name] for s in e.free_symbols}))
-        for e in (motion.drive_gain, motion.stiffness, motion.inertia, motion.rest)
-        if e is not None
+        evaluated(part, model.values)
+        for part in (motion.drive_gain, motion.stiffness, motion.inertia, motion.rest)
     )
     if stiffness <= 0.0:
         raise InputError(

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from rigsight.effects import effect_named
 from rigsight.records import Hold, Kind, Record, Role
-from rigsight.rigs import RUNNING_GEAR
+from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure, compose, simulate
 
@@ -86,7 +86,7 @@ class VirtualRig:
         """
         torque = self._torque_disturbance(u.size, rng)
         values = self.truth.values()
-        per_ampere = values["b"] * values["k_tau"] / values["r_0"]
+        per_ampere = evaluated(self.structure.rig.motion.drive_gain, values)
         driven = Record(
             name=name, dt=self.dt, signals={"u": u + torque / per_ampere}, units={"u": "A"}, role=role, kind=kind,
             amplitude=amplitude, hold=hold,

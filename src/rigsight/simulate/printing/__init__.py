@@ -1,1 +1,1 @@
-"""Symbolic equations -> text of a language; one file per language."""
+"""How are the equations of a structure written in each language? One file per language, and what they share."""

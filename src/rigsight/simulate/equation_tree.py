@@ -1,0 +1,187 @@
+"""What are the equations of a rig with effects made of, before anything is substituted: one tree that everything else reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+
+import sympy as sp
+
+
+class Kind(StrEnum):
+    """What a named value of the equations is."""
+
+    DRIVE = "drive"
+    DEFLECTION = "deflection"
+    DEFLECTION_RATE = "deflection_rate"
+    SPRING = "spring_torque"
+    TORQUE = "torque"
+    LATERAL = "lateral_rate"
+    READING = "reading"
+
+
+class late(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """First argument as it was the second argument ago; the whole expression of a definition, never a part of one."""
+
+    is_real = True
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A named value: what an effect makes of the signal that reaches it.
+
+    Attributes
+    ----------
+    symbol
+        Its symbol in the definitions and equations behind it.
+    expression
+        What it is, of inputs, states, parameters and the definitions in front of it; a delay is `late` of a signal.
+    kind
+        What it is in the signal path.
+    owner
+        Name of the effect that it belongs to; None for the rig.
+    rate_of
+        Symbol of the definition whose time derivative this is, if it is one: people see a dot instead of an equation.
+    """
+
+    symbol: sp.Symbol
+    expression: sp.Expr
+    kind: Kind
+    owner: str | None
+    rate_of: sp.Symbol | None = None
+
+
+@dataclass(frozen=True)
+class EquationsOfMotion:
+    """``mass @ accelerations = forces``, of n degrees of freedom; n = 0 where the motion is prescribed.
+
+    Attributes
+    ----------
+    coordinates, velocities
+        Symbols of the states, n each.
+    mass
+        Mass matrix (n, n) of parameters, coordinates and definitions.
+    terms
+        For each coordinate the parts of its generalized force with their signs, in the order in which people read them.
+    dimension
+        Dimension text of the coordinates.
+    """
+
+    coordinates: tuple[sp.Symbol, ...] = ()
+    velocities: tuple[sp.Symbol, ...] = ()
+    mass: sp.ImmutableMatrix = field(default_factory=lambda: sp.ImmutableMatrix(0, 0, []))
+    terms: tuple[tuple[sp.Expr, ...], ...] = ()
+    dimension: str = "x"
+
+    @property
+    def forces(self) -> tuple[sp.Expr, ...]:
+        """Generalized forces, one for each coordinate."""
+        return tuple(sp.Add(*terms) for terms in self.terms)
+
+    @property
+    def accelerations(self) -> tuple[sp.Expr, ...]:
+        """Rates of the velocities: the forces through the inverse of the mass matrix."""
+        if len(self.coordinates) == 1:
+            return (self.forces[0] / self.mass[0, 0],)
+        return tuple(self.mass.LUsolve(sp.Matrix(self.forces))) if self.coordinates else ()
+
+
+@dataclass(frozen=True)
+class FirstOrderState:
+    """A state beside the motion: a memory, a lag, the lateral displacement.
+
+    Attributes
+    ----------
+    symbol
+        Its symbol.
+    terms
+        The parts of its rate, in the order in which people read them.
+    dimension
+        Dimension text.
+    limit
+        Half-width of the range that it cannot leave, if any.
+    owner
+        Name of the effect that it belongs to; None for the rig.
+    """
+
+    symbol: sp.Symbol
+    terms: tuple[sp.Expr, ...]
+    dimension: str
+    limit: sp.Expr | None
+    owner: str | None
+
+    @property
+    def rate(self) -> sp.Expr:
+        """The rate inside the range."""
+        return sp.Add(*self.terms)
+
+    @property
+    def limited_rate(self) -> sp.Expr:
+        """The rate, zero while the state is driven against an end of its range."""
+        return rate_within(self.symbol, self.rate, self.limit)
+
+
+@dataclass(frozen=True)
+class Output:
+    """A recorded quantity: its column, and the parts it is the sum of, in the order in which people read them."""
+
+    name: str
+    terms: tuple[sp.Expr, ...]
+
+
+@dataclass(frozen=True)
+class EquationTree:
+    """The equations of a rig with effects; every expression refers to the definitions.
+
+    Attributes
+    ----------
+    inputs
+        Symbols of what is recorded and drives the rig, as it is now and not as it arrives.
+    definitions
+        Named values in the order of evaluation.
+    motion
+        The equations of motion.
+    states
+        The states beside the motion.
+    outputs
+        What is recorded of the rig.
+    """
+
+    inputs: tuple[sp.Symbol, ...]
+    definitions: tuple[Definition, ...]
+    motion: EquationsOfMotion
+    states: tuple[FirstOrderState, ...]
+    outputs: tuple[Output, ...]
+
+    def flattened(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression without definitions; what is late stands in it as if it arrived at once."""
+        return expression.xreplace(self._values)
+
+    def lateness(self, symbol: sp.Symbol) -> tuple[sp.Symbol, sp.Expr | None]:
+        """Return what a symbol was before it was delayed, and by how much in all; None without a delay."""
+        delays: list[sp.Expr] = []
+        while isinstance(expression := self._expressions.get(symbol), late):
+            symbol, delay = expression.args
+            delays.append(delay)
+        return symbol, sp.Add(*delays) if delays else None
+
+    @cached_property
+    def _expressions(self) -> Mapping[sp.Symbol, sp.Expr]:
+        return {definition.symbol: definition.expression for definition in self.definitions}
+
+    @cached_property
+    def _values(self) -> Mapping[sp.Symbol, sp.Expr]:
+        values: dict[sp.Symbol, sp.Expr] = {}
+        for symbol, expression in self._expressions.items():
+            now = expression.args[0] if isinstance(expression, late) else expression
+            values[symbol] = now.xreplace(values)
+        return values
+
+
+def rate_within(state: sp.Symbol, rate: sp.Expr, limit: sp.Expr | None) -> sp.Expr:
+    """Return the rate of a state that rests at the end of its range that it is driven against."""
+    if limit is None:
+        return rate
+    return rate * (1 - sp.sign(state * sp.sign(rate) - limit)) / 2

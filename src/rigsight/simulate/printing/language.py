@@ -1,0 +1,64 @@
+"""How do statements look in a language of code, whatever the language?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+
+class PowersAsProducts:
+    """Small powers as products: `pow` is slow and, in a loop of controls, of no known duration."""
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: ARG002, N802
+        printer: Any = self
+        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
+            product = "*".join([printer.parenthesize(expr.base, 1000)] * abs(int(expr.exp)))
+            return f"({product})" if expr.exp > 0 else f"(1.0/({product}))"
+        return str(super()._print_Pow(expr))  # type: ignore[misc]
+
+
+@dataclass(frozen=True)
+class Language:
+    """How statements look: the printer, a fresh variable and an assignment."""
+
+    printer: Any
+    declared: str
+    assigned: str
+
+    def expression(self, expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
+        """Return one expression with its symbols renamed."""
+        return str(self.printer.doprint(_plain(_renamed(expression, names))))
+
+    def statements(
+        self, targets: Sequence[str], expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str]
+    ) -> list[str]:
+        """Return statements that assign expressions to targets, sharing common parts.
+
+        Parameters
+        ----------
+        targets
+            Left-hand sides.
+        expressions
+            Right-hand sides, same length.
+        names
+            Name in the code of each symbol.
+        """
+        renamed = [_renamed(expression, names) for expression in expressions]
+        parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
+        shared, reduced = sp.cse(renamed, symbols=parts, optimizations=None)
+        lines = [self.declared.format(s.name, self.printer.doprint(_plain(e))) for s, e in shared]
+        return lines + [
+            self.assigned.format(target, self.printer.doprint(_plain(e)))
+            for target, e in zip(targets, reduced, strict=True)
+        ]
+
+
+def _renamed(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> sp.Expr:
+    return expression.xreplace({symbol: sp.Symbol(name, real=True) for symbol, name in names.items()})
+
+
+def _plain(expression: sp.Expr) -> sp.Expr:
+    return expression.evalf() if expression.is_number else expression

@@ -1,0 +1,84 @@
+"""How are equations written as LaTeX?"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import sympy as sp
+from sympy.printing.latex import LatexPrinter as SympyLatexPrinter
+
+from rigsight.simulate.printing.names import GREEK, ShownName, named
+from rigsight.simulate.printing.shown import ShownEquation
+
+_DIGITS = 6
+"""Of numbers that stand in an effect's equation; those of parameters stand beside it."""
+_ACCENTS = ("", r"\dot", r"\ddot")
+
+
+def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]) -> tuple[str, str]:
+    """Return both sides of an equation as LaTeX of mathematics.
+
+    Parameters
+    ----------
+    equation
+        The equation.
+    names
+        Name of each symbol.
+    """
+    printer = LatexPrinter(names)
+    right = " ".join(f"{sign} {printer.expression(term)}".strip() for sign, term in equation.signed_terms)
+    if equation.limit is not None:
+        state, half_width = map(printer.expression, equation.limit)
+        right += rf",\quad \left|{state}\right| \leq {half_width}"
+    return printer.expression(equation.left), right
+
+
+def latex_name(name: ShownName) -> str:
+    r"""Return a name as LaTeX of mathematics: ``k_{c}``, ``\dot{\psi}``."""
+    letter = name.letter
+    if letter in GREEK:
+        letter = f"\\{letter}"
+    elif len(letter) > 1:
+        letter = rf"\mathrm{{{latex_text(letter)}}}"
+    if name.dots:
+        letter = f"{_ACCENTS[name.dots]}{{{letter}}}"
+    return f"{letter}_{{{', '.join(map(_below, name.below))}}}" if name.below else letter
+
+
+def latex_text(text: str, *, math: bool = False) -> str:
+    """Return text with the characters escaped that LaTeX reads itself; in mathematics ``^`` stays a power."""
+    special = r"([&%$#_{}])" if math else r"([&%$#_{}^])"
+    return re.sub(special, r"\\\1", text.replace("\\", "/")).replace("\\^", r"\^{}")
+
+
+class LatexPrinter(SympyLatexPrinter):  # type: ignore[misc]
+    """sympy's LaTeX with the names that people read.
+
+    Parameters
+    ----------
+    names
+        Name of each symbol.
+    """
+
+    def __init__(self, names: Mapping[sp.Symbol, ShownName]) -> None:
+        symbols = {sp.Symbol(name.plain, real=True): latex_name(name) for name in names.values()}
+        super().__init__({"symbol_names": symbols, "full_prec": False})
+        self._names = names
+
+    def expression(self, expression: sp.Expr) -> str:
+        """Return an expression of named symbols."""
+        return str(self.doprint(named(expression, self._names)))
+
+    def _print_Float(self, expr: sp.Float) -> str:  # noqa: N802
+        return str(super()._print_Float(sp.Float(expr, _DIGITS)))
+
+    def _print_late(self, expression: sp.Expr) -> str:
+        signal, delay = map(self._print, expression.args)
+        return rf"{signal}\left(t - {delay}\right)"
+
+
+def _below(word: str) -> str:
+    if word in GREEK:
+        return f"\\{word}"
+    return word if len(word) <= 2 else rf"\text{{{latex_text(word)}}}"

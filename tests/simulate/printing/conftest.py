@@ -1,0 +1,76 @@
+"""What the simulation computes of a structure at one instant: the only place that the test of shown equations asks.
+
+The frozen equations as they are printed as code: exact at any instant. The compiled kernel, which tells no rates, is asked by
+what it moves in a moment, in a test of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import pytest
+import sympy as sp
+
+from rigsight.simulate import Structure
+from rigsight.simulate.kinks import freeze
+from rigsight.simulate.printing.python import PYTHON
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Rates by state and outputs by column at one instant; the first output is read `measured_late` later."""
+
+    rates: dict[sp.Symbol, float]
+    outputs: dict[str, float]
+    measured_late: float
+
+
+@pytest.fixture(scope="session")
+def simulated_instant() -> Callable[..., Instant]:
+    return _simulated_instant
+
+
+def _simulated_instant(
+    structure: Structure,
+    numbers: Mapping[sp.Symbol, float],
+    source: Callable[[float], float],
+    source_rate: Callable[[float], float],
+    time: float,
+) -> Instant:
+    """Return what is simulated for numbers of states and parameters, and an input as a function of time."""
+    frozen = freeze(structure)
+    known: dict[sp.Symbol, float] = dict(numbers)
+    late = 0.0 if structure.delay is None else _values([structure.delay], known)[0]
+    known |= {INPUT: source(time - late), INPUT_RATE: source_rate(time - late), TIME: time}
+    for mode, switch in zip(frozen.modes, frozen.switches, strict=True):
+        known[mode] = 1.0 if _values([switch], known)[0] >= 0.0 else -1.0
+    rates = _values(frozen.rates, known)
+    outputs = _values(frozen.outputs[: len(structure.outputs)], known)
+    measured_late = 0.0 if structure.measured_late is None else _values([structure.measured_late], known)[0]
+    return Instant(
+        dict(zip(structure.states, rates, strict=True)),
+        dict(zip((s.name for s in structure.rig.outputs), outputs, strict=True)),
+        measured_late,
+    )
+
+
+def _values(expressions: Sequence[sp.Expr], known: Mapping[sp.Symbol, float]) -> list[float]:
+    scope: dict[str, Any] = {
+        "math": math,
+        "sign_of": lambda value: math.copysign(1.0, value) if value else 0.0,
+        **{f"number_{i}": value for i, value in enumerate(known.values())},
+    }
+    exec(_code(tuple(expressions), tuple(known)), scope)
+    return [float(scope[f"value_{i}"]) for i in range(len(expressions))]
+
+
+@cache
+def _code(expressions: tuple[sp.Expr, ...], symbols: tuple[sp.Symbol, ...]) -> Any:
+    names = {symbol: f"number_{i}" for i, symbol in enumerate(symbols)}
+    targets = [f"value_{i}" for i in range(len(expressions))]
+    return compile("\n".join(PYTHON.statements(targets, expressions, names)), "equations", "exec")
