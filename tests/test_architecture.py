@@ -50,4 +50,4 @@ def test_every_language_is_printed_in_one_place() -> None:
     }
     elsewhere = {name for name in printers if not name.startswith("simulate/printing/")}
     # These are about to move: the kernel's own, the C export's, and the text and LaTeX of a discovered equation.
-    assert elsewhere <= {"simulate/expressions.py", "export/languages.py", "discover/equations.py"}
+    assert elsewhere <= {"export/languages.py", "discover/equations.py"}

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from sympy.printing.str import StrPrinter
 
 from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.motion import Motion
@@ -24,20 +23,13 @@ from rigsight.discover.regression import Projected, inclusion_probabilities
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
+from rigsight.simulate.printing.text import TermPrinter
 
 _FORCE = sp.Symbol("F", real=True)
 _RATE = sp.Symbol("x'", real=True)
 _DISPLACEMENT = sp.Symbol("x", real=True)
 _RIVALS = (-_FORCE, _DISPLACEMENT)
 """A force that relaxes, and one without memory: terms that no loop has."""
-
-
-class _Text(StrPrinter):  # type: ignore[misc]
-    def _print_Abs(self, expr: sp.Expr) -> str:  # noqa: N802
-        return f"|{self._print(expr.args[0])}|"
-
-    def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
-        return str(super()._print_Pow(expr, rational=rational)).replace("**", "^").replace(" ", "")
 
 
 @dataclass(frozen=True)
@@ -159,4 +151,4 @@ def _name(term: sp.Expr) -> str:
         return not factor.has(_RATE), factor == _FORCE, str(factor)
 
     factors = [f for f in sp.Mul.make_args(term) if not f.is_number]
-    return " ".join(_Text().doprint(factor) for factor in sorted(factors, key=place))
+    return " ".join(TermPrinter().doprint(factor) for factor in sorted(factors, key=place))

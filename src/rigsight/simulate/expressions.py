@@ -1,44 +1,10 @@
-"""Printing of symbolic equations as Python, and what of them depends on parameters alone."""
+"""What of the equations depends on parameters alone, and in which form do the rest take fewest operations?"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import sympy as sp
-from sympy.printing.pycode import PythonCodePrinter
-
-
-class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
-    """Prints expressions in the vocabulary of the kernel: products for small powers, selects for signs."""
-
-    def __init__(self) -> None:
-        super().__init__({"fully_qualified_modules": True, "strict": False})
-
-    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: N802
-        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
-            base = self.parenthesize(expr.base, 1000)
-            product = "*".join([base] * abs(int(expr.exp)))
-            return f"({product})" if expr.exp > 0 else f"(1.0/({product}))"
-        text: str = super()._print_Pow(expr, rational)
-        return text
-
-    def _print_Abs(self, expr: sp.Abs) -> str:  # noqa: N802
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_absolute(self, expr: sp.Function) -> str:
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"max({self._print(expr.args[0])}, 0.0)"
-
-    def _print_sign(self, expr: sp.sign) -> str:
-        return f"sign_of({self._print(expr.args[0])})"
-
-    def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
-        return repr(float(expr))
-
-    def _print_Half(self, expr: sp.Expr) -> str:  # noqa: ARG002, N802
-        return "0.5"
 
 
 def hoist_constants(

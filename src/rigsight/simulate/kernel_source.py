@@ -20,7 +20,7 @@ import sympy as sp
 
 from rigsight.simulate.expressions import gathered, hoist_constants
 from rigsight.simulate.kinks import FrozenStructure, freeze
-from rigsight.simulate.printing.c import c_statements, limited
+from rigsight.simulate.printing.c import C_LANES, C, limited
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
 
 LANES = 32
@@ -288,7 +288,9 @@ def _body(
     lanes: bool = False,
 ) -> str:
     """Return the body of a function; arguments that its equations happen not to read are marked for the compiler."""
-    lines = c_statements(targets, expressions, names, lanes) if targets else []
+    for symbol in sorted(set().union(*(e.free_symbols for e in expressions)) - set(names), key=str):
+        raise KeyError(f"The symbol {symbol} has no number: no name of a rig or an effect may reach C.")
+    lines = (C_LANES if lanes else C).statements(targets, expressions, names) if targets else []
     text = "\n".join([*lines, *further])
     unread = [a for a in arguments if f"{a}[" not in text and f"{a}->" not in text]
     marks = [" ".join(f"(void){argument};" for argument in unread)] if unread else []

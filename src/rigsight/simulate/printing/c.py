@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import sympy as sp
 from sympy.printing.c import C99CodePrinter
+
+from rigsight.simulate.printing.language import Language, PowersAsProducts
 
 
 class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -15,14 +14,8 @@ class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
     is_real = True
 
 
-class CPrinter(C99CodePrinter):  # type: ignore[misc]
+class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
     """C99 with products for small powers; ``sign_of``, ``positive`` and ``within`` are functions of the file."""
-
-    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: ARG002, N802
-        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
-            product = "*".join([self.parenthesize(expr.base, 1000)] * abs(int(expr.exp)))
-            return f"({product})" if expr.exp > 0 else f"(1.0/({product}))"
-        return str(super()._print_Pow(expr))
 
     def _print_Rational(self, expr: sp.Rational) -> str:  # noqa: N802
         return repr(float(expr))
@@ -51,6 +44,11 @@ class CPrinter(C99CodePrinter):  # type: ignore[misc]
 
 class LanePrinter(CPrinter):
     """The same for vectors: every function is the vector's own, with a ``v_`` in front, and takes vectors alone."""
+
+    def doprint(self, expr: sp.Expr, assign_to: str | None = None) -> str:
+        """Return an expression as a vector."""
+        text = str(super().doprint(expr, assign_to))
+        return f"v_all({text})" if expr.is_number else text
 
     def _vector(self, expr: sp.Expr) -> str:
         text = str(self._print(expr))
@@ -93,58 +91,5 @@ class LanePrinter(CPrinter):
         return self._call("within", *expr.args)
 
 
-_SCALAR, _LANES = CPrinter(), LanePrinter()
-
-
-def c_expression(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
-    """Return one expression with its symbols renamed."""
-    return str(_SCALAR.doprint(_plain(_renamed(expression, names))))
-
-
-def c_statements(
-    targets: Sequence[str],
-    expressions: Sequence[sp.Expr],
-    names: Mapping[sp.Symbol, str],
-    lanes: bool = False,
-) -> list[str]:
-    """Return C statements that assign expressions to targets, sharing common parts.
-
-    Parameters
-    ----------
-    targets
-        Left-hand sides.
-    expressions
-        Right-hand sides, same length.
-    names
-        Name in the code of each symbol; every symbol must be listed, so that no name of a rig or an effect reaches C.
-    lanes
-        True for vectors of parameter sets.
-
-    Raises
-    ------
-    KeyError
-        If a symbol has no name.
-    """
-    printer: Any = _LANES if lanes else _SCALAR
-    for symbol in set().union(*(expression.free_symbols for expression in expressions)):
-        if symbol not in names:
-            raise KeyError(f"The symbol {symbol} has no name in C.")
-    renamed = [_renamed(expression, names) for expression in expressions]
-    parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
-    shared, reduced = sp.cse(renamed, symbols=parts, optimizations=None)
-    declared = "const lanes {} = {};" if lanes else "const double {} = {};"
-
-    def written(expression: sp.Expr) -> str:
-        text = str(printer.doprint(_plain(expression)))
-        return f"v_all({text})" if lanes and expression.is_number else text
-
-    lines = [declared.format(symbol.name, written(expression)) for symbol, expression in shared]
-    return lines + [f"{target} = {written(e)};" for target, e in zip(targets, reduced, strict=True)]
-
-
-def _renamed(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> sp.Expr:
-    return expression.xreplace({s: sp.Symbol(names[s], real=True) for s in expression.free_symbols})
-
-
-def _plain(expression: sp.Expr) -> sp.Expr:
-    return expression.evalf() if expression.is_number else expression
+C = Language(CPrinter(), "const double {} = {};", "{} = {};")
+C_LANES = Language(LanePrinter(), "const lanes {} = {};", "{} = {};")

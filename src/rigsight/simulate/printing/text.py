@@ -21,6 +21,16 @@ class TextPrinter(StrPrinter):  # type: ignore[misc]
         return f"{float(expr):.6g}"
 
 
+class TermPrinter(StrPrinter):  # type: ignore[misc]
+    """A single term as short as it can be read: bars for absolute values, no spaces in powers."""
+
+    def _print_Abs(self, expr: sp.Expr) -> str:  # noqa: N802
+        return f"|{self._print(expr.args[0])}|"
+
+    def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
+        return str(super()._print_Pow(expr, rational=rational)).replace("**", "^").replace(" ", "")
+
+
 def text(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
     """Return an expression as plain text with its symbols renamed."""
     return str(
