@@ -11,6 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEPENDENCIES := $(VENV)/.dependencies-installed
 INSTALLED := $(VENV)/.rigsight-installed
+COMPILER := $(VENV)/.compiler-found
 FUZZER_INSTALLED := $(VENV)/.fuzzer-installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
@@ -68,8 +69,15 @@ $(DEPENDENCIES): requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	@touch $@
 
+# Simulations are compiled: where the machine has no C compiler, one comes from the package index (a tenth of a gigabyte).
+$(COMPILER): $(DEPENDENCIES)
+	@test -n "$$CC" || command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null \
+		|| { echo "No C compiler was found: installing one into $(VENV) ..."; \
+		     $(BIN)/python -m pip install --quiet --disable-pip-version-check "ziglang==0.17.1"; }
+	@touch $@
+
 # hatchling comes from the lock, so that no unpinned build tool is fetched.
-$(INSTALLED): pyproject.toml $(DEPENDENCIES)
+$(INSTALLED): pyproject.toml $(DEPENDENCIES) $(COMPILER)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 

@@ -16,7 +16,7 @@ from rigsight.units import characteristic_value
 from rigsight.workflow.effect_promises import AXIS_BENCH, GEAR_BENCH, bench_of, sizes
 
 DT = 5e-3
-N_SAMPLES = 400
+N_SAMPLES = 200
 _WIDE = 1e3
 """Longest ratio of a search box that is drawn evenly; longer ones are drawn by their logarithm."""
 
