@@ -87,7 +87,7 @@ def main() -> None:
     text = [
         f"Written by `python experiments/engine_accuracy/run.py --draws {chosen.draws} --seed {chosen.seed}`.",
         "",
-        f"Relative RMS error of the first output of `simulate` (wish {WISH:g}) against DOP853, restarted at every sample and kink.",
+        f"Relative RMS error of the first output of `simulate` (wish {WISH:g}) against DOP853, restarted at samples and kinks.",
         "",
         "| effect | draws | median | largest | above the wish |", "|---|---|---|---|---|", *rows, "",
         "Above the wish, with the factor by which a shift of 1e-9 of the displacement at the start grows by itself:", "",
