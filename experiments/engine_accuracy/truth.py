@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 from typing import Any
 
 import numpy as np
@@ -88,7 +89,7 @@ class Truth:
         self._read_signs(0.0, y, jump=True)
         start_rate = self._rates(self._signals(0.0), y, self._modes)
         found = [self._read(0.0, y)]
-        for begin, stop in zip(merged[:-1], merged[1:], strict=True):
+        for begin, stop in itertools.pairwise(merged):
             self._row = self._row_at(0.5 * (begin + stop))
             if not self._held.continuous or begin == 0.0:
                 self._read_signs(begin, y, jump=True)
