@@ -36,6 +36,7 @@ check: $(INSTALLED)  ## format, lint, types, layers
 	$(BIN)/lint-imports
 
 bench: $(INSTALLED)  ## measure the simulator against C and scipy, the time of a diagnosis, and exports against the simulator
+	@$(BIN)/python benchmarks/engine.py
 	@$(BIN)/python benchmarks/simulation.py
 	@$(BIN)/python benchmarks/diagnosis.py
 	@$(BIN)/python benchmarks/exports.py
