@@ -13,30 +13,6 @@ from sympy.printing.octave import OctaveCodePrinter
 from rigsight.simulate.expressions import KernelPrinter
 
 
-class _PowersAsProducts:
-    """Small powers as products: `pow` is slow and, in a loop of controls, of no known duration."""
-
-    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:  # noqa: ARG002, N802
-        printer: Any = self
-        if expr.exp.is_Integer and 2 <= abs(int(expr.exp)) <= 6:
-            product = "*".join([printer.parenthesize(expr.base, 1000)] * abs(int(expr.exp)))
-            return f"({product})" if expr.exp > 0 else f"(1.0/({product}))"
-        return str(super()._print_Pow(expr))  # type: ignore[misc]
-
-
-class CPrinter(_PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
-    """C99; ``sign_of`` is a function of the file."""
-
-    def _print_sign(self, expr: sp.sign) -> str:
-        return f"sign_of({self._print(expr.args[0])})"
-
-    def _print_absolute(self, expr: sp.Function) -> str:
-        return f"fabs({self._print(expr.args[0])})"
-
-    def _print_positive_part(self, expr: sp.Function) -> str:
-        return f"fmax({self._print(expr.args[0])}, 0.0)"
-
-
 class MatlabPrinter(OctaveCodePrinter):  # type: ignore[misc]
     """MATLAB, of scalars, so that no operator needs its dot."""
 
@@ -109,7 +85,6 @@ class Language:
         ]
 
 
-C = Language(CPrinter(), "const double {} = {};", "{} = {};")
 MATLAB = Language(MatlabPrinter(), "{} = {};", "{} = {};")
 MODELICA = Language(ModelicaPrinter(), "{} = {};", "{} = {};")
 PYTHON = Language(KernelPrinter(), "{} = {}", "{} = {}")
