@@ -16,7 +16,10 @@ from rigsight.simulate.kernel_source import ACCURATE, template
 
 STRICT = ("-O2", "-Wall", "-Wextra", "-Werror", "-std=c99", "-pedantic")
 TO_ROUNDING = 1e-11
-"""Measured: 3e-14 and less, but 1e-12 where the test hands on a motion whose rates it has computed itself."""
+"""With the engine's options. Measured: 1e-14 and less, but 1e-12 where the test itself computes the rates of a motion."""
+OTHER_ROUNDING = 1e-8
+"""With others. Measured: 3e-14 here, 3e-9 in 3000 samples of a Bouc-Wen loop, where rounding shows in the lengths of
+steps. A hundredth of the error that the engine aims for."""
 
 
 def compiled(folder: Path, *arguments: str, flags: tuple[str, ...] = STRICT) -> Path:
@@ -46,9 +49,9 @@ def output_of(program: Path, case) -> dict[str, np.ndarray]:
 
 def test_it_gives_the_outputs_of_the_engine_to_rounding(case, tmp_path: Path):
     written(case, tmp_path)
-    for flags in (STRICT, kernel_options()):
+    for flags, allowed in ((kernel_options(), TO_ROUNDING), (STRICT, OTHER_ROUNDING)):
         simulated = output_of(compiled(tmp_path, "-DRIG_MAIN", "rig.c", flags=flags), case)
-        assert max(case.errors(simulated, told=True).values()) <= TO_ROUNDING
+        assert max(case.errors(simulated, told=True).values()) <= allowed
 
 
 def test_it_holds_the_engine_s_own_text(case_named, tmp_path: Path):
@@ -63,7 +66,7 @@ def test_its_accuracy_can_be_chosen(case_named, tmp_path: Path):
         output_of(compiled(tmp_path, "-DRIG_MAIN", f"-DRIG_ACCURACY={accuracy}", "rig.c"), case)
         for accuracy in ("1e-6", "1e-8")
     )
-    assert max(case.errors(usual, told=True).values()) <= TO_ROUNDING
+    assert max(case.errors(usual, told=True).values()) <= OTHER_ROUNDING
     assert max(case.errors(fine).values()) < 0.1 * max(case.errors(usual).values())
 
 

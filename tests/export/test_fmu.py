@@ -16,8 +16,8 @@ from rigsight.simulate.kernel_cache import kernel_options
 
 fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed (pip install fmpy lxml)")
 
-TO_ROUNDING = 1e-11
-"""As for C."""
+OTHER_ROUNDING = 1e-8
+"""As for C that is not compiled for this processor alone."""
 VERSIONS = ("fmu", "fmu3")
 STRICT = ("-O2", "-Wall", "-Wextra", "-Werror", "-std=c99", "-pedantic", "-shared", "-fPIC")
 
@@ -123,7 +123,7 @@ def test_it_gives_the_outputs_of_the_engine_to_rounding(
 ):
     path = written(case, tmp_path, target)
     simulated = slave(path, tmp_path).run(case, linear=case.model.hold != "zoh")
-    assert max(case.errors(simulated, told=True).values()) <= TO_ROUNDING
+    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
 
 
 @pytest.mark.parametrize("target", VERSIONS)
@@ -140,7 +140,7 @@ def test_fmpy_simulates_a_constant_hold_by_itself(name: str, target: str, case_n
     )
     simulated = {name: result[name] for name in case.outputs}
     assert len(simulated[case.outputs[0]]) == len(case.t)
-    assert max(case.errors(simulated, told=True).values()) <= TO_ROUNDING
+    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
 
 
 def test_fmpy_simulates_straight_lines_by_fmi_3_with_slopes(case_named, tmp_path: Path):
@@ -158,7 +158,7 @@ def test_fmpy_simulates_straight_lines_by_fmi_3_with_slopes(case_named, tmp_path
         output=list(case.outputs),
     )
     simulated = {name: result[name] for name in case.outputs}
-    assert max(case.errors(simulated, told=True).values()) <= TO_ROUNDING
+    assert max(case.errors(simulated, told=True).values()) <= OTHER_ROUNDING
 
 
 @pytest.mark.parametrize("target", VERSIONS)
