@@ -49,5 +49,5 @@ def test_every_language_is_printed_in_one_place() -> None:
         if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
     }
     elsewhere = {name for name in printers if not name.startswith("simulate/printing/")}
-    # These are about to move: the kernel's own, the C export's, and the text and LaTeX of a discovered equation.
-    assert elsewhere <= {"export/languages.py", "discover/equations.py"}
+    # About to move: the text and LaTeX of a discovered equation.
+    assert elsewhere <= {"discover/equations.py"}

@@ -63,7 +63,8 @@ def test_hold_and_step_are_passed_on(write_model: Callable[..., Path], tmp_path:
         (["--to", "c", "--out", "1st.c"], "'1st' cannot be the name"),
         (["--to", "c", "--out", "model.json/stage.c"], "model.json is a file"),
         (["--to", "python", "--source-only"], "--source-only is of an FMU"),
-        (["--to", "c", "--step", "-1"], "--step must lie in"),
+        (["--to", "python", "--step", "-1"], "--step must lie in"),
+        (["--to", "c", "--step", "0.001"], "--step is of python, matlab"),
         (["--to", "c", "--hold", "spline"], "--hold is 'spline'"),
     ],
 )
@@ -104,7 +105,7 @@ def test_an_effect_that_a_target_cannot_say_is_named(
     code, _, stderr = run("export", model, "--to", "control", "--out", tmp_path / "stage.py")
     assert code == 2
     assert "'input_delay' cannot be exported to control" in stderr
-    assert "python, c, fmu, matlab, latex, modelica" in stderr
+    assert "python, c, fmu, fmu3, matlab, latex, modelica" in stderr
 
 
 def test_without_a_compiler_an_fmu_of_sources_is_offered(

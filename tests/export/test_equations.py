@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from importlib.resources import files
+
 import pytest
 import sympy as sp
 
@@ -13,6 +16,7 @@ from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
+from rigsight.simulate.kernel_source import ACCURATE, template
 from rigsight.simulate.model import Model
 
 
@@ -46,7 +50,19 @@ def test_names_are_words_that_no_language_has_and_occur_once():
     assert all(name.isidentifier() for name in names)
 
 
-@pytest.mark.parametrize("target", [name for name in TARGETS if name != "fmu"])
+def test_no_name_is_a_macro_of_the_c_text():
+    kernel = [template(name) for name in ("equations.c.txt", *ACCURATE)]
+    own = [
+        files("rigsight.export").joinpath("templates", f"{name}.c.txt").read_text("utf-8")
+        for name in ("model", "fmi", "fmi2", "fmi3")
+    ]
+    # Macros with arguments are not those of a name without.
+    macros = re.findall(r"^#define (\w+)(?!\w|\()", "\n".join([*kernel, *own]), re.MULTILINE)
+    assert len(macros) > 20
+    assert set(macros) <= RESERVED
+
+
+@pytest.mark.parametrize("target", [name for name in TARGETS if not name.startswith("fmu")])
 def test_a_description_ends_no_comment_and_no_string(target: str):
     text = export_model(
         own_model(["stiff"], 'a "b" */ c\n \\" """ d'), target, source='x"""*/\n\\y/model.json', name="rig"

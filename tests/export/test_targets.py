@@ -15,7 +15,7 @@ LATE = {"input_delay", "sensor_delay"}
 REFUSED = {"control": STICKS | LATE, "modelica": STICKS}
 
 
-@pytest.mark.parametrize("target", [name for name in TARGETS if name != "fmu"])
+@pytest.mark.parametrize("target", [name for name in TARGETS if not name.startswith("fmu")])
 @pytest.mark.parametrize("name", [effect.name for effect in CATALOGUE])
 def test_every_effect_is_written_or_refused_by_name(name: str, target: str, case_named):
     model = case_named(name).model
@@ -34,12 +34,12 @@ def test_an_effect_that_has_vanished_is_left_out(case_named):
     assert "T_c" not in str(export_model(without, "control", source="model.json"))
 
 
-@pytest.mark.parametrize("target", ["python", "c", "fmu", "matlab"])
+@pytest.mark.parametrize("target", ["python", "c", "fmu", "fmu3", "matlab"])
 def test_a_sampled_analog_input_asks_for_a_hold(target: str, case_named):
     model = replace(case_named("linear axis").model, hold="band_limited")
     with pytest.raises(InputError, match=r"'band_limited'.*--hold foh.*--hold zoh"):
         export_model(model, target, source="model.json")
-    if target != "fmu":
+    if not target.startswith("fmu"):
         assert export_model(model, target, source="model.json", hold="zoh")
 
 
@@ -56,8 +56,12 @@ def test_equations_alone_need_no_hold(target: str, case_named):
         ("c", {"name": "two words"}, "'two words' cannot be the name of a c model"),
         ("modelica", {"name": "model"}, "'model' is a word of the language"),
         ("c", {"hold": "linear"}, "--hold is 'linear'"),
-        ("c", {"step": 0.0}, "--step must lie in"),
-        ("c", {"step": float("nan")}, "--step must lie in"),
+        ("python", {"step": 0.0}, "--step must lie in"),
+        ("matlab", {"step": float("nan")}, "--step must lie in"),
+        ("c", {"step": 0.001}, "--step is of python, matlab.*c finds its steps by itself.*-DNAME_ACCURACY"),
+        ("fmu", {"step": 0.001}, "--step is of python, matlab"),
+        ("fmu3", {"step": 0.001}, "--step is of python, matlab"),
+        ("latex", {"step": 0.001}, "--step is of python, matlab.*latex leaves the steps to others"),
         ("c", {"source_only": True}, "--source-only is of an FMU"),
     ],
 )
@@ -66,7 +70,7 @@ def test_what_cannot_be_used_is_told(target, options, message, case_named):
         export_model(case_named("linear axis").model, target, source="model.json", **options)
 
 
-@pytest.mark.parametrize("target", [name for name in TARGETS if name != "fmu"])
+@pytest.mark.parametrize("target", [name for name in TARGETS if not name.startswith("fmu")])
 def test_the_same_model_gives_the_same_text(target: str, case_named):
     model = case_named("offsets").model
     first, second = (export_model(model, target, source="model.json", name="rig") for _ in range(2))

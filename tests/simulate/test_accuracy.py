@@ -24,6 +24,10 @@ from rigsight.simulate import (
 
 SETS = ("R", "B", "P", "stiff")
 DT = 5e-3
+GEAR_VALUES = {
+    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27,
+    "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98, "psi_off": 0.0, "y_off": 0.0,
+}  # fmt: skip
 
 
 def hysteretic_truth(values, samples: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -164,3 +168,19 @@ def test_diverging_lane_leaves_its_neighbors_alone(hysteretic, hysteresis_sets, 
     out = simulate_sets(hysteretic, held, both, np.stack([state, state], axis=1), record.n_samples, 8)
     assert np.all(np.isfinite(out[:, :, 0]))
     assert not np.all(np.isfinite(out[:, :, 1]))
+
+
+def test_what_is_to_come_does_not_change_what_was(axis, axis_values, make_record):
+    samples = np.sin(0.05 * np.arange(400)) * np.repeat([1e-3, 1.0], 200)
+    whole = simulate(axis, axis_values, make_record(samples))["x"]
+    part = simulate(axis, axis_values, make_record(samples[:200]))["x"]
+    np.testing.assert_array_equal(whole[:199], part[:199])
+
+
+def test_a_rig_at_rest_behind_a_dead_zone_is_not_resolved_to_rounding(make_record):
+    structure = compose(RUNNING_GEAR, [effect_named("input_dead_zone")])
+    values = {**GEAR_VALUES, "u_0": 0.2}
+    late = np.sin(np.arange(161) * 0.02) * np.linspace(0.0, 1.0, 161)
+    assert np.ptp(simulate(structure, values, make_record(late), accuracy=1e-9)["psi"]) > 1e-3
+    quiet = simulate(structure, values, make_record(0.19 * np.sin(0.3 * np.arange(161))), accuracy=1e-9)
+    assert np.max(np.abs(quiet["psi"])) <= 1e-15

@@ -37,16 +37,22 @@ print(before, hashlib.sha256(psi.tobytes()).hexdigest())
 """
 
 
-def run(folder: Path) -> subprocess.CompletedProcess[str]:
+def start(folder: Path) -> subprocess.Popen[str]:
     source = str(Path(rigsight.__file__).parents[1])
     environment = {**os.environ, "RIGSIGHT_CACHE_DIR": str(folder), "PYTHONPATH": source}
-    return subprocess.run(
+    return subprocess.Popen(
         [sys.executable, "-c", PROGRAM],
         env=environment,
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        check=False,
     )
+
+
+def run(folder: Path) -> subprocess.CompletedProcess[str]:
+    process = start(folder)
+    stdout, stderr = process.communicate()
+    return subprocess.CompletedProcess(process.args, process.returncode, stdout, stderr)
 
 
 def test_second_process_does_not_compile_and_gives_the_same_bits_and_damaged_code_is_replaced(tmp_path):
@@ -66,6 +72,15 @@ def test_second_process_does_not_compile_and_gives_the_same_bits_and_damaged_cod
         assert again.stdout.split() == ["False", result]
 
 
+def test_processes_that_compile_the_same_kernel_at_once_do_not_harm_each_other(tmp_path):
+    processes = [start(tmp_path) for _ in range(2)]
+    said = [process.communicate() for process in processes]
+    assert [process.returncode for process in processes] == [0, 0], said
+    assert len({stdout.split()[1] for stdout, _ in said}) == 1
+    (file,) = tmp_path.iterdir()
+    assert run(tmp_path).stdout.split()[0] == "True", file
+
+
 @pytest.fixture
 def fresh_cache(tmp_path, monkeypatch):
     """Point at an empty folder and forget what is loaded in this process."""
@@ -81,6 +96,15 @@ def test_other_equations_are_another_file(fresh_cache):
     assert len(texts) == 3
     files = {kernel_cache.kernel_of(compose(AXIS, effects)).path for effects in ((), (delay,), (halved,))}
     assert len(files) == 3
+
+
+def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):
+    structure = compose(AXIS)
+    own = kernel_cache.kernel_of(structure).path
+    kernel_cache._kernels.clear()
+    monkeypatch.setattr(kernel_cache, "_processor", lambda: "another")
+    assert not kernel_cache.compiled(compose(AXIS))
+    assert kernel_cache.kernel_of(structure).path != own
 
 
 def test_source_does_not_depend_on_the_order_of_hashes():

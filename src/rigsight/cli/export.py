@@ -21,7 +21,11 @@ def export(
     ],
     to: Annotated[
         str,
-        typer.Option("--to", metavar="TARGET", help="python, control, c, fmu, matlab, latex or modelica."),
+        typer.Option(
+            "--to",
+            metavar="TARGET",
+            help="python, control, c, fmu (FMI 2.0), fmu3 (FMI 3.0), matlab, latex or modelica.",
+        ),
     ],
     out: Annotated[
         Path | None,
@@ -48,7 +52,7 @@ def export(
             "--step",
             metavar="SECONDS",
             show_default="from the model's own time scales",
-            help="Longest internal step of python, c, fmu and matlab.",
+            help="Longest internal step of python and matlab.",
         ),
     ] = None,
     source_only: Annotated[

@@ -27,5 +27,12 @@ _OF_TEMPLATES = _words(
     """input_value input_rate friction_sign sign_of rates switches outputs limits modes state math np control numbers given
     max min abs sign pi eps delay"""
 )
-RESERVED = C | MATLAB | MODELICA | _OF_TEMPLATES | frozenset(keyword.kwlist)
+_C_MACROS = _words(
+    """BUFSIZ EOF EXIT_FAILURE EXIT_SUCCESS EXPORTED FILENAME_MAX FOPEN_MAX FP_INFINITE FP_NAN FP_NORMAL FP_SUBNORMAL FP_ZERO
+    HUGE_VAL HUGE_VALF HUGE_VALL INFINITY L_tmpnam MATH_ERREXCEPT MATH_ERRNO NAN NULL RAND_MAX SEEK_CUR SEEK_END SEEK_SET
+    TMP_MAX bool linux math_errhandling stderr stdin stdout unix
+    DEPENDENT_MODES FRICTION HAS_DELAY HAS_LIMITS MAX_STEPS N_COMPUTED N_DEPENDENT N_IN N_INPUTS N_MODES N_OUT N_PARAMETERS
+    N_SLOPES N_STATES N_VALUES N_WATCHED ROUNDING SIZE_CONSTANTS SIZE_INPUTS SIZE_MODES SIZE_STATES SIZE_WATCHED VELOCITY"""
+)
+RESERVED = C | _C_MACROS | MATLAB | MODELICA | _OF_TEMPLATES | frozenset(keyword.kwlist)
 """A name inside an export is none of these, so that it is the same in all of them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import sympy as sp
 
@@ -12,7 +13,7 @@ from rigsight.errors import InputError, check_in_range, check_option
 from rigsight.export.c_source import c_source
 from rigsight.export.control_system import control_system
 from rigsight.export.equations import Exported, exported, harmless
-from rigsight.export.fmu import fmu
+from rigsight.export.fmu import Version, fmu
 from rigsight.export.internal_step import LONGEST, internal_step
 from rigsight.export.latex import latex
 from rigsight.export.matlab_function import matlab_function
@@ -23,6 +24,7 @@ from rigsight.simulate import Structure
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
 
+_FMUS: dict[str, Version] = {"fmu": 2, "fmu3": 3}
 STICKING = "the sticking of dry friction"
 DELAY = "a delay"
 SENSOR_DELAY = "a late sensor"
@@ -44,6 +46,8 @@ class Target:
         What it is written without.
     steps
         True if it goes from sample to sample itself, so that the hold of the input is its business.
+    fixed_step
+        True if it does so in steps of its own of a fixed length.
     named
         True if the text holds a name of its own, taken from the file's.
     """
@@ -54,20 +58,25 @@ class Target:
     write: Callable[[Exported, str, str], str | bytes]
     lacks: frozenset[str] = frozenset()
     steps: bool = True
+    fixed_step: bool = False
     named: bool = True
 
 
 TARGETS: dict[str, Target] = {
     target.name: target
     for target in (
-        Target("python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s), named=False),
+        Target(
+            "python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s),
+            fixed_step=True, named=False,
+        ),
         Target(
             "control", ".py", "a python-control NonlinearIOSystem", control_system,
             lacks=frozenset({STICKING, DELAY, SENSOR_DELAY}), steps=False, named=False,
         ),
         Target("c", ".c", "one C99 file without dependencies", c_source),
         Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu),
-        Target("matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function),
+        Target("fmu3", ".fmu", "an FMU: FMI 3.0, co-simulation", partial(fmu, version=3)),
+        Target("matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function, fixed_step=True),
         Target("latex", ".tex", "equations and numbers for a document", lambda e, s, _: latex(e, s), steps=False, named=False),
         Target("modelica", ".mo", "a Modelica model", modelica, lacks=frozenset({STICKING}), steps=False),
     )
@@ -100,7 +109,7 @@ def export_model(
     hold
         How the input behaves between samples; default is the model's.
     step
-        Longest internal step [s]; default follows from the model's own time scales.
+        Longest internal step [s] of a target with a fixed one; default follows from the model's own time scales.
     source_only
         True for an FMU without a binary.
 
@@ -110,18 +119,18 @@ def export_model(
         If the target is unknown or has no words for an effect, hold or name, or if an FMU cannot be compiled.
     """
     chosen = TARGETS[check_option("Target", target, TARGETS)]
-    if source_only and target != "fmu":
+    if source_only and target not in _FMUS:
         raise InputError(f"--source-only is of an FMU; '{target}' is source anyway. Leave it out.")
     if chosen.named:
         _check_name(chosen, name)
     if step is not None:
-        check_in_range("--step", step, _SHORTEST, LONGEST, "s")
+        _check_step(chosen, step)
     content = exported(
-        model, _hold(chosen, model, hold), step or (internal_step(model) if chosen.steps else LONGEST)
+        model, _hold(chosen, model, hold), step or (internal_step(model) if chosen.fixed_step else LONGEST)
     )
     _check_expressible(chosen, content)
-    if target == "fmu":
-        return fmu(content, harmless(source), name, source_only=source_only)
+    if source_only:
+        return fmu(content, harmless(source), name, version=_FMUS[target], source_only=True)
     return chosen.write(content, harmless(source), name)
 
 
@@ -162,6 +171,17 @@ def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
             "sample faster for the same accuracy) or --hold zoh."
         )
     return hold
+
+
+def _check_step(target: Target, step: float) -> None:
+    if not target.fixed_step:
+        able = ", ".join(t.name for t in TARGETS.values() if t.fixed_step)
+        why = "finds its steps by itself, as simulations do" if target.steps else "leaves the steps to others"
+        accuracy = " (compile it with -DNAME_ACCURACY=1e-8 for smaller errors)" if target.steps else ""
+        raise InputError(
+            f"--step is of {able}; what is written for {target.name} {why}{accuracy}. Leave it out."
+        )
+    check_in_range("--step", step, _SHORTEST, LONGEST, "s")
 
 
 def _check_name(target: Target, name: str) -> None:

@@ -114,6 +114,32 @@ def _system() -> tuple[str, tuple[str, ...]]:
     return _SHARED[system]
 
 
+def first_library(sources: Mapping[str, str], flags: Sequence[str]) -> tuple[Compiler, bytes]:
+    """Return a shared library and the first of this machine's compilers that can make it.
+
+    Parameters
+    ----------
+    sources
+        File name -> C text; the first is compiled, the others it may include.
+    flags
+        Options of the compiler beside those that make a library.
+
+    Raises
+    ------
+    InputError
+        If there is no compiler, or the variable CC names a program that does not exist.
+    MachineError
+        If every compiler fails, with what the first one said, or there is no room for its files.
+    """
+    failed: MachineError | None = None
+    for compiler in c_compilers():
+        try:
+            return compiler, library(compiler, sources, flags)
+        except MachineError as error:
+            failed = failed or error
+    raise failed or InputError(NO_COMPILER)
+
+
 def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]) -> bytes:
     """Return the bytes of a shared library; the same text gives the same bytes with the same compiler.
 

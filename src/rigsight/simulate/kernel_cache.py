@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 
 from rigsight.errors import InputError, MachineError
-from rigsight.simulate.compiler import NO_COMPILER, Compiler, c_compilers, library, library_suffix
+from rigsight.simulate.compiler import Compiler, c_compilers, first_library, library_suffix
 from rigsight.simulate.kernel import Kernel
 from rigsight.simulate.kernel_source import kernel_source
 from rigsight.simulate.structure import Structure
@@ -28,10 +28,11 @@ FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
 # Vectors are written out where they pay; those that a compiler finds by itself in the few states of one set cost a third.
 # No options that let a compiler take numbers for finite or reorder sums: motions beyond the range of numbers are detected, and
 # results are to differ from compiler to compiler by rounding alone.
-_OPTIONS = (
+OPTIONS = (
     "-std=gnu11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
     "-fno-tree-slp-vectorize", "-w",
 )  # fmt: skip
+"""What every compiled model is compiled with; kernels, which stay on this machine, add what its processor can."""
 _OWN_PROCESSOR = {
     "x86_64": "-march=native",
     "AMD64": "-march=native",
@@ -105,34 +106,24 @@ def compiled(structure: Structure) -> bool:
 
 def _library_file(text: str) -> Path:
     """Return a sound library of a C text, with the first compiler that has or can make one."""
-    compilers = c_compilers()
-    if not compilers:
-        raise InputError(NO_COMPILER)
-    for compiler in compilers:
+    for compiler in c_compilers():
         path = _path(text, compiler)
         if _sound(path):
             return path
-    failed: MachineError | None = None
-    for compiler in compilers:
-        try:
-            content = library(compiler, {"kernel.c": text}, _options())
-        except MachineError as error:
-            failed = failed or error
-            continue
-        path = _path(text, compiler)
-        _write(path, content)
-        return path
-    assert failed is not None
-    raise failed
+    compiler, content = first_library({"kernel.c": text}, kernel_options())
+    path = _path(text, compiler)
+    _write(path, content)
+    return path
 
 
-def _options() -> tuple[str, ...]:
+def kernel_options() -> tuple[str, ...]:
+    """Return what kernels of this machine are compiled with."""
     own = _OWN_PROCESSOR.get(platform.machine())
-    return (*_OPTIONS, *((own,) if own else ()), *os.environ.get(FLAGS_VARIABLE, "").split())
+    return (*OPTIONS, *((own,) if own else ()), *os.environ.get(FLAGS_VARIABLE, "").split())
 
 
 def _path(text: str, compiler: Compiler) -> Path:
-    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(_options()), _processor())
+    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(kernel_options()), _processor())
     name = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
     return cache_folder() / f"{name}{library_suffix()}"
 

@@ -13,14 +13,16 @@ from rigsight.simulate.input_hold import HeldInput, hold_input
 from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.structure import Structure
 
-_RAMP_PERIODS = 20.0
+RAMP_PERIODS = 20.0
 """Length of the slow rise of the input in periods of the linear rig."""
-_INTERVALS = 100
-_SETTLED = 1e-9
+INTERVALS = 100
+"""Pieces of the rise, and of the first wait."""
+SETTLED = 1e-9
 """Relative change of the states over one wait below which they rest."""
-_WAITS = 7
+WAITS = 7
 """Each wait is twice as long as the one before."""
-_TOLERANCE = 1e-9
+TOLERANCE = 1e-9
+"""Error allowed per step on the way, relative to the largest excursion of each state."""
 
 
 def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
@@ -55,7 +57,7 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
     quiet = _quiet_parameters(structure, p, critical_damping=2.0 * math.sqrt(stiffness * inertia))
     first = float(held.coefficients[0, 0])
     for start, stop in ((0.0, 0.0), (0.0, first)) if first != 0.0 else ((0.0, 0.0),):
-        reached = _settled(structure, quiet, state, (start, stop), _RAMP_PERIODS * period)
+        reached = _settled(structure, quiet, state, (start, stop), RAMP_PERIODS * period)
         if reached is None:
             return state
         state = reached
@@ -100,19 +102,19 @@ def _settled(
 ) -> NDArray[np.float64] | None:
     """Return the state after a ramp of the input and waits until nothing moves; None if the motion has no end."""
     velocity = structure.velocity_index or 0
-    interval = duration / _INTERVALS
-    samples = np.linspace(*ramp, _INTERVALS + 1)
+    interval = duration / INTERVALS
+    samples = np.linspace(*ramp, INTERVALS + 1)
     state = state.copy()
-    for wait in range(_WAITS):
+    for wait in range(WAITS):
         before = state.copy()
         held = hold_input(samples, interval, "foh")
-        status, _, state = kernel_of(structure).simulate_one(held, p, state, _TOLERANCE, samples.size)
+        status, _, state = kernel_of(structure).simulate_one(held, p, state, TOLERANCE, samples.size)
         if status != 0:
             return None
         moved = np.abs(state - before)
         moved[velocity] = 0.0
-        if np.all(moved <= _SETTLED * np.abs(state)):
+        if np.all(moved <= SETTLED * np.abs(state)):
             break
-        samples = np.full(_INTERVALS * 2**wait + 1, ramp[1])
+        samples = np.full(INTERVALS * 2**wait + 1, ramp[1])
     state[velocity] = 0.0
     return state

@@ -21,7 +21,7 @@ from rigsight.simulate.substeps import Substeps
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""
-_LOCAL_PER_GLOBAL = 0.03
+LOCAL_PER_GLOBAL = 0.03
 """Error allowed per step for one unit of global error; measured on 122 rigs of the blind bench and on the sets of the thesis.
 
 Ten times as much costs a tenth less time, and is five times beside the wish where dry friction sticks and slips in a wide sweep.
@@ -138,7 +138,7 @@ def simulate_outputs(
         If the motion leaves the range of numbers or the model is too stiff.
     """
     status, out, _ = kernel_of(structure).simulate_one(
-        held, p, _state_vector(structure, initial_state), _LOCAL_PER_GLOBAL * accuracy, n_samples, taken
+        held, p, _state_vector(structure, initial_state), LOCAL_PER_GLOBAL * accuracy, n_samples, taken
     )
     if status != 0:
         effects = ", ".join(structure.effect_names) or "no effect"

@@ -37,7 +37,7 @@ def run_export(
     hold
         How the input behaves between its samples; default is the model's.
     step
-        Longest internal step of a target that integrates by itself [s].
+        Longest internal step of a target with a fixed one [s].
     source_only
         True for an FMU without a binary.
     own_effects
