@@ -76,7 +76,11 @@ def draws(effect: Effect, count: int, seed: int) -> Iterator[Draw]:
         scales = sizes(type(bench)(rig, values, bench.output, values, bench.free), record)
         own = {p.name: _drawn(rng, p) * characteristic_value(p.dimension, scales) for p in effect.parameters}
         own |= {p.name: p.default or 0.0 for p in effect.parameters if not p.fitted}
-        if any(own[pair.first] + own[pair.second] < 0.0 for pair in effect.searched_as):
+        sums = [
+            (own[pair.first] + own[pair.second], own[pair.first] - own[pair.second])
+            for pair in effect.searched_as
+        ]
+        if any(min(both) < 0.0 for both in sums):
             continue
         count -= 1
         named = {structure.parameter_name(effect, key): value for key, value in own.items()}

@@ -129,8 +129,13 @@ def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float
             p.name: c * characteristic_value(p.dimension, scales) for p, c in zip(fitted, point, strict=True)
         }
         own |= {p.name: p.default or 0.0 for p in effect.parameters if not p.fitted}
-        # A negative sum lets a memory grow without end; a search moves the sum itself, from zero upwards.
-        if all(own[pair.first] + own[pair.second] >= 0.0 for pair in effect.searched_as):
+        # A search moves sum and difference themselves. A negative sum lets a memory grow without end; where the unloading branch
+        # is the steeper one, a saturated loop has nothing but its rounding to come back with.
+        if all(
+            own[pair.first] + own[pair.second] >= 0.0
+            and own[pair.first] - own[pair.second] >= min(pair.difference_range[0], 0.0)
+            for pair in effect.searched_as
+        ):
             points.append({**bench.values, **own})
     return points
 
