@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,37 +11,18 @@ from numpy.typing import NDArray
 from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
-from rigsight.errors import SimulationError
-from rigsight.identify import DEFAULT_ACCURACY, FitResult, GreyBoxFit
+from rigsight.identify import FitResult, GreyBoxFit
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import (
-    Structure,
-    carried_over,
-    compose,
-    parameter_vector,
-    record_input,
-    simulate_outputs,
-)
+from rigsight.simulate import Structure, carried_over, compose
 
 Support = frozenset[str]
 _EVALUATIONS = 40
 _FIRST_EVALUATIONS = 12
 _HOPELESS = 10.0
 """Factor over the best RMS so far at which a support is given up after the first evaluations."""
-_COARSEST = 1e-2
-"""Accuracy of the simulations that a polish starts with, relative to the motion: a start is further off than that."""
-_UNSEEN = 0.03
-"""Error of the simulations as a share of what a fit leaves: as power, a thousandth."""
-_NEAR = 10.0
-"""Noise floors left below which simulations are as accurate as in any other fit: terms are decided there."""
-_FINER = 0.5
-"""Factor by which the accuracy must fall behind what a fit leaves for the fit to go on with finer steps."""
-_TOLERANCE_OF_ACCURACY = 0.1
-"""Relative change of the cost at which a fit stops, per accuracy of its simulations: a smaller gain is within their error."""
+_TOLERANCE = 1e-5
 _SMALL = 1e-3
-_HARDLY = 1e-2
-"""Share of what the regression gives a term with which the term is hardly there, and yet larger than rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,127 +196,56 @@ class Bench:
         """
         key = support, release, left_out
         if key not in self.trials:
-            structure = self.structure(support, release)
-            values = self.start(structure, support) if start is None else start
-            self.trials[key] = self._polished(support, structure, [values], left_out)
+            self.trials[key] = self._polished(support, release, start, left_out)
         return self.trials[key]
 
-    def trial_near(self, support: Support, neighbor: Trial) -> Trial:
-        """Polish a support from where one with a term more or less ended, and from the regression's values if never done so.
-
-        The regression's values may lie far off the motion as soon as terms are alike; those of a neighbor do not.
-        """
-        own = {name for n in support & neighbor.support for name in self.candidates[n].effect.special_cases}
-        release = frozenset(own - {name for name, _ in neighbor.fit.structure.fixed})
-        key = support, release, frozenset[str]()
-        before = self.trials.get(key)
+    def shortened(self, support: Support, longer: Trial) -> Trial:
+        """Polish a support once more from the values that a longer one ended at, and keep the better of both."""
+        kept = {name for name, _ in longer.fit.structure.fixed}
+        special = {name for n in support for name in self.candidates[n].effect.special_cases}
+        release = frozenset(special - kept)
         structure = self.structure(support, release)
-        values = self.start(structure, support)
-        starts = [_beside(structure, values, neighbor), *([values] if before is None else [])]
-        again = self._polished(support, structure, starts, frozenset())
-        if before is None or again.excess < before.excess:
-            self.trials[key] = again
-        return self.trials[key]
-
-    def hopeless(self, fit: FitResult) -> bool:
-        """Return True for a fit so much worse than the best so far that more evaluations or a parameter more cannot make up."""
-        best = min((trial.fit.cost for trial in self.trials.values()), default=float("inf"))
-        return not fit.cost < _HOPELESS**2 * best
+        start = {
+            **self.start(structure, support),
+            **carried_over(longer.fit.values, longer.fit.structure, structure),
+        }
+        before = self.trial(support)
+        again = self._polished(support, release, start, frozenset())
+        return again if again.excess < before.excess else before
 
     def _polished(
-        self, support: Support, structure: Structure, starts: Sequence[Mapping[str, float]], left_out: Support
+        self, support: Support, release: Support, start: Mapping[str, float] | None, left_out: Support
     ) -> Trial:
-        fit = self._fitted(structure, starts, self.free_parameters(structure, left_out))
-        return self.scored(support, fit, self._unseen(fit))
-
-    def _fitted(
-        self, structure: Structure, starts: Sequence[Mapping[str, float]], free: list[str]
-    ) -> FitResult:
-        """Fit the estimation records from the better start, with steps as coarse as what is still left allows."""
-
-        def go_on(
-            values: Mapping[str, float],
-            states: tuple[NDArray[np.float64], ...] | None,
-            error: float,
-            evaluations: int,
-        ) -> FitResult:
-            accuracy = self._accuracies(self.estimation, error)
-            return GreyBoxFit(structure, self.estimation, self.scales, self.noise, accuracy).fit(
-                values,
-                free,
-                states,
-                max_evaluations=evaluations,
-                tolerance=_TOLERANCE_OF_ACCURACY * min(accuracy),
-                finish=False,
-            )
-
-        # Where a start is near already, coarse steps would lead away from it: sliders let go at other turns of the motion.
-        errors = [self._unseen(go_on(start, None, float("inf"), 1)) for start in starts]
-        first = [
-            go_on(start, None, error, _FIRST_EVALUATIONS) for start, error in zip(starts, errors, strict=True)
-        ]
-        best = int(np.argmin([found.cost for found in first]))
-        fit, error = first[best], errors[best]
-        left = _EVALUATIONS - _FIRST_EVALUATIONS
-        while left > 0 and not self.hopeless(fit):
-            finer = self._unseen(fit)
-            before, after = (min(self._accuracies(self.estimation, e)) for e in (error, finer))
-            if fit.success and after > _FINER * before:
-                break
-            error = min(error, finer)
-            fit = go_on(fit.values, fit.initial_states, error, left)
-            left -= fit.n_evaluations
-        return fit
-
-    def _unseen(self, fit: FitResult) -> float:
-        """Return the error of the first output that is lost in what a fit leaves, none near the noise."""
-        left = float(np.sqrt(fit.cost / fit.n_samples))
-        return _UNSEEN * left * self.noise[self.rig.outputs[0].name] if left > _NEAR else 0.0
-
-    def _accuracies(self, records: Sequence[Record], error: float) -> list[float]:
-        """Return the accuracies, relative to the motion of each record, with which simulations err by no more than this."""
-        sizes = [float(np.std(record[self.rig.outputs[0].name])) or 1.0 for record in records]
-        return [float(np.clip(error / size, DEFAULT_ACCURACY, _COARSEST)) for size in sizes]
-
-    def scored(self, support: Support, fit: FitResult, error: float = 0.0) -> Trial:
-        """Simulate the held-out records with a fit; only their initial states are estimated, by simulations that may err."""
-        failed = Trial(support, fit, float("inf"), np.zeros(0))
-        if not np.isfinite(fit.cost):
-            return failed
-        accuracy = self._accuracies(self.held_out, error)
-        score = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, accuracy).fit(
-            fit.values, [], tolerance=_TOLERANCE_OF_ACCURACY * min(accuracy), finish=False
+        structure = self.structure(support, release)
+        values = dict(start) if start is not None else self.start(structure, support)
+        free = self.free_parameters(structure, left_out)
+        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise)
+        fit = problem.fit(
+            values, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
         )
-        if not np.isfinite(score.cost):
-            return failed
-        try:
-            simulated = [
-                self._simulated(score, record, state)
-                for record, state in zip(self.held_out, score.initial_states, strict=True)
-            ]
-        except SimulationError:
-            return failed
+        best = min((trial.fit.cost for trial in self.trials.values()), default=float("inf"))
+        if not fit.success and fit.cost < _HOPELESS**2 * best:
+            fit = problem.fit(
+                fit.values,
+                free,
+                fit.initial_states,
+                max_evaluations=_EVALUATIONS - _FIRST_EVALUATIONS,
+                tolerance=_TOLERANCE,
+                finish=False,
+                substeps=fit.substeps,
+            )
+        return self.scored(support, fit)
+
+    def scored(self, support: Support, fit: FitResult) -> Trial:
+        """Simulate the held-out records with a fit; only their initial states are estimated."""
+        if not np.isfinite(fit.cost):
+            return Trial(support, fit, float("inf"), np.zeros(0))
+        score = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise).fit(fit.values, [])
+        if not score.residuals:
+            return Trial(support, fit, float("inf"), np.zeros(0))
         output = self.rig.outputs[0].name
-        measured = np.concatenate([record[output] for record in self.held_out])
-        errors = (measured - np.concatenate(simulated)) / self.noise[output]
+        errors = np.concatenate([r[:, 0] for r in score.residuals]) / self.noise[output]
         return Trial(support, fit, float(np.sqrt(np.mean(errors**2))), errors)
-
-    def _simulated(self, fit: FitResult, record: Record, state: NDArray[np.float64]) -> NDArray[np.float64]:
-        p = parameter_vector(fit.structure, fit.values)
-        held = record_input(fit.structure, record)
-        return simulate_outputs(fit.structure, held, p, state, record.n_samples, DEFAULT_ACCURACY)[:, 0]
-
-
-def _beside(structure: Structure, values: Mapping[str, float], neighbor: Trial) -> dict[str, float]:
-    """Return the values of a neighbor; terms that it lacks have those given, moved to where they almost vanish."""
-    found = {**values, **carried_over(neighbor.fit.values, neighbor.fit.structure, structure)}
-    for effect in structure.effects:
-        if effect.name not in neighbor.support:
-            for parameter in effect.parameters:
-                name = structure.parameter_name(effect, parameter.name)
-                if parameter.null is not None and name in found:
-                    found[name] = parameter.null + _HARDLY * (values[name] - parameter.null)
-    return found
 
 
 def _rig_values(

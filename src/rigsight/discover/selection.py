@@ -23,14 +23,10 @@ _MOST_TERMS = 5
 _GROWTH = 3
 _WORTH = 0.02
 """Share of the regression's residual power that a term must explain to be worth a polish, unless it is the first in line."""
-_ROUNDS = 6
+_ROUNDS = 4
 _RELEASED = 0.98
 """Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
 
-_FAR = 10.0
-"""Noise floors left from which what is left is the error of a wrong equation, and says little about a small term."""
-_HARDLY_MORE = 1.1
-"""Factor by which a term must lower what is left as long as it is far from the noise."""
 _CHANCE = 2.0
 """Standard deviations by which an RMS may exceed the floor by chance."""
 _WHITE = 0.75
@@ -99,10 +95,10 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         Called with what has just been polished.
     """
 
-    def tried(support: Support, neighbor: Trial | None = None) -> Trial:
-        trial = bench.trial(support) if neighbor is None else bench.trial_near(support, neighbor)
+    def tried(support: Support) -> Trial:
+        trial = bench.trial(support)
         special = dict(trial.fit.structure.fixed)
-        if special and not at_floor(trial) and not bench.hopeless(trial.fit):
+        if special and not at_floor(trial):
             start = {**trial.fit.values, **special}
             released = bench.trial(support, release=frozenset(special), start=start)
             trial = released if released.excess < _RELEASED * trial.excess else trial
@@ -122,18 +118,18 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     def cost(trial: Trial) -> float:
         return criterion(trial, independent)
 
-    # First the terms that matter: while far more than noise is left, others only stand for those that are missing.
-    far = True
-    best = _fewest(pool, cost, far)
+    best = _fewest(pool, cost)
     for _ in range(_ROUNDS):
-        grows = len(best.support) < _MOST_TERMS and not at_floor(best)
-        longer = [best.support | {name} for name in next_terms(bench, best.support)] if grows else []
-        pool += [tried(support, best) for support in (*longer, *_simpler(bench, best.support))]
-        independent = independent_samples(min(pool, key=lambda t: t.excess).residuals)
-        found = _fewest(pool, cost, far)
-        if found is best and far:
-            far = False
-            found = _fewest(pool, cost, far)
+        shorter = _simpler(bench, best.support)
+        longer = [best.support | {name} for name in next_terms(bench, best.support)]
+        if len(best.support) >= _MOST_TERMS or at_floor(best):
+            longer = []
+        pool += [tried(frozenset(support)) for support in (*shorter, *longer)]
+        # What stopped short from the regression's values may go on from those of the longer equation.
+        pool += [bench.shortened(frozenset(support), best) for support in shorter if support]
+        finest = min(pool, key=lambda t: t.excess)
+        independent = independent_samples(finest.residuals)
+        found = _fewest(pool, cost)
         if found is best:
             break
         best = found
@@ -144,19 +140,10 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     return Selection(best, tuple(ordered), tuple(cost(trial) for trial in ordered), independent)
 
 
-def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float], far: bool) -> Trial:
-    """Return the trial with the fewest parameters of those that are as good as the best.
-
-    As good is what the held-out records cannot tell from it and, as long as `far` says so and the best is far from the noise,
-    what leaves hardly more.
-    """
-    finest = min(trials, key=cost)
-    hardly = _HARDLY_MORE * finest.excess if far and finest.excess > _FAR else 0.0
-    close = [
-        trial
-        for trial in trials
-        if trial is finest or cost(trial) <= cost(finest) + STRONG or trial.excess < hardly
-    ]
+def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:
+    """Return the trial with the fewest parameters of those that the held-out records cannot tell from the best."""
+    lowest = min(cost(trial) for trial in trials)
+    close = [trial for trial in trials if cost(trial) <= lowest + STRONG or cost(trial) == lowest]
     # As many parameters: one state is less than the six of a spread of sliders.
     return min(close, key=lambda t: (t.n_free, len(t.fit.structure.states), cost(t)))
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import cast
 
 from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
 
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.windows import cut, window_length
@@ -117,14 +116,12 @@ def discover_campaign(
     chosen = cast("Method", check_option("The method", method, METHODS))
     task = discovery_task(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
-    # Products of narrow matrices: with more threads they take no less time, and twice the processors'.
-    with threadpool_limits(limits=1, user_api="blas"):
-        found = discover(task, chosen, pointwise, seed, stage.finished)
-        notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
-        found = replace(found, warnings=(*found.warnings, *notes))
-        if not one_by_one:
-            return found
-        alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
+    found = discover(task, chosen, pointwise, seed, stage.finished)
+    notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
+    found = replace(found, warnings=(*found.warnings, *notes))
+    if not one_by_one:
+        return found
+    alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
     return replace(found, by_record=alone)
 
 
