@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
-from rigsight.identify import FitResult, GreyBoxFit
+from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose
@@ -74,6 +74,8 @@ class Bench:
         The regression.
     own_terms
         Columns of the rig's own terms that compete (full form), by parameter.
+    threads
+        Who helps with the records of a fit.
     trials
         What has been polished.
     """
@@ -88,6 +90,7 @@ class Bench:
     candidates: Mapping[str, Candidate]
     projected: Projected
     own_terms: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    threads: IdleThreads = field(default_factory=IdleThreads)
     trials: dict[tuple[Support, Support, Support], Trial] = field(default_factory=dict)
 
     @property
@@ -219,7 +222,7 @@ class Bench:
         structure = self.structure(support, release)
         values = dict(start) if start is not None else self.start(structure, support)
         free = self.free_parameters(structure, left_out)
-        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise)
+        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
         fit = problem.fit(
             values, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
         )
@@ -240,7 +243,9 @@ class Bench:
         """Simulate the held-out records with a fit; only their initial states are estimated."""
         if not np.isfinite(fit.cost):
             return Trial(support, fit, float("inf"), np.zeros(0))
-        score = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise).fit(fit.values, [])
+        score = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, threads=self.threads).fit(
+            fit.values, []
+        )
         if not score.residuals:
             return Trial(support, fit, float("inf"), np.zeros(0))
         output = self.rig.outputs[0].name

@@ -22,7 +22,7 @@ from rigsight.discover.selection import STRONG, Selection, criterion, select
 from rigsight.discover.task import Task
 from rigsight.discover.weak_form import Rows
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
+from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
@@ -43,6 +43,7 @@ def discover(
     pointwise: bool = False,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
+    n_jobs: int = 1,
 ) -> Discovery:
     """Discover the governing equations behind records.
 
@@ -59,6 +60,8 @@ def discover(
         Seed of the ensembles.
     progress
         Called with a short text when a stage or support is done.
+    n_jobs
+        Threads that share the records of a fit; the result is the same with any number.
 
     Raises
     ------
@@ -91,6 +94,7 @@ def discover(
         candidates={candidate.name: candidate for candidate in library},
         projected=projected,
         own_terms=own_terms(task.rig, task.no_spring, projected) if method == "full" else {},
+        threads=IdleThreads(n_jobs),
     )
     selection = select(bench, say)
     if not math.isfinite(selection.best.excess):
@@ -225,7 +229,7 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
         free |= rig.downstream_parameters
 
     def fitted(structure: Structure, start: Mapping[str, float], moved: set[str]) -> FitResult:
-        return GreyBoxFit(structure, records, bench.scales, bench.noise).fit(
+        return GreyBoxFit(structure, records, bench.scales, bench.noise, threads=bench.threads).fit(
             start, [name for name in structure.names if name in moved], max_evaluations=_FINAL_EVALUATIONS
         )
 

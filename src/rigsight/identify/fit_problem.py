@@ -69,8 +69,8 @@ class FitData:
         Which states cannot leave a range, shape (n_states,).
     unlimited_sizes
         Characteristic size of each state, shape (n_states, 1).
-    accuracies
-        Relative accuracy of the simulations of each record.
+    accuracy
+        Relative accuracy of the simulations.
     threads
         Who helps with the records.
     """
@@ -79,7 +79,7 @@ class FitData:
     records: tuple[RecordData, ...]
     limited: NDArray[np.bool_]
     unlimited_sizes: NDArray[np.float64]
-    accuracies: tuple[float, ...]
+    accuracy: float
     threads: IdleThreads = field(default_factory=IdleThreads)
 
     def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
@@ -149,7 +149,7 @@ class Problem:
                     p,
                     states[index],
                     record.record.n_samples,
-                    self.data.accuracies[index],
+                    self.data.accuracy,
                     MOST_SUBSTEPS,
                 )
             except SimulationError:

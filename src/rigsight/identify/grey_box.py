@@ -83,7 +83,7 @@ class GreyBoxFit:
     output_noise
         Standard deviation by which the residuals of each output are divided.
     accuracy
-        Relative accuracy of the simulations, of all or of each record; the number of substeps follows from it.
+        Relative accuracy of the simulations; the number of substeps follows from it.
     memory
         Where outcomes are kept; a fit that was done before is not done again, and comes out the same.
     threads
@@ -96,14 +96,13 @@ class GreyBoxFit:
         records: Sequence[Record],
         scales: Mapping[str, float],
         output_noise: Mapping[str, float],
-        accuracy: float | Sequence[float] = DEFAULT_ACCURACY,
+        accuracy: float = DEFAULT_ACCURACY,
         memory: FitMemory | None = None,
         threads: IdleThreads | None = None,
     ) -> None:
         self.structure = structure
         self.memory = memory
         self.scales = dict(scales)
-        accuracies = (accuracy,) * len(records) if isinstance(accuracy, float) else tuple(accuracy)
         sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
         names = [signal.name for signal in structure.rig.outputs]
         self.data = FitData(
@@ -111,7 +110,7 @@ class GreyBoxFit:
             records=tuple(self._prepared(record, names, output_noise) for record in records),
             limited=np.array([equation.limit is not None for equation in structure.equations], dtype=bool),
             unlimited_sizes=np.array(sizes).reshape(-1, 1),
-            accuracies=accuracies,
+            accuracy=accuracy,
             threads=threads or IdleThreads(),
         )
         self._problem: list[Any] = []
@@ -122,7 +121,7 @@ class GreyBoxFit:
                 sorted(self.scales.items()),
                 [record_digest(record) for record in records],
                 [d.weights.tolist() for d in self.data.records],
-                accuracy if isinstance(accuracy, float) else list(accuracy),
+                accuracy,
             ]
         self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self.data.records))
 
@@ -379,7 +378,7 @@ class GreyBoxFit:
         """Return measured minus accurately simulated outputs of a record."""
         d = self.data.records[index]
         return d.measured - simulate_outputs(
-            self.structure, d.held, p, state, d.record.n_samples, self.data.accuracies[index]
+            self.structure, d.held, p, state, d.record.n_samples, self.data.accuracy
         )
 
 

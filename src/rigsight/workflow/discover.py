@@ -116,7 +116,7 @@ def discover_campaign(
     chosen = cast("Method", check_option("The method", method, METHODS))
     task = discovery_task(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
-    found = discover(task, chosen, pointwise, seed, stage.finished)
+    found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
     notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
     found = replace(found, warnings=(*found.warnings, *notes))
     if not one_by_one:
