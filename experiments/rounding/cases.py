@@ -63,8 +63,9 @@ def cases(draws: int, trials: tuple[int, ...]) -> list[Case]:
     for number in trials:
         trial = draw_trial("small", 9, number)
         rig = trial.linear.rig
-        task = Task(f"trial {number}", rig, trial.linear.constants, trial.given, trial.records)
-        noise = float(trial.key["noise"][rig.outputs[0].name])
+        constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
+        task = Task(f"trial {number}", rig, constants, trial.given, trial.records)
+        noise = min(float(value) for value in trial.key["noise_floor"].values())
         found.append(Case(f"small 9, trial {number}", task, CATALOGUE, noise))
     return found
 
