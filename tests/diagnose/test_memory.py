@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,14 +29,12 @@ def fit_at():
     return lambda values: SimpleNamespace(values=values, structure=STRUCTURE)
 
 
-@pytest.mark.parametrize(
-    ("k", "a", "x_s", "q"),
-    [(2500.0, 0.03, 0.002, -0.4), (180.0, 0.55, 0.008, -0.7), (150.0, 0.75, 0.006, 0.5)],
-    ids=["nearly all memory", "sliders of any size", "large sliders"],
-)
-def test_its_numbers_come_back(k: float, a: float, x_s: float, q: float) -> None:
-    truth = {**RIG, "k": k, "a": a, "x_s": x_s, "q": q}
-    rng = np.random.default_rng(0)
+NEARLY_ALL_MEMORY = {**RIG, "k": 2500.0, "a": 0.03, "x_s": 0.002, "q": -0.4}
+
+
+def recorded(truth: Mapping[str, float], draw: int = 0, disturbance: int = 0) -> Task:
+    """Records with a draw of noise, and on request disturbed by 1e-9 of it."""
+    noise, rounding = np.random.default_rng(draw), np.random.default_rng([draw, disturbance])
     t = DT * np.arange(2000)
     records = []
     for name, role, size in (
@@ -45,13 +44,50 @@ def test_its_numbers_come_back(k: float, a: float, x_s: float, q: float) -> None
     ):
         run = Record(name, DT, {"u": linear_sweep(t, size, 1.0, 30.0)}, {}, role=role, hold="zoh")
         clean = simulate(STRUCTURE, truth, run)
-        records.append(clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size)))
-    found = diagnose(Task("memory", AXIS, {"gain": 1.0}, {}, tuple(records)), [IWAN])
+        x = clean["x"] + noise.normal(scale=NOISE, size=t.size)
+        if disturbance:
+            x = x + rounding.normal(scale=1e-9 * NOISE, size=t.size)
+        records.append(clean.with_signals(x=x))
+    return Task("memory", AXIS, {"gain": 1.0}, {}, tuple(records))
+
+
+@pytest.mark.parametrize(
+    ("k", "a", "x_s", "q"),
+    [(2500.0, 0.03, 0.002, -0.4), (180.0, 0.55, 0.008, -0.7), (150.0, 0.75, 0.006, 0.5)],
+    ids=["nearly all memory", "sliders of any size", "large sliders"],
+)
+def test_its_numbers_come_back(k: float, a: float, x_s: float, q: float) -> None:
+    truth = {**RIG, "k": k, "a": a, "x_s": x_s, "q": q}
+    found = diagnose(recorded(truth), [IWAN])
     assert found.effects == ("iwan_hysteresis",)
     best = found.candidates[0]
     assert best.excess < 1.1
     for name in ("k", "a", "x_s", "q"):
         assert best.parameters[name].value == pytest.approx(truth[name], rel=0.02), name
+
+
+@pytest.mark.parametrize("draw", [4, 5, 6])
+def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
+    """Another one, with sliders that reach sixty times as far, leaves eight times the noise."""
+    best = diagnose(recorded(NEARLY_ALL_MEMORY, draw, disturbance=1), [IWAN]).candidates[0]
+    assert best.excess < 1.1
+    for name in ("k", "a", "x_s", "q"):
+        assert best.parameters[name].value == pytest.approx(NEARLY_ALL_MEMORY[name], rel=0.02), name
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [NEARLY_ALL_MEMORY, {**RIG, "k": 180.0, "a": 0.55, "x_s": 0.008, "q": -0.7}],
+    ids=["nearly all memory", "sliders of any size"],
+)
+def test_rounding_moves_no_number(truth: Mapping[str, float]) -> None:
+    """A disturbance of 1e-9 of the noise stands for another processor; no number moves by a hundredth of its standard error."""
+    plain, *disturbed = (
+        diagnose(recorded(truth, disturbance=d), [IWAN]).candidates[0].parameters for d in (0, 1, 2)
+    )
+    for found in disturbed:
+        for name, estimate in plain.items():
+            assert abs(found[name].value - estimate.value) < 0.01 * estimate.std, name
 
 
 def test_a_fit_that_took_the_sliders_for_their_neighbors_is_moved(fit_at) -> None:

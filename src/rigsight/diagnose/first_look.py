@@ -1,8 +1,9 @@
 """From where is a candidate worth fitting to all records with care? First looks from all its starts.
 
 From every start a candidate is fitted to the liveliest stretches of the records: in short pieces with initial states of their
-own, which keeps a model that is far off in step with the motion, then in one piece. From where the best of these ended it is
-fitted roughly to the whole records.
+own, which keeps a model that is far off in step with the motion, then in one piece. Only there starts are compared: in pieces
+the right one may be the worst, as sliders that let go at a wrong sample hold a fit at a place that the next rounding moves.
+From where the best of these ended the candidate is fitted roughly to the whole records.
 
 References
 ----------
@@ -30,7 +31,12 @@ from rigsight.simulate import Structure
 _LOOK_EVALUATIONS = 25
 _GLIMPSE_EVALUATIONS = 8
 _MOST_STARTS = 4
-"""Starts that are fitted further; which of more they are, the first few evaluations of each tell."""
+"""Starts that are all fitted at length."""
+_LENGTHY = 2
+"""Of more starts, those that are fitted at length in pieces, best after a glimpse first; from the others the fit in one piece
+begins after the glimpse. Of hysteresis by sliders with ten draws of noise three to seven of nine glimpses led on to the right
+place, of four fits at length in pieces one or two; these are for a model that is too far off for a fit in one piece.
+"""
 _PIECE = 4.0
 """Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
 
@@ -165,12 +171,13 @@ def _looked(
         glimpses = sorted(
             (tried(start, None, _GLIMPSE_EVALUATIONS) for start in starts), key=lambda f: f.cost
         )
-        first = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_MOST_STARTS]]
+        at_length = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_LENGTHY]]
+        first = [*at_length, *glimpses[_LENGTHY:]]
     else:
         first = [tried(start, None, _LOOK_EVALUATIONS) for start in starts]
     near = [
         fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
-        for found in _distinct(first, alike=float("inf"))
+        for found in _apart(first)
     ]
     return _distinct(near)
 
@@ -255,13 +262,21 @@ def mean_square(fit: FitResult) -> float:
     return fit.cost / fit.n_samples
 
 
-def _distinct(fits: Sequence[FitResult], alike: float = _ALIKE) -> tuple[FitResult, ...]:
-    """Return the best fit, and the next one that ended elsewhere if its cost is within a factor of the best."""
-    ordered = sorted(fits, key=lambda result: result.cost)
-    best = ordered[0]
-    values = np.array([best.values[name] for name in best.free])
-    for other in ordered[1:]:
-        theirs = np.array([other.values[name] for name in other.free])
-        if other.cost <= alike * best.cost and not np.allclose(values, theirs, rtol=0.05, atol=1e-12):
-            return best, other
-    return (best,)
+def _apart(fits: Sequence[FitResult]) -> list[FitResult]:
+    """Return the fits, best first, those that ended at the same place once."""
+    kept: list[FitResult] = []
+    for fit in sorted(fits, key=lambda result: result.cost):
+        if not any(_at_one_place(fit, other) for other in kept):
+            kept.append(fit)
+    return kept
+
+
+def _distinct(fits: Sequence[FitResult]) -> tuple[FitResult, ...]:
+    """Return the best fit, and the next one that ended elsewhere if its cost is nearly that of the best."""
+    best, *others = _apart(fits)
+    return (best, *[other for other in others if other.cost <= _ALIKE * best.cost][:1])
+
+
+def _at_one_place(one: FitResult, other: FitResult) -> bool:
+    ours, theirs = (np.array([fit.values[name] for name in fit.free]) for fit in (one, other))
+    return bool(np.allclose(ours, theirs, rtol=0.05, atol=1e-12))

@@ -123,6 +123,7 @@ class Problem:
         self.coordinates = coordinates
         self.n_states = n_states
         self.upper = upper
+        self.steps = np.full(upper.size, STEP)
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
         self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
@@ -207,7 +208,7 @@ class Problem:
                 return float(residual @ residual), derivative.T @ derivative, derivative.T @ residual
 
         for index, (squares, square, projection) in enumerate(self.data.of_each_record(products)):
-            columns = self._columns(index)
+            columns = self.columns(index)
             # A diverging simulation overflows here; that is what the check below is for.
             with np.errstate(over="ignore", invalid="ignore"):
                 cost += squares
@@ -220,7 +221,8 @@ class Problem:
         self.n_evaluations += 1
         return self._last
 
-    def _columns(self, index: int) -> NDArray[np.intp]:
+    def columns(self, index: int) -> NDArray[np.intp]:
+        """Return which coordinates a record depends on: the parameters and its own initial states."""
         own = self.n_free + index * self.n_states + np.arange(self.n_states)
         return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
 
@@ -234,7 +236,7 @@ class Problem:
         self, theta: NDArray[np.float64]
     ) -> Callable[[int], tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Return what makes the sensitivities of a record, given its number."""
-        shifts = np.where(theta + STEP > self.upper, -STEP, STEP)
+        shifts = np.where(theta + self.steps > self.upper, -self.steps, self.steps)
         base = self.coordinates.to_parameters(theta[: self.n_free])
         shifted = []
         for i in range(self.n_free):
@@ -246,7 +248,7 @@ class Problem:
 
         def one(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             record = self.data.records[index]
-            columns = self._columns(index)
+            columns = self.columns(index)
             step = shifts[columns]
             places = np.repeat(theta[columns[self.n_free :], None], p.shape[1], axis=1)
             for i in range(self.n_states):

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import Coordinates
@@ -27,6 +26,7 @@ from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit_problem import MOST_SUBSTEPS, FitData, Problem, RecordData
 from rigsight.identify.fit_result import FitResult
 from rigsight.identify.idle_threads import IdleThreads
+from rigsight.identify.search import FINE_TOLERANCE, off_kinks, searched
 from rigsight.identify.separate_states import SeparateStates
 from rigsight.records.record import Record
 from rigsight.simulate import (
@@ -184,11 +184,13 @@ class GreyBoxFit:
 
         def search(theta: NDArray[np.float64] = theta) -> _Outcome:
             for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
-                solution = _least_squares(problem, theta, (lower, upper), tolerance, max_evaluations)
+                solution = searched(problem, theta, (lower, upper), tolerance, max_evaluations)
                 theta = solution.x
                 # A time constant on its way to zero is held back where steps chosen for a longer one become unstable.
                 if not (finish and substeps is None and problem.refined(theta)):
                     break
+            if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
+                theta = off_kinks(problem, theta, (lower, upper), self.n_samples)
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))
@@ -233,7 +235,7 @@ class GreyBoxFit:
             own, success, message = begin.theta[:n_free], True, "Nothing to fit but initial states."
             bounds, cost = (coordinates.lower, coordinates.upper), float("inf")
             for _ in range(most_rounds if free else 0):
-                solution = _least_squares(problem, own, bounds, tolerance, max_evaluations)
+                solution = searched(problem, own, bounds, tolerance, max_evaluations)
                 own, success, message = solution.x, bool(solution.status > 0), str(solution.message)
                 before, cost = cost, problem.settle_anew(own)
                 if cost > (1.0 - _WORTH_A_ROUND) * before:
@@ -380,24 +382,3 @@ class GreyBoxFit:
         return d.measured - simulate_outputs(
             self.structure, d.held, p, state, d.record.n_samples, self.data.accuracy
         )
-
-
-def _least_squares(
-    problem: Problem,
-    theta: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    tolerance: float,
-    max_evaluations: int,
-) -> OptimizeResult:
-    return least_squares(
-        problem.residual,
-        theta,
-        jac=problem.jacobian,
-        bounds=bounds,
-        method="trf",
-        x_scale="jac",
-        ftol=tolerance,
-        xtol=0.1 * tolerance,
-        gtol=1e-3 * tolerance,
-        max_nfev=max_evaluations,
-    )
