@@ -34,8 +34,8 @@ _MOST_STARTS = 4
 """Starts that are all fitted at length."""
 _LENGTHY = 2
 """Of more starts, those that are fitted at length in pieces, best after a glimpse first; from the others the fit in one piece
-begins after the glimpse. Of hysteresis by sliders with five draws of noise mostly two to five of nine glimpses led on to the right
-place, of four fits at length in pieces one; these are for a model that is too far off for a fit in one piece.
+begins after the glimpse. Of hysteresis by sliders with five draws of noise mostly two to five of nine glimpses led on to the
+right place, of four fits at length in pieces one; these are for a model that is too far off for a fit in one piece.
 """
 _PIECE = 4.0
 """Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
