@@ -23,6 +23,8 @@ MOVED = {
     "experiments/blind_small/README.md": "experiments/blind_small.md",
     "experiments/fuzzing/README.md": "experiments/fuzzing.md",
     "experiments/linear_recovery/README.md": "experiments/linear_recovery.md",
+    "experiments/engine_accuracy/README.md": "experiments/engine_accuracy.md",
+    "experiments/rounding/README.md": "experiments/rounding.md",
     "experiments/thesis/README.md": "experiments/thesis.md",
 }
 """Files outside docs/ that are pages: their path in the repository -> that on the site."""
