@@ -17,6 +17,7 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, kernel_cache, simulate
+from rigsight.simulate.compiler import c_compilers, library
 from rigsight.simulate.kernel_source import kernel_source
 
 PROGRAM = """
@@ -173,3 +174,11 @@ def test_simulation_is_the_same_from_any_cache(fresh_cache, axis_values, make_re
     first = simulate(compose(AXIS), axis_values, record)["x"]
     kernel_cache._kernels.clear()
     np.testing.assert_array_equal(simulate(compose(AXIS), axis_values, record)["x"], first)
+
+
+@pytest.mark.parametrize("names", [(), ("coulomb_friction",), ("input_delay", "backlash")])
+def test_a_kernel_calls_nothing_that_it_does_not_declare(names):
+    """Newer compilers refuse it, older ones take a call that is never made for granted."""
+    text = kernel_source(compose(AXIS, [effect_named(name) for name in names]))
+    options = [option for option in kernel_cache.OPTIONS if option != "-w"]
+    assert library(c_compilers()[0], {"kernel.c": text}, [*options, "-Werror=implicit-function-declaration"])
