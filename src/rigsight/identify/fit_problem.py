@@ -1,7 +1,7 @@
 """Cost, derivatives and Gauss-Newton matrix of an output-error fit as functions of its coordinates and initial states.
 
-Residuals and derivatives come from one call of the side-by-side integrator per record: the current parameters and every shifted
-one are its lanes.
+They come from one call of the side-by-side integrator for all records: the current parameters and every shifted one are its
+lanes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from rigsight.identify.coordinates import STEP, Coordinates
 from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
-from rigsight.simulate import Structure, Substeps, choose_substeps, simulate_sets, state_limits
+from rigsight.simulate import (
+    FittedRecord,
+    Structure,
+    Substeps,
+    choose_substeps,
+    normal_equations,
+    simulate_sets,
+    state_limits,
+)
 from rigsight.simulate.input_hold import HeldInput
 
 Result = TypeVar("Result")
@@ -127,6 +135,7 @@ class Problem:
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
         self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
+        self._fitted: list[tuple[Substeps, FittedRecord]] = []
         self._last: Evaluation | None = None
         self._best = float("inf")
 
@@ -198,28 +207,48 @@ class Problem:
         """Evaluate, or return the last evaluation if it was here."""
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
-        n = theta.size
-        normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
-        sensitivity = self._sensitivity(theta)
-
-        def products(index: int) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-            residual, derivative = sensitivity(index)
-            with np.errstate(over="ignore", invalid="ignore"):
-                return float(residual @ residual), derivative.T @ derivative, derivative.T @ residual
-
-        for index, (squares, square, projection) in enumerate(self.data.of_each_record(products)):
-            columns = self.columns(index)
-            # A diverging simulation overflows here; that is what the check below is for.
-            with np.errstate(over="ignore", invalid="ignore"):
-                cost += squares
-                normal[np.ix_(columns, columns)] += square
-                gradient[columns] += projection
+        shifts, p, x0 = self._sets(theta)
+        products = np.array(self._products(p, x0))
+        # A diverging simulation overflows here; that is what the check below is for.
+        with np.errstate(over="ignore", invalid="ignore"):
+            cost = float(np.sum(products[:, 0, 0]))
+            normal, gradient = self._put_together(products[:, 1:, 1:], products[:, 0, 1:])
+            normal /= np.outer(shifts, shifts)
+            gradient /= shifts
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
         self._best = min(self._best, cost)
         self._last = Evaluation(theta.copy(), cost, normal, gradient)
         self.n_evaluations += 1
         return self._last
+
+    def _put_together(
+        self, products: NDArray[np.float64], projections: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what all records say of all coordinates, given what each says of the parameters and its own initial states.
+
+        Parameters
+        ----------
+        products
+            Shape (n_records, n, n) with n = n_free + n_states.
+        projections
+            Shape (n_records, n).
+
+        Returns
+        -------
+        Shapes (n_coordinates, n_coordinates) and (n_coordinates,).
+        """
+        n_records, free = products.shape[0], slice(None, self.n_free)
+        own = self.n_free + np.arange(n_records * self.n_states).reshape(n_records, self.n_states)
+        size = self.n_free + own.size
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
+        normal[free, free] = np.sum(products[:, free, free], axis=0)
+        between = np.moveaxis(products[:, free, self.n_free :], 0, 1).reshape(self.n_free, own.size)
+        normal[free, self.n_free :], normal[self.n_free :, free] = between, between.T
+        normal[own[:, :, None], own[:, None, :]] = products[:, self.n_free :, self.n_free :]
+        gradient[free] = np.sum(projections[:, free], axis=0)
+        gradient[self.n_free :] = projections[:, self.n_free :].ravel()
+        return normal, gradient
 
     def columns(self, index: int) -> NDArray[np.intp]:
         """Return which coordinates a record depends on: the parameters and its own initial states."""
@@ -230,12 +259,23 @@ class Problem:
         self, theta: NDArray[np.float64]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
-        return self.data.of_each_record(self._sensitivity(theta))
+        shifts, p, x0 = self._sets(theta)
 
-    def _sensitivity(
+        def one(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            residual, differences = self._differences(index, p, x0[index])
+            with np.errstate(all="ignore"):
+                differences /= shifts[self.columns(index)]
+            return residual, differences
+
+        return self.data.of_each_record(one)
+
+    def _sets(
         self, theta: NDArray[np.float64]
-    ) -> Callable[[int], tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Return what makes the sensitivities of a record, given its number."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the shift of each coordinate, and what differences are taken of: the place itself and each shifted one.
+
+        These are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
+        """
         shifts = np.where(theta + self.steps > self.upper, -self.steps, self.steps)
         base = self.coordinates.to_parameters(theta[: self.n_free])
         shifted = []
@@ -244,41 +284,82 @@ class Problem:
             moved[i] += shifts[i]
             shifted.append(self.coordinates.to_parameters(moved))
         p = np.column_stack([base, *shifted, *[base] * self.n_states])
-        sizes = self.data.state_sizes(p)
+        places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
+        states = np.repeat(places[:, :, None], p.shape[1], axis=2)
+        own = np.arange(self.n_states)
+        states[:, own, 1 + self.n_free + own] += shifts[self.n_free :].reshape(places.shape)
+        return shifts, p, states * self.data.state_sizes(p)
 
-        def one(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            record = self.data.records[index]
-            columns = self.columns(index)
-            step = shifts[columns]
-            places = np.repeat(theta[columns[self.n_free :], None], p.shape[1], axis=1)
-            for i in range(self.n_states):
-                places[i, 1 + self.n_free + i] += step[self.n_free + i]
-            x0 = places * sizes
-            with np.errstate(all="ignore"):
-                out = simulate_sets(
-                    self.data.structure, record.held, p, x0, record.record.n_samples, self.substeps[index]
+    def _products(self, p: NDArray[np.float64], x0: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Return per record the products of its residual and its differences, shape (n_sets, n_sets)."""
+        data = self.data
+        if data.structure.measured_late is not None:
+
+            def one(index: int) -> NDArray[np.float64]:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    columns = np.column_stack(self._differences(index, p, x0[index]))
+                    return np.asarray(columns.T @ columns)
+
+            return data.of_each_record(one)
+        fitted = self._fitted_records()
+        return data.threads.results_of_shares(
+            lambda share: list(
+                normal_equations(data.structure, [fitted[i] for i in share], p, x0[list(share)])
+            ),
+            [record.record.n_samples for record in data.records],
+        )
+
+    def _fitted_records(self) -> list[FittedRecord]:
+        # Equal numbers of steps may stand for other needs: these are the same if they are the same object.
+        if [id(substeps) for substeps, _ in self._fitted] != [id(substeps) for substeps in self.substeps]:
+            self._fitted = [
+                (
+                    substeps,
+                    FittedRecord(
+                        record.held,
+                        substeps.per_piece(record.held.n_pieces),
+                        record.measured,
+                        record.weights,
+                    ),
                 )
-                return weighted(record, out, step)
+                for substeps, record in zip(self.substeps, self.data.records, strict=True)
+            ]
+        return [fitted for _, fitted in self._fitted]
 
-        return one
+    def _differences(
+        self, index: int, p: NDArray[np.float64], x0: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return weighted residuals (n,) of the first set, and its outputs minus those of each other (n, n_sets - 1)."""
+        record = self.data.records[index]
+        with np.errstate(all="ignore"):
+            out = simulate_sets(
+                self.data.structure, record.held, p, x0, record.record.n_samples, self.substeps[index]
+            )
+            return weighted(record, out)
 
 
-def weighted(
-    record: RecordData, out: NDArray[np.float64], step: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return weighted residuals (n,) of the first lane and, of the others, their derivatives (n, n_lanes - 1)."""
+def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return weighted residuals (n,) of the first set and its outputs minus those of each other one (n, n_sets - 1).
+
+    Parameters
+    ----------
+    record
+        What was measured.
+    out
+        Simulated outputs, shape (n_samples, n_outputs, n_sets).
+    """
     used = np.flatnonzero(record.weights > 0.0)
-    n_samples, _, n_lanes = out.shape
+    n_samples, _, n_sets = out.shape
     residuals = np.empty(used.size * n_samples)
-    derivatives = np.empty((used.size * n_samples, n_lanes - 1))
+    differences = np.empty((used.size * n_samples, n_sets - 1))
     for place, i in enumerate(used):
         # In place: these are the largest arrays of a fit, and every copy goes through the memory.
         rows = slice(place * n_samples, (place + 1) * n_samples)
         np.subtract(record.measured[:, i], out[:, i, 0], out=residuals[rows])
         residuals[rows] *= record.weights[i]
-        np.subtract(out[:, i, :1], out[:, i, 1:], out=derivatives[rows])
-        derivatives[rows] *= record.weights[i] / step
-    return residuals, derivatives
+        np.subtract(out[:, i, :1], out[:, i, 1:], out=differences[rows])
+        differences[rows] *= record.weights[i]
+    return residuals, differences
 
 
 def compressed(evaluation: Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -53,15 +53,29 @@ class IdleThreads:
         sizes
             How much work each is, in any unit.
         """
+        return self.results_of_shares(lambda numbers: [one(number) for number in numbers], sizes)
+
+    def results_of_shares(
+        self, several: Callable[[Sequence[int]], Sequence[Result]], sizes: Sequence[int]
+    ) -> list[Result]:
+        """Return the same where a function takes several numbers at once.
+
+        Parameters
+        ----------
+        several
+            Called for shares of the numbers, by any thread; returns its results in their order.
+        sizes
+            How much work each number is, in any unit.
+        """
         free = self._borrowed(len(sizes) - 1)
         if not free or self._pool is None:
-            return [one(index) for index in range(len(sizes))]
+            return list(several(range(len(sizes))))
         try:
             own, *others = _shares(sizes, 1 + free)
-            waiting = [self._pool.submit(_each, one, share) for share in others]
-            found = dict(_each(one, own))
-            for helped in waiting:
-                found.update(helped.result())
+            waiting = [(share, self._pool.submit(several, share)) for share in others]
+            found = dict(zip(own, several(own), strict=True))
+            for share, helped in waiting:
+                found.update(zip(share, helped.result(), strict=True))
         finally:
             with self._lock:
                 self._busy -= free
@@ -74,10 +88,6 @@ class IdleThreads:
             free = max(0, min(most, self._n_jobs - max(1, self._busy)))
             self._busy += free
         return free
-
-
-def _each(one: Callable[[int], Result], numbers: Sequence[int]) -> list[tuple[int, Result]]:
-    return [(index, one(index)) for index in numbers]
 
 
 def _shares(sizes: Sequence[int], count: int) -> list[list[int]]:

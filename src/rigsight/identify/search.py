@@ -137,7 +137,7 @@ def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
         record = data.records[index]
         n_samples = record.record.n_samples
         out = simulate_outputs(data.structure, record.held, p, states[index], n_samples, _EXACT)
-        return weighted(record, out[:, :, None], np.zeros(0))[0]
+        return weighted(record, out[:, :, None])[0]
 
     residuals = data.of_each_record(accurate)
     for index, (_, derivative) in enumerate(problem.sensitivities(place)):

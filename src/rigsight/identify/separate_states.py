@@ -167,7 +167,7 @@ class SeparateStates(Problem):
                 record.record.n_samples,
                 self.substeps[index],
             )
-            first, against_first = weighted(record, out, np.ones(places.shape[1] - 1))
+            first, against_first = weighted(record, out)
             return np.column_stack([first, first[:, None] + against_first])
 
 

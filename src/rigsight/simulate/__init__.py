@@ -2,9 +2,11 @@
 
 from rigsight.simulate.composition import compose as compose
 from rigsight.simulate.composition import structure_named as structure_named
+from rigsight.simulate.kernel import FittedRecord as FittedRecord
 from rigsight.simulate.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.simulation import choose_substeps as choose_substeps
+from rigsight.simulate.simulation import normal_equations as normal_equations
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
 from rigsight.simulate.simulation import record_input as record_input
 from rigsight.simulate.simulation import simulate as simulate
@@ -16,12 +18,14 @@ from rigsight.simulate.structure import carried_over as carried_over
 from rigsight.simulate.substeps import Substeps as Substeps
 
 __all__ = [
+    "FittedRecord",
     "Structure",
     "Substeps",
     "cache_folder",
     "carried_over",
     "choose_substeps",
     "compose",
+    "normal_equations",
     "parameter_vector",
     "record_input",
     "rest_state",

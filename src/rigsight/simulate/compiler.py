@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import importlib.util
 import os
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -189,23 +191,34 @@ def _run(command: Sequence[str], place: str) -> tuple[int, str]:
     It runs programs of its own, which end with it when we are interrupted.
     """
     temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), place)
-    with subprocess.Popen(
-        command,
-        cwd=place,
-        env={**os.environ, **temporary},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        start_new_session=True,
-    ) as process:
+    # Ctrl-C reaches the main thread alone: in another one a program is started whole, and its number is known.
+    with ThreadPoolExecutor(1) as starter:
+        started = starter.submit(
+            subprocess.Popen,
+            command,
+            cwd=place,
+            env={**os.environ, **temporary},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
         try:
+            process = started.result()
             _, said = process.communicate()
         except BaseException:
-            if os.name == "nt":
-                process.kill()
-            else:
-                os.killpg(process.pid, signal.SIGKILL)
+            with started.result() as process:
+                _end(process)
             raise
-        return process.returncode, said
+    return process.returncode, said
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a program and those that it runs."""
+    if os.name == "nt":
+        process.kill()
+        return
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,42 @@ Floats = NDArray[np.float64]
 
 _DOUBLES, _INTS = ctypes.c_void_p, ctypes.c_void_p
 _LONG, _DOUBLE, _INT = ctypes.c_long, ctypes.c_double, ctypes.c_int
+
+
+class _FittedRecord(ctypes.Structure):
+    """``fitted_record`` of the kernel."""
+
+    _fields_ = (
+        ("c", _DOUBLES), ("n_pieces", _LONG), ("length", _DOUBLE), ("per_sample", _LONG), ("substeps", _INTS),
+        ("start_time", _DOUBLE), ("measured", _DOUBLES), ("weights", _DOUBLES),
+    )  # fmt: skip
+
+
+class FittedRecord:
+    """A record to which parameter sets are fitted.
+
+    Parameters
+    ----------
+    held
+        Input between its samples.
+    substeps
+        Runge-Kutta steps in each piece of the input, shape (n_pieces,).
+    measured
+        Outputs, shape (n_samples, n_outputs).
+    weights
+        By which residuals are multiplied, shape (n_outputs,); 0 where an output was not measured.
+    """
+
+    def __init__(
+        self, held: HeldInput, substeps: NDArray[np.intc], measured: Floats, weights: Floats
+    ) -> None:
+        # The kernel reads these where they are: they have to live as long as their addresses.
+        self._arrays = (_doubles(held.coefficients), substeps, _doubles(measured), _doubles(weights))
+        c, steps, values, factors = self._arrays
+        self.as_c = _FittedRecord(
+            c.ctypes.data, c.shape[0] - 1, held.interval, held.per_sample, steps.ctypes.data,
+            0.0, values.ctypes.data, factors.ctypes.data,
+        )  # fmt: skip
 
 
 class Kernel:
@@ -56,6 +93,9 @@ class Kernel:
         self._lanes.argtypes = [
             _DOUBLES, _LONG, _DOUBLE, _LONG, _INTS, _DOUBLE, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES,
         ]  # fmt: skip
+        self._normal = loaded.normal_equations
+        self._normal.restype = _INT
+        self._normal.argtypes = [_DOUBLES, _LONG, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES]
 
     def simulate_one(
         self,
@@ -135,6 +175,42 @@ class Kernel:
             p.ctypes.data, p.shape[0], n_sets, x.ctypes.data, out.ctypes.data,
         )  # fmt: skip
         return out
+
+    def normal_equations(self, records: Sequence[FittedRecord], p: Floats, states: Floats) -> Floats:
+        """Simulate parameter sets on records, and return the products of what least squares needs of them.
+
+        Parameters
+        ----------
+        records
+            What is fitted.
+        p
+            Parameters, shape (n_parameters, n_sets).
+        states
+            States at the start, shape (n_records, n_states, n_sets).
+
+        Returns
+        -------
+        Shape (n_records, n_sets, n_sets): products, summed over outputs and samples, of the weighted residual of the first set
+        and of the weighted outputs of the first set minus those of each other one; NaN or infinity where a set diverges.
+
+        Raises
+        ------
+        MachineError
+            If there is no memory.
+        """
+        n_sets = p.shape[1]
+        x = np.zeros((len(records), self._n_states, n_sets))
+        x[:, : states.shape[1]] = states
+        p = _doubles(p)
+        products = np.empty((len(records), n_sets, n_sets))
+        listed = (_FittedRecord * len(records))(*(record.as_c for record in records))
+        failed = self._normal(
+            ctypes.addressof(listed), len(records), p.ctypes.data, p.shape[0], n_sets, x.ctypes.data,
+            products.ctypes.data,
+        )  # fmt: skip
+        if failed:
+            raise MachineError(f"There is no memory to simulate {n_sets} parameter sets side by side.")
+        return products
 
 
 def _doubles(values: Any) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from rigsight.errors import InputError, SimulationError
 from rigsight.records.record import Record
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
+from rigsight.simulate.kernel import FittedRecord
 from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
@@ -180,6 +181,41 @@ def simulate_sets(
     )
     out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
     return as_measured(structure, p, out, held)
+
+
+def normal_equations(
+    structure: Structure,
+    records: Sequence[FittedRecord],
+    p: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the products of weighted residuals and differences that a step of least squares needs of some records.
+
+    Their outputs are never kept: for many records and sets these go through the memory for longer than they take to compute.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects; no sensor is late, as what it shows is interpolated between samples afterwards.
+    records
+        What is fitted.
+    p
+        Shape (n_parameters, n_sets).
+    initial_states
+        Shape (n_records, n_states, n_sets).
+
+    Returns
+    -------
+    Shape (n_records, n_sets, n_sets), see `Kernel.normal_equations`.
+
+    Raises
+    ------
+    ValueError
+        If a sensor is late.
+    """
+    if structure.measured_late is not None:
+        raise ValueError("What a late sensor shows is known once all of a record is simulated.")
+    return kernel_of(structure).normal_equations(records, p, initial_states)
 
 
 def choose_substeps(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-_NEEDED_BY_ALL_BUT = 99.0
-"""Percentile of the pieces' needs that the full number of steps answers: a few more are cut up by events."""
+_NEEDED_BY = 0.99
+"""Share of the pieces that need no more than the full number of steps: those that need more are cut up by events."""
 
 
 class Substeps(int):
@@ -19,11 +19,13 @@ class Substeps(int):
     """
 
     taken: NDArray[np.intc] | None
+    _schedule: NDArray[np.intc] | None
 
     def __new__(cls, most: int, taken: NDArray[np.intc] | None = None) -> Substeps:
         """Make the most steps of a piece, `taken` saying which need as many."""
         made = super().__new__(cls, most)
         made.taken = taken
+        made._schedule = None
         return made
 
     def with_most(self, most: int) -> Substeps:
@@ -34,7 +36,10 @@ class Substeps(int):
         """Return the steps of each piece, shape (n_pieces,); all the most where these needs are of another input."""
         if self.taken is None or self.taken.size != n_pieces:
             return np.full(n_pieces, int(self), dtype=np.intc)
-        full = max(float(np.percentile(self.taken, _NEEDED_BY_ALL_BUT)), 1.0)
-        # A product such as 3 * (1 / 3) may lie above the whole number that it is.
-        steps = np.ceil(self.taken * (int(self) / full) - 1e-9)
-        return np.asarray(np.clip(steps, 1, int(self)), dtype=np.intc)
+        if self._schedule is None:
+            place = int(_NEEDED_BY * (n_pieces - 1))
+            full = max(float(np.partition(self.taken, place)[place]), 1.0)
+            # A product such as 3 * (1 / 3) may lie above the whole number that it is.
+            steps = np.ceil(self.taken * (int(self) / full) - 1e-9)
+            self._schedule = np.asarray(np.clip(steps, 1, int(self)), dtype=np.intc)
+        return self._schedule
