@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -116,6 +117,19 @@ class Evaluation:
     normal: NDArray[np.float64]
     gradient: NDArray[np.float64]
 
+    @cached_property
+    def compressed(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
+        size = np.sqrt(np.diag(self.normal))
+        size[size == 0.0] = 1.0
+        eigenvalues, vectors = symmetric_eigen(self.normal / np.outer(size, size))
+        kept = np.maximum(eigenvalues, 0.0)
+        floor = 1e-13 * max(float(kept[-1]), 1e-300)
+        root = np.sqrt(kept)
+        inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
+        projection = inverse * (vectors.T @ (self.gradient / size))
+        return (root[:, None] * vectors.T) * size, projection
+
 
 class Problem:
     """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
@@ -184,7 +198,7 @@ class Problem:
         evaluation = self.at(theta)
         if not np.isfinite(evaluation.cost):
             return 0.0
-        _, projection = compressed(evaluation)
+        _, projection = evaluation.compressed
         return float(projection @ projection) / max(evaluation.cost, 1e-300)
 
     def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -194,13 +208,13 @@ class Problem:
             stand_in = np.zeros(theta.size + 1)
             stand_in[-1] = np.sqrt(_WORSE * self._best)
             return stand_in
-        _, projection = compressed(evaluation)
+        _, projection = evaluation.compressed
         rest = max(evaluation.cost - float(projection @ projection), 0.0)
         return np.append(projection, np.sqrt(rest))
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivatives that go with `residual`."""
-        root, _ = compressed(self.at(theta))
+        root, _ = self.at(theta).compressed
         return np.vstack([root, np.zeros(theta.size)])
 
     def at(self, theta: NDArray[np.float64]) -> Evaluation:
@@ -360,16 +374,3 @@ def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.f
         np.subtract(out[:, i, :1], out[:, i, 1:], out=differences[rows])
         differences[rows] *= record.weights[i]
     return residuals, differences
-
-
-def compressed(evaluation: Evaluation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
-    size = np.sqrt(np.diag(evaluation.normal))
-    size[size == 0.0] = 1.0
-    eigenvalues, vectors = symmetric_eigen(evaluation.normal / np.outer(size, size))
-    kept = np.maximum(eigenvalues, 0.0)
-    floor = 1e-13 * max(float(kept[-1]), 1e-300)
-    root = np.sqrt(kept)
-    inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
-    projection = inverse * (vectors.T @ (evaluation.gradient / size))
-    return (root[:, None] * vectors.T) * size, projection

@@ -13,7 +13,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP
-from rigsight.identify.fit_problem import Evaluation, Problem, compressed, weighted
+from rigsight.identify.fit_problem import Evaluation, Problem, weighted
 from rigsight.simulate import simulate_outputs
 
 FINE_TOLERANCE = 1e-6
@@ -156,7 +156,7 @@ def _step(
     Coordinates that it pushes against a bound are held.
     """
     place = evaluation.theta
-    root, projection = compressed(evaluation)
+    root, projection = evaluation.compressed
     free = np.ones(place.size, dtype=bool)
     step = np.zeros(place.size)
     for _ in range(place.size):

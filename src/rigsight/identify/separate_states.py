@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.coordinates import STEP, Coordinates
-from rigsight.identify.fit_problem import Evaluation, FitData, Problem, compressed, weighted
+from rigsight.identify.fit_problem import Evaluation, FitData, Problem, weighted
 from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.simulate import simulate_sets
 
@@ -66,7 +66,7 @@ class SeparateStates(Problem):
         """Return the derivatives that go with `residual`; where they are asked for, the search goes on from."""
         evaluation = self.at(theta)
         self.places = self._settled_at
-        root, _ = compressed(evaluation)
+        root, _ = evaluation.compressed
         return np.vstack([root, np.zeros(theta.size)])
 
     def at(self, theta: NDArray[np.float64]) -> Evaluation:
