@@ -7,6 +7,9 @@ from sympy.printing.c import C99CodePrinter
 
 from rigsight.simulate.printing.language import Language, PowersAsProducts
 
+_LONGEST_CHAIN = 3
+"""Terms that are added one after the other."""
+
 
 class limited(sp.Function):  # type: ignore[misc]  # noqa: N801
     """First argument, kept within plus and minus the second: two instructions, where `clamp` would print six."""
@@ -28,6 +31,15 @@ class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
         return repr(float(expr))
 
     _print_Pi = _print_Exp1 = _print_NumberSymbol  # noqa: N815
+
+    def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
+        # A compiler may not reorder a sum: each term of a long one would wait for all before it.
+        terms = self._as_ordered_terms(expr, order)
+        if len(terms) <= _LONGEST_CHAIN:
+            return str(super()._print_Add(expr, order))
+        half = len(terms) // 2
+        parts = [sp.Add(*part, evaluate=False) for part in (terms[:half], terms[half:])]
+        return " + ".join(f"({self._print_Add(part, order)})" for part in parts)
 
     def _print_sign(self, expr: sp.sign) -> str:
         return f"sign_of({self._print(expr.args[0])})"
@@ -59,6 +71,10 @@ class LanePrinter(CPrinter):
 
     def _print_Function(self, expr: sp.Function) -> str:  # noqa: N802
         return self._call(type(expr).__name__, *expr.args)
+
+    def _print_Add(self, expr: sp.Add, order: str | None = None) -> str:  # noqa: N802
+        # Vectors of many sets hide the wait.
+        return str(C99CodePrinter._print_Add(self, expr, order))
 
     # sympy's C printer knows these by name, and would print the scalar function.
     _print_sin = _print_cos = _print_tan = _print_asin = _print_acos = _print_atan = _print_atan2 = (
