@@ -263,7 +263,7 @@ def _signals(
     """Return the parts of an effect as resisting forces per unit of their coefficient."""
     if effect.delay is not None:
         time = motion.dt * np.arange(motion.u.size)
-        return [motion.u - np.interp(time - next(iter(inner.values())), time, motion.u)]
+        return [motion.u - np.interp(time - _evaluated(effect.delay, inner, motion), time, motion.u)]
     if effect.torque is not None:
         return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
     if effect.deflection is not None:
