@@ -209,7 +209,7 @@ def best_loop(
     if not starts:
         return None
 
-    rest = projected.rest_of(projected.target)
+    rest = projected.rest
 
     def left(column: NDArray[np.float64]) -> NDArray[np.float64]:
         if not np.all(np.isfinite(column)):
