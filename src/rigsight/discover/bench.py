@@ -71,14 +71,15 @@ class Attempt:
     left_out
         Rig parameters that stay where `start` has them.
     to_beat
-        Cost of a fit of the same equation: one that is no lower is not scored.
+        Where the same terms have been scored already: cost of that fit, infinite where its equation has other parameters. A
+        fit whose cost is no lower, or that is far behind, is not scored. None where they have not been scored.
     """
 
     support: Support
     release: Support = frozenset()
     start: Mapping[str, float] | None = None
     left_out: Support = frozenset()
-    to_beat: float = float("inf")
+    to_beat: float | None = None
 
     @property
     def key(self) -> tuple[Support, Support, Support]:
@@ -303,7 +304,9 @@ class Bench:
                     finish=False,
                     substeps=fit.substeps,
                 )
-            return self._roughly_scored(look.attempt.support, fit, look.attempt.to_beat)
+            attempt = look.attempt
+            worth = float("inf") if attempt.to_beat is None else min(attempt.to_beat, hopeless)
+            return self._roughly_scored(attempt.support, fit, worth)
 
         rough = []
         for trial in self.threads.side_by_side(further, looks):
