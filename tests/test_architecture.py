@@ -48,6 +48,4 @@ def test_every_language_is_printed_in_one_place() -> None:
         for module in MODULES
         if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
     }
-    elsewhere = {name for name in printers if not name.startswith("simulate/printing/")}
-    # About to move: the text and LaTeX of a discovered equation.
-    assert elsewhere <= {"discover/equations.py"}
+    assert {name for name in printers if not name.startswith("simulate/printing/")} == set()

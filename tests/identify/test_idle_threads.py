@@ -43,3 +43,33 @@ def test_an_error_is_raised_and_the_thread_is_free_again() -> None:
         threads.results(lambda index: 1 // (index - 2), [9, 9, 1])
     both = threading.Barrier(2, timeout=PATIENCE)
     assert len(threads.results(lambda _: both.wait(), [1, 1])) == 2
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2, 5])
+def test_models_that_are_fitted_side_by_side_come_in_order(n_jobs: int) -> None:
+    threads = IdleThreads(n_jobs)
+    assert list(threads.side_by_side(lambda model: model.upper(), "abcdefg")) == list("ABCDEFG")
+    assert list(threads.side_by_side(str, [])) == []
+
+
+def test_two_models_are_fitted_at_the_same_time_and_nobody_is_left_to_help() -> None:
+    threads = IdleThreads(2)
+    both = threading.Barrier(2, timeout=PATIENCE)
+
+    def fitted(_: int) -> set[int]:
+        both.wait()
+        made_by = set(threads.results(lambda _: threading.get_ident(), [1] * 8))
+        both.wait()
+        return made_by
+
+    first, second = threads.side_by_side(fitted, [0, 1])
+    assert len(first) == len(second) == 1
+    assert first != second
+
+
+def test_a_model_that_fails_leaves_its_thread_free() -> None:
+    threads = IdleThreads(2)
+    with pytest.raises(ZeroDivisionError):
+        list(threads.side_by_side(lambda index: 1 // index, [1, 0]))
+    both = threading.Barrier(2, timeout=PATIENCE)
+    assert len(threads.results(lambda _: both.wait(), [1, 1])) == 2

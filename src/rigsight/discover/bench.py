@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,10 +17,13 @@ from rigsight.rigs import Rig
 from rigsight.simulate import Structure, carried_over, compose
 
 Support = frozenset[str]
+Progress = Callable[[Support], None]
 _EVALUATIONS = 40
 _FIRST_EVALUATIONS = 12
-_HOPELESS = 10.0
+HOPELESS = 10.0
 """Factor over the best RMS so far at which a support is given up after the first evaluations."""
+_FAR = 2.0
+"""Factor over the best held-out error from which finding better initial states changes no choice."""
 _TOLERANCE = 1e-5
 _SMALL = 1e-3
 
@@ -38,7 +41,8 @@ class Trial:
     excess
         RMS of the first output's held-out free-run error in units of the noise floor.
     residuals
-        Held-out errors of the first output in units of the noise floor, all records one after the other.
+        Held-out errors of the first output in units of the noise floor, all records one after the other; empty where a rough
+        score says enough.
     """
 
     support: Support
@@ -53,15 +57,73 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
+class Attempt:
+    """A support and where its fit starts.
+
+    Attributes
+    ----------
+    support
+        Names of the effects.
+    release
+        Parameters that are not to be held at their special values.
+    start
+        Values to start from; None for those of the regression.
+    left_out
+        Rig parameters that stay where `start` has them.
+    to_beat
+        Where the same terms have been scored already: cost of that fit, infinite where its equation has other parameters. A
+        fit whose cost is no lower, or that is far behind, is not scored. None where they have not been scored.
+    """
+
+    support: Support
+    release: Support = frozenset()
+    start: Mapping[str, float] | None = None
+    left_out: Support = frozenset()
+    to_beat: float | None = None
+
+    @property
+    def key(self) -> tuple[Support, Support, Support]:
+        """What a trial is kept by."""
+        return self.support, self.release, self.left_out
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """The first evaluations of a fit."""
+
+    attempt: Attempt
+    problem: GreyBoxFit
+    fit: FitResult
+
+
+@dataclass(frozen=True, eq=False)
+class _RoughTrial:
+    """A fit with the first evaluations of its score; None where there is nothing to score."""
+
+    support: Support
+    fit: FitResult
+    problem: GreyBoxFit
+    score: FitResult | None
+
+    @property
+    def excess(self) -> float:
+        """The held-out error is no larger than this."""
+        return float("inf") if self.score is None else float(np.sqrt(self.score.cost / self.score.n_samples))
+
+    def as_it_is(self) -> Trial:
+        return Trial(self.support, self.fit, self.excess, np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
 class Bench:
     """What every support is polished and scored with.
 
     Attributes
     ----------
     rig
-        The rig.
+        The rig as far as its first output goes.
     estimation, held_out
-        Records to fit and records to score.
+        Records to fit and records to score, of the first output alone.
     values
         Constants, and linear parameters as start values.
     scales, noise
@@ -75,7 +137,7 @@ class Bench:
     own_terms
         Columns of the rig's own terms that compete (full form), by parameter.
     threads
-        Who helps with the records of a fit.
+        Who fits supports side by side, and helps with the records of a fit.
     trials
         What has been polished.
     """
@@ -177,80 +239,118 @@ class Bench:
                 found[structure.parameter_name(effect, parameter.name)] = own[parameter.name]
         return found
 
-    def trial(
-        self,
-        support: Support,
-        release: Support = frozenset(),
-        start: Mapping[str, float] | None = None,
-        left_out: Support = frozenset(),
-    ) -> Trial:
-        """Polish a support and score it; what has been done is not done again.
+    def trial(self, attempt: Attempt) -> Trial:
+        """Polish a support and score it; what has been done is not done again."""
+        return self.trials_of([attempt])[0]
+
+    def trials_of(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
+        """Polish supports side by side and score them; what has been done is not done again.
 
         Parameters
         ----------
-        support
-            Names of the effects.
-        release
-            Parameters that are not to be held at their special values.
-        start
-            Values to start from; default are those of the regression.
-        left_out
-            Rig parameters that stay where `start` has them.
+        attempts
+            Where each fit starts.
+        progress
+            Called with every support that is polished.
         """
-        key = support, release, left_out
-        if key not in self.trials:
-            self.trials[key] = self._polished(support, release, start, left_out)
-        return self.trials[key]
+        new = list({attempt.key: attempt for attempt in attempts if attempt.key not in self.trials}.values())
+        polished = self._polished(new, progress)
+        self.trials.update({attempt.key: trial for attempt, trial in zip(new, polished, strict=True)})
+        return [self.trials[attempt.key] for attempt in attempts]
 
-    def shortened(self, support: Support, longer: Trial) -> Trial:
-        """Polish a support once more from the values that a longer one ended at, and keep the better of both."""
+    def shortened(self, supports: Sequence[Support], longer: Trial) -> list[Trial]:
+        """Polish supports once more from the values that a longer one ended at, and keep the better of both."""
         kept = {name for name, _ in longer.fit.structure.fixed}
-        special = {name for n in support for name in self.candidates[n].effect.special_cases}
-        release = frozenset(special - kept)
-        structure = self.structure(support, release)
-        start = {
-            **self.start(structure, support),
-            **carried_over(longer.fit.values, longer.fit.structure, structure),
-        }
-        before = self.trial(support)
-        again = self._polished(support, release, start, frozenset())
-        return again if again.excess < before.excess else before
-
-    def _polished(
-        self, support: Support, release: Support, start: Mapping[str, float] | None, left_out: Support
-    ) -> Trial:
-        structure = self.structure(support, release)
-        values = dict(start) if start is not None else self.start(structure, support)
-        free = self.free_parameters(structure, left_out)
-        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
-        fit = problem.fit(
-            values, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
-        )
-        best = min((trial.fit.cost for trial in self.trials.values()), default=float("inf"))
-        if not fit.success and fit.cost < _HOPELESS**2 * best:
-            fit = problem.fit(
-                fit.values,
-                free,
-                fit.initial_states,
-                max_evaluations=_EVALUATIONS - _FIRST_EVALUATIONS,
-                tolerance=_TOLERANCE,
-                finish=False,
-                substeps=fit.substeps,
+        before = self.trials_of([Attempt(support) for support in supports])
+        attempts = []
+        for support, first in zip(supports, before, strict=True):
+            special = {name for n in support for name in self.candidates[n].effect.special_cases}
+            release = frozenset(special - kept)
+            structure = self.structure(support, release)
+            start = {
+                **self.start(structure, support),
+                **carried_over(longer.fit.values, longer.fit.structure, structure),
+            }
+            same = first.fit.structure.fixed == structure.fixed
+            attempts.append(
+                Attempt(support, release, start, to_beat=first.fit.cost if same else float("inf"))
             )
-        return self.scored(support, fit)
+        pairs = zip(before, self._polished(attempts), strict=True)
+        return [again if again.excess < first.excess else first for first, again in pairs]
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
         """Simulate the held-out records with a fit; only their initial states are estimated."""
-        if not np.isfinite(fit.cost):
-            return Trial(support, fit, float("inf"), np.zeros(0))
-        score = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, threads=self.threads).fit(
-            fit.values, []
+        return self._finely_scored(self._roughly_scored(support, fit))
+
+    def _polished(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
+        """Fit and score; what is far behind is left as it is.
+
+        It is far behind what was done before or what all of these came to at the same stage, so that the order in which threads
+        do them changes nothing.
+        """
+        looks = list(self.threads.side_by_side(self._first_look, attempts))
+        costs = [trial.fit.cost for trial in self.trials.values()] + [look.fit.cost for look in looks]
+        hopeless = HOPELESS**2 * min(costs, default=float("inf"))
+
+        def further(look: _Look) -> _RoughTrial:
+            fit = look.fit
+            if not fit.success and fit.cost < hopeless:
+                fit = look.problem.fit(
+                    fit.values,
+                    fit.free,
+                    fit.initial_states,
+                    max_evaluations=_EVALUATIONS - _FIRST_EVALUATIONS,
+                    tolerance=_TOLERANCE,
+                    finish=False,
+                    substeps=fit.substeps,
+                )
+            attempt = look.attempt
+            worth = float("inf") if attempt.to_beat is None else min(attempt.to_beat, hopeless)
+            return self._roughly_scored(attempt.support, fit, worth)
+
+        rough = []
+        for trial in self.threads.side_by_side(further, looks):
+            progress(trial.support)
+            rough.append(trial)
+        errors = [trial.excess for trial in self.trials.values()] + [trial.excess for trial in rough]
+        far = _FAR * min(errors, default=float("inf"))
+
+        def finished(trial: _RoughTrial) -> Trial:
+            return self._finely_scored(trial) if trial.excess < far else trial.as_it_is()
+
+        return list(self.threads.side_by_side(finished, rough))
+
+    def _first_look(self, attempt: Attempt) -> _Look:
+        structure = self.structure(attempt.support, attempt.release)
+        values = dict(attempt.start) if attempt.start is not None else self.start(structure, attempt.support)
+        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
+        fit = problem.fit(
+            values,
+            self.free_parameters(structure, attempt.left_out),
+            max_evaluations=_FIRST_EVALUATIONS,
+            tolerance=_TOLERANCE,
+            finish=False,
         )
+        return _Look(attempt, problem, fit)
+
+    def _roughly_scored(self, support: Support, fit: FitResult, to_beat: float = float("inf")) -> _RoughTrial:
+        problem = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, threads=self.threads)
+        if not fit.cost < to_beat:
+            return _RoughTrial(support, fit, problem, None)
+        score = problem.fit(
+            fit.values, [], max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
+        )
+        return _RoughTrial(support, fit, problem, score)
+
+    def _finely_scored(self, trial: _RoughTrial) -> Trial:
+        if not np.isfinite(trial.excess) or trial.score is None:
+            return trial.as_it_is()
+        score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states)
         if not score.residuals:
-            return Trial(support, fit, float("inf"), np.zeros(0))
+            return Trial(trial.support, trial.fit, float("inf"), np.zeros(0))
         output = self.rig.outputs[0].name
         errors = np.concatenate([r[:, 0] for r in score.residuals]) / self.noise[output]
-        return Trial(support, fit, float(np.sqrt(np.mean(errors**2))), errors)
+        return Trial(trial.support, trial.fit, float(np.sqrt(np.mean(errors**2))), errors)
 
 
 def _rig_values(

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from rigsight.discover.assembly import Found, assembled
-from rigsight.discover.bench import Bench, Trial
+from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
 from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import Candidate, candidates, offered_effects
@@ -61,7 +61,7 @@ def discover(
     progress
         Called with a short text when a stage or support is done.
     n_jobs
-        Threads that share the records of a fit; the result is the same with any number.
+        Supports that are fitted at the same time; the result is the same with any number.
 
     Raises
     ------
@@ -71,20 +71,25 @@ def discover(
         If the rig's own equations cannot be simulated near the records.
     """
     say = progress or (lambda _: None)
+    threads = IdleThreads(n_jobs)
     rng = np.random.default_rng(seed)
     estimation, held_out, how = _split(task)
     values = _linear_values(task, estimation)
     scales = characteristic_scales(task.rig, estimation, values)
     output = task.rig.outputs[0].name
-    motions = [motion_of(task.rig, record, values, task.noise[output]) for record in estimation]
+    motions = threads.results(
+        lambda index: motion_of(task.rig, estimation[index], values, task.noise[output]),
+        [record.n_samples for record in estimation],
+    )
     say("motion smoothed")
     rows = rows_of(motions, scales["time"], pointwise)
     projected = own_regression(task.rig, task.no_spring, motions, rows)
-    library = _library(task, motions, rows, projected, scales)
+    library = _library(task, motions, rows, projected, scales, threads)
     library, same = _distinct(library, projected)
     say("library")
     bench = Bench(
-        rig=task.rig,
+        # What the motion knows nothing of would be simulated in every fit.
+        rig=replace(task.rig, lateral=None, outputs=task.rig.outputs[:1]),
         estimation=tuple(_without_downstream(task.rig, record) for record in estimation),
         held_out=tuple(_without_downstream(task.rig, record) for record in held_out),
         values=values,
@@ -94,7 +99,7 @@ def discover(
         candidates={candidate.name: candidate for candidate in library},
         projected=projected,
         own_terms=own_terms(task.rig, task.no_spring, projected) if method == "full" else {},
-        threads=IdleThreads(n_jobs),
+        threads=threads,
     )
     selection = select(bench, say)
     if not math.isfinite(selection.best.excess):
@@ -171,10 +176,15 @@ def _without_downstream(rig: Rig, record: Record) -> Record:
 
 
 def _library(
-    task: Task, motions: Sequence[Motion], rows: Rows, projected: Projected, scales: Mapping[str, float]
+    task: Task,
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    threads: IdleThreads,
 ) -> list[Candidate]:
     effects = offered_effects(task.rig, not task.no_spring)
-    found = candidates(effects, motions, rows, projected, scales, task.rig.is_driven)
+    found = candidates(effects, motions, rows, projected, scales, task.rig.is_driven, threads)
     return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 
 
@@ -205,10 +215,12 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
         return chosen
     special = {name for effect in chosen.fit.structure.effects for name in effect.special_cases}
     without = bench.trial(
-        chosen.support,
-        release=frozenset(special - set(dict(chosen.fit.structure.fixed))),
-        start={**dict(chosen.fit.structure.fixed), **chosen.fit.values, damping: 0.0},
-        left_out=frozenset({damping}),
+        Attempt(
+            chosen.support,
+            release=frozenset(special - set(dict(chosen.fit.structure.fixed))),
+            start={**dict(chosen.fit.structure.fixed), **chosen.fit.values, damping: 0.0},
+            left_out=frozenset({damping}),
+        )
     )
     say(f"without {damping}")
     worse = criterion(without, selection.independent) - criterion(chosen, selection.independent)
@@ -235,16 +247,17 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
 
     special = {name: value for e in chosen.fit.structure.effects for name, value in e.special_cases.items()}
     start = {**special, **dict(chosen.fit.structure.fixed), **chosen.fit.values}
-    fit = fitted(bench.structure(chosen.support, frozenset(special)), start, free | set(special))
+    effects = chosen.fit.structure.effects
+    fit = fitted(compose(rig, effects), start, free | set(special))
     if not math.isfinite(fit.cost):
-        fit = fitted(chosen.fit.structure, chosen.fit.values, free)
+        fit = fitted(compose(rig, effects, dict(chosen.fit.structure.fixed)), chosen.fit.values, free)
         if not math.isfinite(fit.cost):
             raise SimulationError(f"The discovered equations cannot be fitted to all records: {fit.message}")
         return fit, ""
     known = {name: (fit.values[name], fit.standard_errors[name]) for name in special}
     if not special or any(abs(v - special[n]) > _CLEARLY_OFF * error for n, (v, error) in known.items()):
         return fit, ""
-    held = fitted(compose(rig, chosen.fit.structure.effects, special), fit.values, free - set(special))
+    held = fitted(compose(rig, effects, special), fit.values, free - set(special))
     if not math.isfinite(held.cost):
         return fit, ""
     told = ", ".join(f"{name} = {value:.4g} +/- {error:.2g}" for name, (value, error) in known.items())

@@ -61,7 +61,9 @@ def inclusion(
         # The loop does not know where rest is.
         loops = [candidate for candidate in library if is_loop(candidate.effect)]
         effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
-        library = loops + candidates(effects, moved, rows, projected, bench.scales, task.rig.is_driven)
+        library = loops + candidates(
+            effects, moved, rows, projected, bench.scales, task.rig.is_driven, bench.threads
+        )
     again = replace(
         bench,
         candidates={candidate.name: candidate for candidate in library},

@@ -20,6 +20,7 @@ from rigsight.discover.regression import Projected
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import Effect, SumAndDifference
 from rigsight.effects import symbols as canonical
+from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose, simulate_sets
@@ -171,6 +172,7 @@ def best_loop(
     projected: Projected,
     scales: Mapping[str, float],
     driven: bool,
+    threads: IdleThreads,
 ) -> Loop | None:
     """Return the loop that explains most of what the rig's own terms leave, None where none explains anything.
 
@@ -188,6 +190,8 @@ def best_loop(
         Size of each base quantity.
     driven
         True if the acceleration is regressed, false if the force is.
+    threads
+        Who helps with the motions.
     """
     shape = LoopShape.of(effect)
     structure = loop_structure(effect)
@@ -196,7 +200,7 @@ def best_loop(
 
     def columns_at(points: Sequence[Point]) -> NDArray[np.float64]:
         shapes = [shape.values(point, scales) for point in points]
-        return _columns(structure, effect, motions, rows, shapes, scales["x"])
+        return _columns(structure, effect, motions, rows, shapes, scales["x"], threads)
 
     sign = -1.0 if driven else 1.0
     columns = sign * columns_at(grid)
@@ -205,7 +209,7 @@ def best_loop(
     if not starts:
         return None
 
-    rest = projected.rest_of(projected.target)
+    rest = projected.rest
 
     def left(column: NDArray[np.float64]) -> NDArray[np.float64]:
         if not np.all(np.isfinite(column)):
@@ -269,6 +273,7 @@ def _columns(
     rows: Rows,
     shapes: Sequence[Mapping[str, float]],
     x_size: float,
+    threads: IdleThreads,
 ) -> NDArray[np.float64]:
     """Return the rows of several loops' deflections, shape (n_rows, n_loops)."""
     motion_of_element = structure.rig.motion
@@ -277,12 +282,14 @@ def _columns(
     assert effect.elastic_share is not None
     values = [{**fixed, effect.elastic_share: 0.0, **inner} for inner in shapes]
     p = np.array([[v[name] for v in values] for name in structure.names])
-    blocks = []
-    for motion in motions:
+
+    def block(index: int) -> NDArray[np.float64]:
+        motion = motions[index]
         held = hold_motion(motion.x, motion.v, motion.dt)
         start = np.zeros((len(structure.states), len(shapes)))
         with np.errstate(all="ignore"):
             z = simulate_sets(structure, held, p, start, motion.x.size, _SUBSTEPS)[:, 0, :]
             z = np.where(np.abs(z) < _RUNAWAY * x_size, z, np.nan)
-        blocks.append(np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(shapes))]))
-    return np.concatenate(blocks)
+        return np.column_stack([rows.of(np.ascontiguousarray(z[:, i])) for i in range(len(shapes))])
+
+    return np.concatenate(threads.results(block, [motion.x.size for motion in motions]))

@@ -27,6 +27,7 @@ from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Place
+from rigsight.identify import IdleThreads
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.units import characteristic_value
@@ -115,6 +116,7 @@ def candidates(
     projected: Projected,
     scales: Mapping[str, float],
     driven: bool,
+    threads: IdleThreads | None = None,
 ) -> list[Candidate]:
     """Return one candidate per effect, at the inner values that explain most of what the rig's own terms leave.
 
@@ -132,23 +134,23 @@ def candidates(
         Size of each base quantity.
     driven
         True if the acceleration is regressed, false if the force is: a resisting force has the other sign there.
+    threads
+        Who looks for inner values; None for the calling thread alone.
     """
     sign = -1.0 if driven else 1.0
+    helpers = threads or IdleThreads()
     plain = [effect for effect in effects if _is_plain(effect)]
     found = []
     for effect, column in zip(plain, _library_columns(plain, motions, rows), strict=True):
         found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
-    for effect in effects:
-        if effect in plain:
-            continue
-        best = (
-            _loop(effect, motions, rows, projected, scales, driven)
-            if is_loop(effect)
-            else _best_inner(effect, motions, rows, projected, scales, sign)
-        )
-        if best is not None:
-            found.append(best)
-    return found
+
+    def at_best_values(effect: Effect) -> Candidate | None:
+        if is_loop(effect):
+            return _loop(effect, motions, rows, projected, scales, driven, helpers)
+        return _best_inner(effect, motions, rows, projected, scales, sign)
+
+    others = [effect for effect in effects if effect not in plain]
+    return found + [best for best in helpers.side_by_side(at_best_values, others) if best is not None]
 
 
 def _loop(
@@ -158,8 +160,9 @@ def _loop(
     projected: Projected,
     scales: Mapping[str, float],
     driven: bool,
+    threads: IdleThreads,
 ) -> Candidate | None:
-    loop = best_loop(effect, motions, rows, projected, scales, driven)
+    loop = best_loop(effect, motions, rows, projected, scales, driven, threads)
     return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
 
 
@@ -260,7 +263,7 @@ def _signals(
     """Return the parts of an effect as resisting forces per unit of their coefficient."""
     if effect.delay is not None:
         time = motion.dt * np.arange(motion.u.size)
-        return [motion.u - np.interp(time - next(iter(inner.values())), time, motion.u)]
+        return [motion.u - np.interp(time - _evaluated(effect.delay, inner, motion), time, motion.u)]
     if effect.torque is not None:
         return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
     if effect.deflection is not None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,14 +47,22 @@ class Projected:
     target: NDArray[np.float64]
     independent: float
 
+    @cached_property
+    def _directions(self) -> NDArray[np.float64]:
+        return np.linalg.qr(self.base / np.linalg.norm(self.base, axis=0))[0]
+
+    @cached_property
+    def rest(self) -> NDArray[np.float64]:
+        """The target without what the base columns explain."""
+        return self.rest_of(self.target)
+
     def rest_of(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return columns, or the target, without what the base columns explain."""
-        directions = np.linalg.qr(self.base / np.linalg.norm(self.base, axis=0))[0]
-        return np.asarray(columns - directions @ (directions.T @ columns))
+        """Return columns without what the base columns explain."""
+        return np.asarray(columns - self._directions @ (self._directions.T @ columns))
 
     def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Return coefficients of further columns and the share of what the base leaves that they explain."""
-        left, added = self.rest_of(self.target), self.rest_of(columns)
+        left, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
         if np.any(size <= _TINY * np.linalg.norm(columns, axis=0)):
             return np.zeros(columns.shape[1]), 0.0
@@ -82,7 +91,7 @@ def sparse_path(projected: Projected, columns: NDArray[np.float64]) -> list[tupl
     columns
         Shape (n_rows, n_terms).
     """
-    matrix, target = _compressed(projected.rest_of(columns), projected.rest_of(projected.target))
+    matrix, target = _compressed(projected.rest_of(columns), projected.rest)
     paths = [_shrinking(matrix, target), _growing(matrix, target)]
     supports = {support for path in paths for support in path if support}
     return sorted(supports, key=lambda s: (len(s), s))
@@ -95,7 +104,7 @@ def inclusion_probabilities(
 
     In every draw the support is the smallest that leaves hardly more than the one of the lowest Bayesian information criterion.
     """
-    matrix, target = projected.rest_of(columns), projected.rest_of(projected.target)
+    matrix, target = projected.rest_of(columns), projected.rest
     blocks = np.array_split(np.arange(target.size), min(_BLOCKS, target.size))
     counts = np.zeros(columns.shape[1])
     for _ in range(N_ENSEMBLE):

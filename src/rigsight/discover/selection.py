@@ -6,13 +6,14 @@ criterion of their independent samples; of two models that those cannot tell apa
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.bench import Bench, Support, Trial
+from rigsight.discover.bench import HOPELESS, Attempt, Bench, Support, Trial
 from rigsight.discover.regression import information_criterion, sparse_path
 
 STRONG = 10.0
@@ -95,24 +96,29 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         Called with what has just been polished.
     """
 
-    def tried(support: Support) -> Trial:
-        trial = bench.trial(support)
-        special = dict(trial.fit.structure.fixed)
-        if special and not at_floor(trial):
-            start = {**trial.fit.values, **special}
-            released = bench.trial(support, release=frozenset(special), start=start)
-            trial = released if released.excess < _RELEASED * trial.excess else trial
-        progress(", ".join(sorted(support)) or "linear")
-        return trial
+    def tried(supports: Sequence[Support]) -> list[Trial]:
+        trials = bench.trials_of(
+            [Attempt(support) for support in supports],
+            lambda support: progress(", ".join(sorted(support)) or "linear"),
+        )
+        enough = HOPELESS * min(trial.excess for trial in bench.trials.values())
+        special = {trial.support: dict(trial.fit.structure.fixed) for trial in trials}
+        releases = [
+            Attempt(t.support, frozenset(own), {**t.fit.values, **own})
+            for t in trials
+            if (own := special[t.support]) and t.excess < enough and not at_floor(t)
+        ]
+        released = {trial.support: trial for trial in bench.trials_of(releases)}
+        return [_better(trial, released.get(trial.support)) for trial in trials]
 
-    pool = [tried(frozenset())]
-    for support in proposals(bench):
-        if at_floor(pool[-1]):
+    pool = tried([frozenset()])
+    for _, as_long in itertools.groupby(proposals(bench), key=len):
+        if any(at_floor(trial) for trial in pool):
             break
-        pool.append(tried(support))
+        pool += tried(list(as_long))
     if not any(at_floor(trial) for trial in pool):
         # A rich term may stand for a simple one in the regression, and its fit stop where that of the simple one does not.
-        pool += [tried(support) for support in _special_cases(bench, [trial.support for trial in pool])]
+        pool += tried(_special_cases(bench, [trial.support for trial in pool]))
     independent = independent_samples(min(pool, key=lambda t: t.excess).residuals)
 
     def cost(trial: Trial) -> float:
@@ -124,9 +130,9 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         longer = [best.support | {name} for name in next_terms(bench, best.support)]
         if len(best.support) >= _MOST_TERMS or at_floor(best):
             longer = []
-        pool += [tried(frozenset(support)) for support in (*shorter, *longer)]
+        pool += tried([*shorter, *longer])
         # What stopped short from the regression's values may go on from those of the longer equation.
-        pool += [bench.shortened(frozenset(support), best) for support in shorter if support]
+        pool += bench.shortened([support for support in shorter if support], best)
         finest = min(pool, key=lambda t: t.excess)
         independent = independent_samples(finest.residuals)
         found = _fewest(pool, cost)
@@ -138,6 +144,11 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         by_support.setdefault(trial.support, trial)
     ordered = list(by_support.values())
     return Selection(best, tuple(ordered), tuple(cost(trial) for trial in ordered), independent)
+
+
+def _better(held: Trial, released: Trial | None) -> Trial:
+    """Return the trial with the special values released where that is worth more parameters."""
+    return held if released is None or released.excess >= _RELEASED * held.excess else released
 
 
 def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:

@@ -1,4 +1,4 @@
-"""Which threads help with the records of one fit? Those that no other fit keeps busy.
+"""Which threads do which fit, and which help with the records of one? Those that no other fit keeps busy.
 
 Candidates are fitted side by side as long as there are as many of them as jobs. Before the first and after the last of them, and
 where one takes far longer than the others, the jobs that are left take a share of the records of a fit that runs: simulations
@@ -8,11 +8,14 @@ do not hold the interpreter. What is computed, and the order in which it is summ
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
+from joblib import Parallel, delayed
+
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -42,6 +45,27 @@ class IdleThreads:
         finally:
             with self._lock:
                 self._busy -= 1
+
+    def side_by_side(self, one: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """Yield what a function makes of each item, in their order; who has no item left helps with the records of others.
+
+        Parameters
+        ----------
+        one
+            Fits one model.
+        items
+            Models.
+        """
+        if self._n_jobs == 1:
+            yield from map(one, items)
+            return
+
+        def counted(item: Item) -> Result:
+            with self.one_busy():
+                return one(item)
+
+        parallel = Parallel(n_jobs=self._n_jobs, prefer="threads", return_as="generator")
+        yield from parallel(delayed(counted)(item) for item in items)
 
     def results(self, one: Callable[[int], Result], sizes: Sequence[int]) -> list[Result]:
         """Return what a function makes of each of some numbers ``0, 1, ...``, in their order.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import cast
 
 from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
 
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.windows import cut, window_length
@@ -116,13 +117,15 @@ def discover_campaign(
     chosen = cast("Method", check_option("The method", method, METHODS))
     task = discovery_task(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
-    found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
-    notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
-    found = replace(found, warnings=(*found.warnings, *notes))
-    if not one_by_one:
-        return found
-    alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
-    return replace(found, by_record=alone)
+    # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
+        notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
+        found = replace(found, warnings=(*found.warnings, *notes))
+        if not one_by_one:
+            return found
+        alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
+        return replace(found, by_record=alone)
 
 
 def discovery_task(campaign: Campaign) -> Task:

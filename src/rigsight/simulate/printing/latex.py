@@ -13,6 +13,8 @@ from rigsight.simulate.printing.shown import ShownEquation
 
 _DIGITS = 6
 """Of numbers that stand in an effect's equation; those of parameters stand beside it."""
+_JOINED = {"": "", "+": " + ", "-": " - "}
+_WITHIN = r",\quad \left|%s\right| \leq %s"
 _ACCENTS = ("", r"\dot", r"\ddot")
 
 
@@ -26,12 +28,8 @@ def latex_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]
     names
         Name of each symbol.
     """
-    printer = LatexPrinter(names)
-    right = " ".join(f"{sign} {printer.expression(term)}".strip() for sign, term in equation.signed_terms)
-    if equation.limit is not None:
-        state, half_width = map(printer.expression, equation.limit)
-        right += rf",\quad \left|{state}\right| \leq {half_width}"
-    return printer.expression(equation.left), right
+    left, right = equation.written(LatexPrinter(names).expression, _JOINED, _WITHIN)
+    return left, right.strip()
 
 
 def latex_name(name: ShownName) -> str:

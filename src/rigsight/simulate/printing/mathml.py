@@ -15,6 +15,7 @@ _TIMES = '<mo lspace="0.14em" rspace="0.14em">&InvisibleTimes;</mo>'
 """A little space, so that names of several letters do not run into each other."""
 _DOTS = ("", "\u02d9", "\u00a8")
 _JOINED = {"": "", "+": "<mo>+</mo>", "-": "<mo>&minus;</mo>"}
+_WITHIN = "<mo>,</mo><mspace width='1em'/><mo>|</mo>%s<mo>|</mo><mo>&le;</mo>%s"
 
 
 def mathml_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName]) -> str:
@@ -27,12 +28,8 @@ def mathml_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName
     names
         Name of each symbol.
     """
-    printer = MathMLPrinter(names)
-    right = "".join(_JOINED[sign] + printer.expression(term) for sign, term in equation.signed_terms)
-    if equation.limit is not None:
-        state, half_width = map(printer.expression, equation.limit)
-        right += f"<mo>,</mo><mspace width='1em'/><mo>|</mo>{state}<mo>|</mo><mo>&le;</mo>{half_width}"
-    return f'<math display="block"><mrow>{printer.expression(equation.left)}<mo>=</mo>{right}</mrow></math>'
+    left, right = equation.written(MathMLPrinter(names).expression, _JOINED, _WITHIN)
+    return f'<math display="block"><mrow>{left}<mo>=</mo>{right}</mrow></math>'
 
 
 class MathMLPrinter(MathMLPresentationPrinter):  # type: ignore[misc]

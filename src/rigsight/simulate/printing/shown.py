@@ -1,12 +1,13 @@
-"""Which equations are people shown? Those of the tree, in the order of reading; no language yet."""
+"""Which equations are people shown? Those of the tree, in the order of reading, in any language."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from rigsight.simulate.equation_tree import late
 from rigsight.simulate.printing.names import (
     ShownName,
     in_words,
@@ -52,6 +53,26 @@ class ShownEquation:
             signed.append(("-", -part) if negative else (plus, part))
         return tuple(signed)
 
+    def written(
+        self, expression: Callable[[sp.Expr], str], joined: Mapping[str, str], within: str
+    ) -> tuple[str, str]:
+        """Return both sides in a language.
+
+        Parameters
+        ----------
+        expression
+            Writes an expression.
+        joined
+            How the language writes what joins a term to the one before: ``+``, ``-``, or nothing at the head.
+        within
+            How it writes that a state stays within a half-width, with a ``%s`` for each of the two.
+        """
+        right = "".join(joined[sign] + expression(term) for sign, term in self.signed_terms)
+        if self.limit is not None:
+            state, half_width = self.limit
+            right += within % (expression(state), expression(half_width))
+        return expression(self.left), right
+
 
 @dataclass(frozen=True)
 class ShownEquations:
@@ -90,20 +111,43 @@ def shown_equations(structure: Structure, label: Callable[[str], str] = in_words
     effects = [
         ShownEquation(d.owner, d.symbol, (d.expression,)) for d in tree.definitions if d.rate_of is None
     ]
-    kinematic = kinematic_states(structure)
-    states = [
-        ShownEquation(
-            state.owner,
-            rate_symbol(kinematic.get(state.symbol, state.symbol)),
-            state.terms,
-            None if state.limit is None else (state.symbol, state.limit),
-        )
-        for state in tree.states
-        if state.symbol not in kinematic
-    ]
-    every = [*_motion(structure), *effects, *states, *_outputs(structure)]
+    every = [*_motion(structure), *effects, *_states(structure), *_outputs(structure)]
     owners = dict.fromkeys([None, *(equation.owner for equation in every)])
     return ShownEquations(names, tuple(e for owner in owners for e in every if e.owner == owner))
+
+
+def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -> ShownEquations:
+    """Return the equations of a structure without definitions, one for each degree of freedom, state and output.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    numbers
+        Parameters that stand as numbers.
+    """
+    tree = structure.tree
+    values: dict[sp.Symbol, sp.Expr] = {}
+    for definition in tree.definitions:
+        value = definition.expression
+        if isinstance(value, late):
+            value = late(*tree.lateness(definition.symbol))
+        values[definition.symbol] = value.xreplace(values)
+
+    def flat(expression: sp.Expr) -> sp.Expr:
+        return expression.xreplace(values).xreplace(numbers)
+
+    every = [*_motion(structure), *_states(structure), *_outputs(structure)]
+    flattened = (
+        replace(
+            equation,
+            left=flat(equation.left),
+            terms=tuple(term for term in map(flat, equation.terms) if term != 0) or (sp.Integer(0),),
+            limit=None if equation.limit is None else (equation.limit[0], flat(equation.limit[1])),
+        )
+        for equation in every
+    )
+    return ShownEquations(shown_names(structure), tuple(flattened))
 
 
 def _motion(structure: Structure) -> list[ShownEquation]:
@@ -111,6 +155,20 @@ def _motion(structure: Structure) -> list[ShownEquation]:
     accelerations = sp.Matrix([rate_symbol(velocity) for velocity in motion.velocities])
     inertial = motion.mass * accelerations if motion.velocities else ()
     return [ShownEquation(None, left, terms) for left, terms in zip(inertial, motion.terms, strict=True)]
+
+
+def _states(structure: Structure) -> list[ShownEquation]:
+    kinematic = kinematic_states(structure)
+    return [
+        ShownEquation(
+            state.owner,
+            rate_symbol(kinematic.get(state.symbol, state.symbol)),
+            state.terms,
+            None if state.limit is None else (state.symbol, state.limit),
+        )
+        for state in structure.tree.states
+        if state.symbol not in kinematic
+    ]
 
 
 def _outputs(structure: Structure) -> list[ShownEquation]:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import sympy as sp
+from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
+
+from rigsight.simulate.printing.shown import ShownEquation
+
+_JOINED = {"": "", "+": " + ", "-": " - "}
+_WITHIN = " within |%s| <= %s"
 
 
 class TextPrinter(StrPrinter):  # type: ignore[misc]
@@ -21,14 +27,25 @@ class TextPrinter(StrPrinter):  # type: ignore[misc]
         return f"{float(expr):.6g}"
 
 
-class TermPrinter(StrPrinter):  # type: ignore[misc]
-    """A single term as short as it can be read: bars for absolute values, no spaces in powers."""
+class EquationPrinter(TextPrinter):
+    """Text as equations are read: factors side by side, bars for absolute values."""
+
+    def _print_Mul(self, expr: sp.Expr) -> str:  # noqa: N802
+        return str(super()._print_Mul(expr)).replace("*", " ")
 
     def _print_Abs(self, expr: sp.Expr) -> str:  # noqa: N802
         return f"|{self._print(expr.args[0])}|"
 
+    def _print_late(self, expression: sp.Expr) -> str:
+        signal, delay = expression.args
+        return f"{self._print(signal)}(t - {self.parenthesize(delay, PRECEDENCE['Mul'])})"
+
+
+class TermPrinter(EquationPrinter):
+    """A single term as short as it can be read: no spaces in powers."""
+
     def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
-        return str(super()._print_Pow(expr, rational=rational)).replace("**", "^").replace(" ", "")
+        return super()._print_Pow(expr, rational=rational).replace(" ", "")
 
 
 def text(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
@@ -38,3 +55,15 @@ def text(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
             expression.xreplace({s: sp.Symbol(name, real=True) for s, name in names.items()})
         )
     )
+
+
+def text_equation(equation: ShownEquation, names: Mapping[sp.Symbol, str]) -> str:
+    """Return an equation as plain text with its symbols renamed."""
+    symbols = {s: sp.Symbol(name, real=True) for s, name in names.items()}
+    printer = EquationPrinter()
+
+    def expression(shown: sp.Expr) -> str:
+        return str(printer.doprint(shown.xreplace(symbols)))
+
+    left, right = equation.written(expression, _JOINED, _WITHIN)
+    return f"{left} = {right}".replace("=  - ", "= -")
