@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from threadpoolctl import threadpool_limits
 
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.effects import effect_named
@@ -22,6 +24,11 @@ from rigsight.simulate import compose, simulate
 # Timings decide no test: on a busy machine an example may take any time.
 settings.register_profile("rigsight", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("rigsight")
+
+# Tests run side by side, a process per processor. Matrix products spread over the same processors wait for each other there:
+# a fit of a step took 4 s of processor time instead of 0.1 s. The variable is for the processes that tests start.
+threadpool_limits(limits=1, user_api="blas")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Whoever starts the tests in the background may have them ignore Ctrl-C, and the commands that they start inherit that.
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
