@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import pickle
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +16,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from threadpoolctl import threadpool_limits
 
-from rigsight.blind import Outcome, ParameterError, WithheldError
+from rigsight.blind import Outcome, ParameterError, Trial, WithheldError, draw_trial
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
@@ -156,6 +158,30 @@ def write_model(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Trial]:
+    """Return a trial of the small bench by seed and number, drawn once for all processes that test: it takes ten seconds."""
+    own = tmp_path_factory.getbasetemp()
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+    def draw(seed: int, number: int) -> Trial:
+        file = shared / f"trial-{seed}-{number}"
+        with file.with_suffix(".lock").open("w") as lock:
+            # Where files cannot be locked, two processes may draw the same; the later one replaces what is alike.
+            with contextlib.suppress(ImportError):
+                import fcntl
+
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            if not file.exists():
+                part = file.with_suffix(f".{os.getpid()}")
+                part.write_bytes(pickle.dumps(draw_trial("small", seed, number)))
+                part.replace(file)
+        trial: Trial = pickle.loads(file.read_bytes())
+        return trial
+
+    return draw
 
 
 @pytest.fixture
