@@ -9,12 +9,20 @@ SEED ?= 1
 
 VENV := .venv
 BIN := $(VENV)/bin
-DEPENDENCIES := $(VENV)/.dependencies-installed
-INSTALLED := $(VENV)/.rigsight-installed
+RUNNABLE := $(VENV)/.rigsight-installed
+DEVELOPMENT := $(VENV)/.development-installed
 COMPILER := $(VENV)/.compiler-found
 FUZZER_INSTALLED := $(VENV)/.fuzzer-installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
+
+# Nothing is byte-compiled ahead: Python does that for the few modules that are really imported, at their first import.
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# uv takes a third of pip's processor time. It does not read pip's settings (an index or a certificate of one's own), so where it
+# fails, soon, pip has its turn.
+UV_INSTALL := UV_HTTP_TIMEOUT=15 UV_HTTP_RETRIES=1 $(BIN)/python -m uv pip install --quiet --python $(BIN)/python
+install = $(UV_INSTALL) $(1) 2>/dev/null || $(PIP_INSTALL) $(1)
+NOW := date +%s
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -23,36 +31,36 @@ NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
 
-demo: $(INSTALLED)  ## run the whole chain on the built-in virtual rig; results in demo/
-	@$(BIN)/rigsight demo --out demo
+demo: $(RUNNABLE) $(COMPILER)  ## run the whole chain on the built-in virtual rig; results in demo/
+	@begun=$$($(NOW)); $(BIN)/rigsight demo --out demo && echo "The demo took $$(($$($(NOW)) - begun)) s."
 
-test: $(INSTALLED)  ## run all tests
+test: $(DEVELOPMENT)  ## run all tests
 	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-check: $(INSTALLED)  ## format, lint, types, layers
+check: $(DEVELOPMENT)  ## format, lint, types, layers
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(INSTALLED)  ## measure the simulator against C and scipy, the time of a diagnosis, and exports against the simulator
+bench: $(DEVELOPMENT)  ## measure the simulator against C and scipy, the time of a diagnosis, and exports against the simulator
 	@$(BIN)/python benchmarks/engine.py
 	@$(BIN)/python benchmarks/simulation.py
 	@$(BIN)/python benchmarks/diagnosis.py
 	@$(BIN)/python benchmarks/exports.py
 
-docs: $(INSTALLED) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
+docs: $(DEVELOPMENT) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
 	@# Not --quiet: what is not told does not count as a warning, and would not end a strict build.
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "The site is in build/site; open build/site/index.html."
 
-fuzz: $(INSTALLED) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, a minute each; writes experiments/fuzzing/results.md
+fuzz: $(DEVELOPMENT) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, a minute each; writes experiments/fuzzing/results.md
 	@$(BIN)/python experiments/fuzzing/run.py --seconds $(SECONDS_EACH)
 
-blind-small: $(INSTALLED)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
+blind-small: $(RUNNABLE) $(COMPILER)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
 
-blind: $(INSTALLED)  ## the standard blind bench, 244 rigs; hours, goes on where it was stopped; writes docs/blind.md
+blind: $(RUNNABLE) $(COMPILER)  ## the standard blind bench, 244 rigs; hours, goes on where it was stopped; writes docs/blind.md
 	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
 clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)
@@ -60,34 +68,40 @@ clean:  ## remove results and caches; the environment stays (remove .venv to sta
 	find src tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Stamps are written last: an interrupted installation is taken up again by the next call.
-$(DEPENDENCIES): requirements.lock
+# What rigsight runs with, pinned by the lock: a third of all that the lock holds. hatchling, which builds the package, comes from
+# there too, so that no unpinned build tool is fetched.
+$(RUNNABLE): pyproject.toml requirements.lock
 	@command -v $(PYTHON) >/dev/null || { echo "rigsight needs Python 3.11 or newer, and '$(PYTHON)' was not found. Name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3.12" >&2; exit 1; }
 	@test ! -x $(BIN)/python || $(BIN)/python -c '$(NEW_ENOUGH)' || { echo "$(VENV) holds a Python older than 3.11: remove it (rm -r $(VENV)) and call make again." >&2; exit 1; }
-	@$(BIN)/python -m pip --version >/dev/null 2>&1 \
+	@set -e; begun=$$($(NOW)); \
+	 $(BIN)/python -m pip --version >/dev/null 2>&1 \
 		|| { $(PYTHON) -c '$(NEW_ENOUGH)' || { echo "rigsight needs Python 3.11 or newer, '$(PYTHON)' is $$($(PYTHON) -V 2>&1). Name one: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }; \
-		     $(PYTHON) -m venv --clear $(VENV); }
-	@echo "Installing pinned dependencies into $(VENV) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+		     $(PYTHON) -m venv --clear $(VENV); }; \
+	 echo "Installing rigsight and what it runs with into $(VENV) ..."; \
+	 $(PIP_INSTALL) --only-binary uv "uv==0.13.8" 2>/dev/null || true; \
+	 $(call install,--constraint requirements.lock hatchling); \
+	 $(call install,--constraint requirements.lock --no-build-isolation --editable .); \
+	 touch $@; \
+	 echo "Installed in $$(($$($(NOW)) - begun)) s."
+
+$(DEVELOPMENT): $(RUNNABLE) $(COMPILER)
+	@echo "Installing what tests and checks need into $(VENV) ..."
+	@$(call install,--requirement requirements.lock)
 	@touch $@
 
 # Simulations are compiled: where the machine has no C compiler, one comes from the package index (a tenth of a gigabyte).
-$(COMPILER): $(DEPENDENCIES)
+$(COMPILER): $(RUNNABLE)
 	@test -n "$$CC" || command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null \
 		|| { echo "No C compiler was found: installing one into $(VENV) ..."; \
-		     $(BIN)/python -m pip install --quiet --disable-pip-version-check "ziglang==0.17.1"; }
+		     $(call install,"ziglang==0.17.1"); }
 	@touch $@
 
-# hatchling comes from the lock, so that no unpinned build tool is fetched.
-$(INSTALLED): pyproject.toml $(DEPENDENCIES) $(COMPILER)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@touch $@
-
-$(DOCS_INSTALLED): docs/requirements.lock $(DEPENDENCIES)
+$(DOCS_INSTALLED): docs/requirements.lock $(DEVELOPMENT)
 	@echo "Installing what builds the site into $(VENV) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r docs/requirements.lock
+	@$(call install,--requirement docs/requirements.lock)
 	@touch $@
 
 # For Linux and Python 3.11 or 3.12 there are wheels; no part of the lock, because nothing but the fuzzer needs it.
-$(FUZZER_INSTALLED): $(DEPENDENCIES)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "atheris==3.0.0"
+$(FUZZER_INSTALLED): $(DEVELOPMENT)
+	@$(call install,"atheris==3.0.0")
 	@touch $@

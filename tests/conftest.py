@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pickle
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -11,8 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from threadpoolctl import threadpool_limits
 
-from rigsight.blind import Outcome, ParameterError, WithheldError
+from rigsight.blind import Outcome, ParameterError, Trial, WithheldError, draw_trial
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
@@ -22,6 +26,11 @@ from rigsight.simulate import compose, simulate
 # Timings decide no test: on a busy machine an example may take any time.
 settings.register_profile("rigsight", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("rigsight")
+
+# Tests run side by side, a process per processor. Matrix products spread over the same processors wait for each other there:
+# a fit of a step took 4 s of processor time instead of 0.1 s. The variable is for the processes that tests start.
+threadpool_limits(limits=1, user_api="blas")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Whoever starts the tests in the background may have them ignore Ctrl-C, and the commands that they start inherit that.
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
@@ -149,6 +158,30 @@ def write_model(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, int], Trial]:
+    """Return a trial of the small bench by seed and number, drawn once for all processes that test: it takes ten seconds."""
+    own = tmp_path_factory.getbasetemp()
+    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+    def draw(seed: int, number: int) -> Trial:
+        file = shared / f"trial-{seed}-{number}"
+        with file.with_suffix(".lock").open("w") as lock:
+            # Where files cannot be locked, two processes may draw the same; the later one replaces what is alike.
+            with contextlib.suppress(ImportError):
+                import fcntl
+
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            if not file.exists():
+                part = file.with_suffix(f".{os.getpid()}")
+                part.write_bytes(pickle.dumps(draw_trial("small", seed, number)))
+                part.replace(file)
+        trial: Trial = pickle.loads(file.read_bytes())
+        return trial
+
+    return draw
 
 
 @pytest.fixture

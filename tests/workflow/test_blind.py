@@ -8,6 +8,7 @@ import os
 import shutil
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.blind import Outcome, Trial, draw_trial, n_trials, subject_of
+from rigsight.blind import Outcome, Trial, n_trials, subject_of
 from rigsight.errors import InputError, MachineError, RigsightError
 from rigsight.records import Record
 from rigsight.workflow import blind, blind_trial
@@ -49,9 +50,10 @@ json.dump(seen, open("results/seen.json", "w"))
 
 
 @pytest.fixture(scope="module")
-def trial() -> Trial:
-    number = next(t for t in range(n_trials("small")) if subject_of("small", SEED, t).kind == "none")
-    return draw_trial("small", SEED, number)
+def trial(drawn: Callable[[int, int], Trial]) -> Trial:
+    return drawn(
+        SEED, next(t for t in range(n_trials("small")) if subject_of("small", SEED, t).kind == "none")
+    )
 
 
 @pytest.fixture

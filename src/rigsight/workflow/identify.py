@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import cast
 
 from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
 
 from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
@@ -122,16 +123,17 @@ def identify_campaign(
     no_spring = campaign.parameters.get("k") == 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
-    # Threads: the work is linear algebra, which lets others run.
     found = []
-    parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
-    for record in parallel(
-        delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, wishes)
-        for record in campaign.estimation
-    ):
-        found.append(record)
-        stage.finished(record.record.name)
-    joint = identify_jointly(campaign, found, no_spring)
+    # Threads: the work is linear algebra, which lets others run; spread over the same processors it would only wait for itself.
+    with threadpool_limits(limits=1, user_api="blas"):
+        parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+        for record in parallel(
+            delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, wishes)
+            for record in campaign.estimation
+        ):
+            found.append(record)
+            stage.finished(record.record.name)
+        joint = identify_jointly(campaign, found, no_spring)
     stage.finished("one set for all records")
     if not campaign.rig.is_driven:
         found = [_over_time(record, joint) for record in found]
