@@ -73,3 +73,17 @@ def test_a_model_that_fails_leaves_its_thread_free() -> None:
         list(threads.side_by_side(lambda index: 1 // index, [1, 0]))
     both = threading.Barrier(2, timeout=PATIENCE)
     assert len(threads.results(lambda _: both.wait(), [1, 1])) == 2
+
+
+def test_jobs_that_have_a_model_do_not_help_with_another() -> None:
+    threads = IdleThreads(2)
+    begun = threading.Barrier(2, timeout=60.0)
+    ended = threading.Barrier(2, timeout=60.0)
+
+    def one(_: int) -> set[int]:
+        begun.wait()
+        made_by = set(threads.results(lambda _: threading.get_ident(), [1] * 5))
+        ended.wait()
+        return made_by - {threading.get_ident()}
+
+    assert list(threads.side_by_side(one, range(2))) == [set(), set()]

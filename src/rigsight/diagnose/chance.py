@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
-from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 
@@ -55,9 +54,7 @@ def is_predictable(
     return all(growth_of_disturbances(bench, linear, model, rng) <= PREDICTABLE for model in near)
 
 
-def fitted_in_windows(
-    bench: Workbench, linear: Scored, singles: Sequence[Scored], n_jobs: int = 1
-) -> list[Scored]:
+def fitted_in_windows(bench: Workbench, linear: Scored, singles: Sequence[Scored]) -> list[Scored]:
     """Fit the nearest models in windows; the others are only scored there, with the numbers that they have.
 
     Parameters
@@ -68,8 +65,6 @@ def fitted_in_windows(
         The re-identified equations.
     singles
         Every effect alone, fitted to whole records.
-    n_jobs
-        Models fitted at the same time.
     """
     nearest = {model.names for model in _nearest(singles)[:_MOST_FITTED]}
 
@@ -78,7 +73,7 @@ def fitted_in_windows(
             return model
         return _fitted(bench, linear, model) if model.names in nearest else _scored(bench, model)
 
-    return side_by_side(one, singles, n_jobs, bench.threads)
+    return list(bench.threads.side_by_side(one, singles))
 
 
 def _nearest(singles: Sequence[Scored]) -> list[Scored]:

@@ -20,7 +20,6 @@ from rigsight.diagnose.first_look import (
     mean_square,
     widened,
 )
-from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import restart_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -61,7 +60,6 @@ def fit_candidates(
     bench: Workbench,
     linear: Scored,
     effects: Iterable[Effect],
-    n_jobs: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> list[Scored]:
     """Fit and score every effect alone.
@@ -74,16 +72,14 @@ def fit_candidates(
         The re-identified equations.
     effects
         Candidates; those that the rig does not offer are left out.
-    n_jobs
-        Candidates fitted at the same time.
     progress
         Called with the name of each candidate that is done.
     """
     regression = None
     if bench.rig.is_driven:
         regression = EffectRegression(bench.rig, bench.estimation, linear.fit.values, bench.scales)
-    looks = _looks(bench, linear, bench.offered(effects), regression, n_jobs)
-    wide = {look.newest: look for look in widened(bench, looks, n_jobs)}
+    looks = _looks(bench, linear, bench.offered(effects), regression)
+    wide = {look.newest: look for look in widened(bench, looks)}
     lowest = min((look.cost for look in wide.values()), default=float("inf"))
 
     def one(found: Look) -> Scored:
@@ -94,8 +90,8 @@ def fit_candidates(
             progress(found.newest)
         return scored
 
-    models = side_by_side(one, looks, n_jobs, bench.threads)
-    return refine(bench, models, n_jobs)
+    models = list(bench.threads.side_by_side(one, looks))
+    return refine(bench, models)
 
 
 def _looks(
@@ -103,7 +99,6 @@ def _looks(
     linear: Scored,
     effects: Sequence[Effect],
     regression: EffectRegression | None,
-    n_jobs: int,
 ) -> list[Look]:
     """Look at every effect; those that start from a simpler one come after it."""
     names = {effect.name for effect in effects}
@@ -118,7 +113,7 @@ def _looks(
         ready = ready or waiting
         waiting = [effect for effect in waiting if effect not in ready]
         parents = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
-        looks = side_by_side(partial(one, parents), ready, n_jobs, bench.threads)
+        looks = list(bench.threads.side_by_side(partial(one, parents), ready))
         done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
     return [done[effect.name] for effect in effects]
 
@@ -146,7 +141,7 @@ def fit_candidate(
     return refine(bench, [followed(bench, found, promising=True)])[0]
 
 
-def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[Scored]:
+def refine(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
     """Fit those models to full precision whose held-out error is close to the best."""
     best = min((m.excess for m in models), default=float("inf"))
 
@@ -164,7 +159,7 @@ def refine(bench: Workbench, models: Sequence[Scored], n_jobs: int = 1) -> list[
             return model
         return bench.score(model.effects, result)
 
-    return side_by_side(one, models, n_jobs, bench.threads)
+    return list(bench.threads.side_by_side(one, models))
 
 
 def followed(bench: Workbench, look: Look, promising: bool, finish: bool = True) -> Scored:

@@ -105,15 +105,15 @@ def examine(
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
     cut, in_windows = None, False
     if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
-        cut = _cut(task, noise, models, n_jobs)
+        cut = _cut(task, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
     if not in_windows:
-        pairs = _grown(models, effects, lower_bound, task.rig.is_driven, n_jobs, prepare)
+        pairs = _grown(models, effects, lower_bound, task.rig.is_driven, prepare)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
         if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
-            cut = cut or _cut(task, noise, models, n_jobs)
-            found = pairs_in_windows(models.bench, cut.bench, models.linear, pairs, n_jobs)
+            cut = cut or _cut(task, noise, models)
+            found = pairs_in_windows(models.bench, cut.bench, models.linear, pairs)
             say("pairs in windows")
             in_windows = _explained(cut, found, AT_FLOOR)
             pairs = found if in_windows else pairs
@@ -168,7 +168,7 @@ def _singly(
     if task.given:
         say("given simulation")
     quality = data_quality(bench, task.records, linear)
-    singles = fit_candidates(bench, linear, effects, n_jobs, say)
+    singles = fit_candidates(bench, linear, effects, say)
     return _Singly(windowing, bench, before, linear, quality, singles)
 
 
@@ -177,7 +177,6 @@ def _grown(
     effects: Sequence[Effect],
     lower_bound: bool,
     is_driven: bool,
-    n_jobs: int,
     prepare: Prepare | None,
 ) -> list[Scored]:
     """Return pairs where a single effect leaves something to explain.
@@ -188,17 +187,17 @@ def _grown(
     is_excused = lower_bound and min((m.excess for m in models.singles), default=np.inf) <= AT_LOWER_BOUND
     if is_excused and not is_driven:
         return []
-    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, n_jobs, prepare)
+    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, prepare)
     return [pair for pair in pairs if not is_excused or pair.excess <= AT_FLOOR]
 
 
-def _cut(task: Task, noise: Mapping[str, float], models: _Singly, n_jobs: int) -> _Singly:
+def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
     """Return the models in windows of a few cycles."""
     output = task.rig.outputs[0].name
     windowing = Windowing.by_cycles(output, noise[output])
     bench = _bench(task, noise, windowing, models.bench.memory, models.bench.threads)
     linear = fit_linear(bench, models.linear.fit.values)
-    singles = fitted_in_windows(bench, linear, models.singles, n_jobs)
+    singles = fitted_in_windows(bench, linear, models.singles)
     before = _before(task, bench, linear) if linear.residuals else models.before
     return _Singly(windowing, bench, before, linear, models.quality, singles)
 

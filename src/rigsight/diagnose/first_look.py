@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import start_values, with_own_values
 from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Workbench
@@ -185,7 +184,6 @@ def _looked(
 def widened(
     bench: Workbench,
     looks: Sequence[Look],
-    n_jobs: int = 1,
     substeps: Sequence[int] | None = None,
     lowest: float = float("inf"),
 ) -> list[Look]:
@@ -197,8 +195,6 @@ def widened(
         Records, scales and noise.
     looks
         First looks.
-    n_jobs
-        Looks fitted at the same time.
     substeps
         Integration steps per sample of each record; None chooses them.
     lowest
@@ -210,7 +206,7 @@ def widened(
         return replace(look, fits=_on_whole_records(bench, look.structure, look.free, look.fits, substeps))
 
     near = [look for look in looks if look.nearest <= _NEAR * lowest]
-    return side_by_side(one, near, n_jobs, bench.threads)
+    return list(bench.threads.side_by_side(one, near))
 
 
 def looked_again(

@@ -19,7 +19,6 @@ import numpy as np
 
 from rigsight.diagnose.characterize import finished, followed, refine
 from rigsight.diagnose.first_look import Look, look_at, widened
-from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure, carried_over
@@ -64,7 +63,6 @@ def grown(
     singles: Sequence[Scored],
     effects: Sequence[Effect],
     at_floor: float,
-    n_jobs: int = 1,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
     """Return pairs of effects that close at least half of what the best single leaves, fitted and scored.
@@ -79,8 +77,6 @@ def grown(
         Candidates for the second place.
     at_floor
         Held-out error in units of the noise floor at which nothing is left to explain.
-    n_jobs
-        Candidates fitted at the same time.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
 
@@ -105,7 +101,7 @@ def grown(
     pairs: list[Scored] = []
     for parent in beam:
         if min((pair.excess for pair in pairs), default=np.inf) > _NOTHING_LEFT:
-            pairs += _grown_from(bench, parent, effects, pairs, usable, n_jobs, prepare)
+            pairs += _grown_from(bench, parent, effects, pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
         # What came second may be right and the first only its relative: another as good alone may do better in its place.
@@ -113,17 +109,17 @@ def grown(
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
                 instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
-                pairs += _grown_from(bench, second, instead, pairs, usable, n_jobs, prepare)
+                pairs += _grown_from(bench, second, instead, pairs, usable, prepare)
     for _ in range(MOST_EFFECTS):
         best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
         if best_pair is None or not _NOTHING_LEFT < best_pair.excess <= allowed:
             break
-        pairs += _more_general(bench, best_pair, usable, effects, pairs, n_jobs, prepare)
+        pairs += _more_general(bench, best_pair, usable, effects, pairs, prepare)
     pairs.sort(key=lambda pair: pair.excess)
     pairs = [*(finished(bench, pair) for pair in pairs[:_MOST_FINISHED]), *pairs[_MOST_FINISHED:]]
     return [
         replace(pair, effects=tuple(sorted(pair.effects, key=lambda effect: alone[effect.name])))
-        for pair in refine(bench, pairs, n_jobs)
+        for pair in refine(bench, pairs)
         if pair.excess <= allowed
     ]
 
@@ -168,7 +164,6 @@ def _grown_from(
     effects: Sequence[Effect],
     known: Sequence[Scored],
     singles: Sequence[Scored],
-    n_jobs: int,
     prepare: Prepare | None,
 ) -> list[Scored]:
     partners = [
@@ -176,7 +171,7 @@ def _grown_from(
         for effect in bench.offered(effects)
         if effect not in parent.effects and not _known_pair(known, parent, effect)
     ]
-    return _pairs(bench, parent, partners, singles, n_jobs, prepare)
+    return _pairs(bench, parent, partners, singles, prepare)
 
 
 def _more_general(
@@ -185,7 +180,6 @@ def _more_general(
     singles: Sequence[Scored],
     effects: Sequence[Effect],
     known: Sequence[Scored],
-    n_jobs: int,
     prepare: Prepare | None,
 ) -> list[Scored]:
     """Return the pairs in which an effect that contains one of the pair's stands in its place, fitted from there.
@@ -214,7 +208,7 @@ def _more_general(
         (wide,) = widened(bench, [look], substeps=pair.fit.substeps)
         return followed(bench, wide, promising=wide.cost <= pair.fit.cost, finish=False)
 
-    return side_by_side(one, swaps, n_jobs, bench.threads)
+    return list(bench.threads.side_by_side(one, swaps))
 
 
 def _alike(one: Scored, other: Scored) -> bool:
@@ -232,7 +226,6 @@ def _pairs(
     parent: Scored,
     partners: Sequence[Effect],
     singles: Sequence[Scored],
-    n_jobs: int,
     prepare: Prepare | None,
 ) -> list[Scored]:
     base = parent.fit
@@ -251,13 +244,13 @@ def _pairs(
     def one(effect: Effect) -> Look:
         return look_at(bench, (*parent.effects, effect), base, {}, substeps=steps(effect))
 
-    looks = side_by_side(one, partners, n_jobs, bench.threads)
+    looks = list(bench.threads.side_by_side(one, partners))
     near = min((look.nearest for look in looks), default=float("inf"))
 
     def wide(look: Look) -> list[Look]:
         return widened(bench, [look], substeps=steps(look.effects[-1]), lowest=near)
 
-    found = side_by_side(wide, looks, n_jobs, bench.threads)
+    found = list(bench.threads.side_by_side(wide, looks))
     looks = sorted(itertools.chain.from_iterable(found), key=_cost)[:_BOTH_WAYS]
 
     def other_way(found: Look) -> Look:
@@ -269,7 +262,7 @@ def _pairs(
         (wider,) = widened(bench, [turned], substeps=substeps)
         return min(found, replace(wider, effects=found.effects), key=_cost)
 
-    looks = side_by_side(other_way, looks, n_jobs, bench.threads)
+    looks = list(bench.threads.side_by_side(other_way, looks))
     lowest = min((found.cost for found in looks), default=float("inf"))
     worth = min(_WORTH_FOLLOWING * base.cost, _NEAR_THE_BEST * lowest)
     promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
@@ -277,7 +270,7 @@ def _pairs(
     def follow(found: Look) -> Scored:
         return followed(bench, found, promising=True, finish=False)
 
-    return side_by_side(follow, promising[:_MOST_FOLLOWED], n_jobs, bench.threads)
+    return list(bench.threads.side_by_side(follow, promising[:_MOST_FOLLOWED]))
 
 
 def _cost(found: Look) -> float:

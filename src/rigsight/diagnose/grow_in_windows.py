@@ -12,7 +12,6 @@ from dataclasses import replace
 
 from rigsight.diagnose.chance import scored_in_windows
 from rigsight.diagnose.first_look import looked_from
-from rigsight.diagnose.side_by_side import side_by_side
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 
@@ -21,7 +20,7 @@ _MOST_FITTED = 3
 
 
 def pairs_in_windows(
-    bench: Workbench, windows: Workbench, linear: Scored, pairs: Sequence[Scored], n_jobs: int = 1
+    bench: Workbench, windows: Workbench, linear: Scored, pairs: Sequence[Scored]
 ) -> list[Scored]:
     """Return the nearest pairs, fitted and scored in windows.
 
@@ -35,15 +34,13 @@ def pairs_in_windows(
         The re-identified equations on whole records.
     pairs
         Fitted to whole records.
-    n_jobs
-        Pairs fitted at the same time.
     """
     nearest = sorted(pairs, key=lambda pair: pair.excess)[:_MOST_FITTED]
 
     def one(pair: Scored) -> Scored:
         return _fitted(bench, windows, linear, pair)
 
-    return side_by_side(one, nearest, n_jobs, bench.threads)
+    return list(bench.threads.side_by_side(one, nearest))
 
 
 def _fitted(bench: Workbench, windows: Workbench, linear: Scored, pair: Scored) -> Scored:
