@@ -60,8 +60,10 @@ def linear_forms(
 
 def slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     """Return a derivative that is finite where a magnitude is zero; the jump of a sign is an event, or none."""
-    slope = sp.diff(expression, symbol).replace(sp.DiracDelta, lambda *_: sp.Integer(0))
-    return slope.replace(_is_singular, _guarded)
+    # Term by term: sympy takes as long for a derivative that is zero as for another one.
+    terms = [term for term in sp.Add.make_args(expression) if symbol in term.free_symbols]
+    total = sp.Add(*(sp.diff(term, symbol) for term in terms))
+    return total.replace(sp.DiracDelta, lambda *_: sp.Integer(0)).replace(_is_singular, _guarded)
 
 
 def _is_singular(part: sp.Expr) -> bool:
