@@ -25,6 +25,7 @@ MOVED = {
     "experiments/linear_recovery/README.md": "experiments/linear_recovery.md",
     "experiments/engine_accuracy/README.md": "experiments/engine_accuracy.md",
     "experiments/rounding/README.md": "experiments/rounding.md",
+    "experiments/sensitivities/README.md": "experiments/sensitivities.md",
     "experiments/thesis/README.md": "experiments/thesis.md",
 }
 """Files outside docs/ that are pages: their path in the repository -> that on the site."""

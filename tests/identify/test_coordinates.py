@@ -152,3 +152,20 @@ def test_no_free_parameter() -> None:
     assert none.from_values(VALUES).shape == (0,)
     np.testing.assert_array_equal(none.to_parameters(np.zeros(0)), parameter_vector(STRUCTURE, VALUES))
     assert none.jacobian(np.zeros(0)).shape == (0, 0)
+
+
+@pytest.mark.parametrize("fixed", [{"n": 1.0}, {}])
+def test_derivatives_are_those_of_the_parameters(fixed: dict[str, float]) -> None:
+    free = (*FREE, *(() if fixed else ("n",)))
+    structure = compose(AXIS, [effect_named("bouc_wen_hysteresis")], fixed)
+    coordinates = Coordinates.of(structure, free, {**VALUES, "n": 1.6}, SCALES)
+    theta = coordinates.from_values({**VALUES, "n": 1.6}) + 0.01 * np.arange(len(free))
+    found = coordinates.derivatives(theta)
+    steps = 1e-6 * np.eye(len(free))
+    expected = [
+        (coordinates.to_parameters(theta + step) - coordinates.to_parameters(theta - step)) / 2e-6
+        for step in steps
+    ]
+    size = np.max(np.abs(expected), axis=0) + 1e-300
+    np.testing.assert_allclose(found.T / size, np.array(expected) / size, atol=1e-8)
+    np.testing.assert_array_equal(coordinates.jacobian(theta), found[coordinates.index])

@@ -41,9 +41,11 @@ def drawn(structure, n_samples, n_sets, rng, amplitude):
 
 
 @pytest.mark.parametrize("n_sets", [1, 7, 45])
-@pytest.mark.parametrize("effect", ["cubic_stiffness", "coulomb_friction", "input_delay", "iwan_hysteresis"])
+@pytest.mark.parametrize(
+    "effect", ["cubic_stiffness", "input_delay", "iwan_hysteresis", "iwan_hysteresis+coulomb_friction"]
+)
 def test_they_are_those_of_the_simulated_outputs(effect, n_sets, rng):
-    structure = compose(RUNNING_GEAR, [effect_named(effect)])
+    structure = compose(RUNNING_GEAR, map(effect_named, effect.split("+")))
     weights = np.array([2e4, 3e4])
     fitted, expected, states = [], [], []
     # One record ends within the samples that are kept together, the other does not.

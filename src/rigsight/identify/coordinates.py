@@ -17,7 +17,9 @@ from rigsight.simulate import Structure, parameter_vector
 from rigsight.units import characteristic_value
 
 STEP = 1e-4
-"""Finite-difference step of a coordinate: far above the integrator's error, far below any curvature."""
+"""Difference of a coordinate where there may be events: far above the tolerance of their location, far below any curvature."""
+FINE_STEP = 1e-6
+"""Difference of a coordinate where nothing is an event: sets side by side take the same steps, so that only rounding differs."""
 _MARGIN = 1e-9
 _LEAST_STIFFNESS = 1e-12
 _MOST_STIFFNESS = 1e12
@@ -160,15 +162,40 @@ class Coordinates:
             return fixed[pair.exponent]
         return float(p[self.structure.names.index(pair.exponent)])
 
+    def derivatives(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return d parameters / d coordinates of all parameters, shape (n_parameters, n_free)."""
+        p = self.to_parameters(theta)
+        own = np.where(self.logarithmic, p[self.index], self.scale)
+        slopes = np.zeros((p.size, len(self.free)))
+        slopes[self.index, np.arange(len(self.free))] = own
+        for pair in self.pairs:
+            power = self._power(pair, p)
+            size = self.scale[pair.first] ** power
+            rows = []
+            for place in (pair.first, pair.second):
+                row = np.zeros(len(self.free))
+                if pair.exponent in self.free:
+                    # A power of zero stays zero whatever its exponent.
+                    base = max(float(np.abs(theta[place]) * self.scale[pair.first]), 1e-300)
+                    growth = pair.forward(theta[place], power) * size * np.log(base)
+                    row[self.free.index(pair.exponent)] = growth * own[self.free.index(pair.exponent)]
+                row[place] += power * np.abs(theta[place]) ** (power - 1.0) * size
+                rows.append(row)
+            total, difference = rows
+            slopes[self.index[pair.first]] = (total + difference) / 2.0
+            slopes[self.index[pair.second]] = (total - difference) / 2.0
+        if self.split is not None:
+            stiffness, share = self.split.stiffness, self.split.share
+            with_memory, without = np.exp(theta[stiffness]), theta[share]
+            whole = with_memory + without
+            columns = [stiffness, share]
+            slopes[self.index[stiffness], columns] = self.scale[stiffness] * np.array([with_memory, 1.0])
+            slopes[self.index[share], columns] = with_memory / whole**2 * np.array([-without, 1.0])
+        return slopes
+
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return d parameters / d coordinates of the free parameters, shape (n_free, n_free)."""
-        columns = []
-        for i in range(len(self.free)):
-            moved = theta.copy()
-            moved[i] += 1e-6
-            change = self.to_parameters(moved) - self.to_parameters(theta)
-            columns.append(change[self.index] / 1e-6)
-        return np.array(columns).T.reshape(len(self.free), len(self.free))
+        return self.derivatives(theta)[self.index]
 
 
 def _split(structure: Structure, free: Sequence[str]) -> _Split | None:

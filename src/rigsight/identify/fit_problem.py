@@ -1,7 +1,7 @@
 """Cost, derivatives and Gauss-Newton matrix of an output-error fit as functions of its coordinates and initial states.
 
-They come from one call of the side-by-side integrator for all records: the current parameters and every shifted one are its
-lanes.
+They come from one call of the kernel for all records. It carries the derivatives along with the motion, or, where that takes
+longer, the current parameters and every shifted one are lanes of its side-by-side integrator.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
-from rigsight.identify.coordinates import STEP, Coordinates
+from rigsight.identify.coordinates import FINE_STEP, STEP, Coordinates
 from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
@@ -23,10 +23,13 @@ from rigsight.simulate import (
     FittedRecord,
     Structure,
     Substeps,
+    carries_tangents,
     choose_substeps,
     normal_equations,
     simulate_sets,
+    simulate_tangents,
     state_limits,
+    tangent_equations,
 )
 from rigsight.simulate.input_hold import HeldInput
 
@@ -145,7 +148,9 @@ class Problem:
         self.coordinates = coordinates
         self.n_states = n_states
         self.upper = upper
-        self.steps = np.full(upper.size, STEP)
+        # Dry friction carries tangents, unless states have ends or a sensor is late.
+        has_events = bool(np.any(data.limited)) or data.structure.measured_late is not None
+        self.steps = np.full(upper.size, STEP if has_events else FINE_STEP)
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
         self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
@@ -221,14 +226,11 @@ class Problem:
         """Evaluate, or return the last evaluation if it was here."""
         if self._last is not None and np.array_equal(self._last.theta, theta):
             return self._last
-        shifts, p, x0 = self._sets(theta)
-        products = np.array(self._products(p, x0))
         # A diverging simulation overflows here; that is what the check below is for.
         with np.errstate(over="ignore", invalid="ignore"):
+            products = np.array(self._products(theta))
             cost = float(np.sum(products[:, 0, 0]))
             normal, gradient = self._put_together(products[:, 1:, 1:], products[:, 0, 1:])
-            normal /= np.outer(shifts, shifts)
-            gradient /= shifts
         if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
             cost = float("inf")
         self._best = min(self._best, cost)
@@ -273,15 +275,45 @@ class Problem:
         self, theta: NDArray[np.float64]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
-        shifts, p, x0 = self._sets(theta)
+        data = self.data
+        if carries_tangents(data.structure):
+            p, dp, x0, dx0 = self._place(theta)
 
-        def one(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-            residual, differences = self._differences(index, p, x0[index])
+            def tangents(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                own, n = data.records[index], data.records[index].record.n_samples
+                with np.errstate(all="ignore"):
+                    out = simulate_tangents(
+                        data.structure, own.held, p, dp, x0[index], dx0, n, self.substeps[index]
+                    )
+                    # To `weighted` they are outputs of sets that differ by one.
+                    out[:, :, 1:] += out[:, :, :1]
+                    return weighted(own, out)
+
+            return data.of_each_record(tangents)
+        shifts, sets, states = self._sets(theta)
+
+        def differences(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            residual, changes = self._differences(index, sets, states[index])
             with np.errstate(all="ignore"):
-                differences /= shifts[self.columns(index)]
-            return residual, differences
+                changes /= shifts[self.columns(index)]
+            return residual, changes
 
-        return self.data.of_each_record(one)
+        return data.of_each_record(differences)
+
+    def _place(
+        self, theta: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return parameters, initial states and their derivatives by the coordinates that a record depends on.
+
+        Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states. No state
+        is limited where this is asked for, so that the unit of none depends on the parameters.
+        """
+        own = theta[: self.n_free]
+        p = self.coordinates.to_parameters(own)
+        sizes = self.data.state_sizes(p[:, None])[: self.n_states, 0]
+        dp = np.hstack([self.coordinates.derivatives(own), np.zeros((p.size, self.n_states))])
+        dx0 = np.hstack([np.zeros((self.n_states, self.n_free)), np.diag(sizes)])
+        return p, dp, theta[self.n_free :].reshape(len(self.data.records), self.n_states) * sizes, dx0
 
     def _sets(
         self, theta: NDArray[np.float64]
@@ -304,24 +336,30 @@ class Problem:
         states[:, own, 1 + self.n_free + own] += shifts[self.n_free :].reshape(places.shape)
         return shifts, p, states * self.data.state_sizes(p)
 
-    def _products(self, p: NDArray[np.float64], x0: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Return per record the products of its residual and its differences, shape (n_sets, n_sets)."""
+    def _products(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Return per record the products of its residual and its derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
         data = self.data
         if data.structure.measured_late is not None:
-
-            def one(index: int) -> NDArray[np.float64]:
-                with np.errstate(over="ignore", invalid="ignore"):
-                    columns = np.column_stack(self._differences(index, p, x0[index]))
-                    return np.asarray(columns.T @ columns)
-
-            return data.of_each_record(one)
-        fitted = self._fitted_records()
-        return data.threads.results_of_shares(
+            columns = [np.column_stack(parts) for parts in self.sensitivities(theta)]
+            return [np.asarray(own.T @ own) for own in columns]
+        fitted, lengths = self._fitted_records(), [record.record.n_samples for record in data.records]
+        if carries_tangents(data.structure):
+            p, dp, x0, dx0 = self._place(theta)
+            return data.threads.results_of_shares(
+                lambda share: list(
+                    tangent_equations(data.structure, [fitted[i] for i in share], p, dp, x0[list(share)], dx0)
+                ),
+                lengths,
+            )
+        shifts, sets, states = self._sets(theta)
+        products = data.threads.results_of_shares(
             lambda share: list(
-                normal_equations(data.structure, [fitted[i] for i in share], p, x0[list(share)])
+                normal_equations(data.structure, [fitted[i] for i in share], sets, states[list(share)])
             ),
-            [record.record.n_samples for record in data.records],
+            lengths,
         )
+        per_shift = [np.append(1.0, 1.0 / shifts[self.columns(index)]) for index in range(len(lengths))]
+        return [own * np.outer(scale, scale) for own, scale in zip(products, per_shift, strict=True)]
 
     def _fitted_records(self) -> list[FittedRecord]:
         # Equal numbers of steps may stand for other needs: these are the same if they are the same object.

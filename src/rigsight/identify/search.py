@@ -2,7 +2,8 @@
 
 Where a slider lets go one sample later the cost has a kink, and a descent along derivatives stops at one of many, by rounding at
 another one each time. Differences over steps as long as the noise makes them see past kinks and are continuous in the parameters
-and in the data: the place where Gauss-Newton steps made of them vanish moves no more than the data do.
+and in the data: the place where Gauss-Newton steps made of them vanish moves no more than the data do. This is another need than
+that of derivatives, and what is carried along with a motion cannot serve it.
 """
 
 from __future__ import annotations

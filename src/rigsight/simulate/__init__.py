@@ -5,6 +5,7 @@ from rigsight.simulate.composition import structure_named as structure_named
 from rigsight.simulate.kernel import FittedRecord as FittedRecord
 from rigsight.simulate.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.rest import rest_state as rest_state
+from rigsight.simulate.simulation import carries_tangents as carries_tangents
 from rigsight.simulate.simulation import choose_substeps as choose_substeps
 from rigsight.simulate.simulation import normal_equations as normal_equations
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
@@ -12,6 +13,8 @@ from rigsight.simulate.simulation import record_input as record_input
 from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
 from rigsight.simulate.simulation import simulate_sets as simulate_sets
+from rigsight.simulate.simulation import simulate_tangents as simulate_tangents
+from rigsight.simulate.simulation import tangent_equations as tangent_equations
 from rigsight.simulate.state_limits import state_limits as state_limits
 from rigsight.simulate.structure import Structure as Structure
 from rigsight.simulate.structure import carried_over as carried_over
@@ -23,6 +26,7 @@ __all__ = [
     "Substeps",
     "cache_folder",
     "carried_over",
+    "carries_tangents",
     "choose_substeps",
     "compose",
     "normal_equations",
@@ -32,6 +36,8 @@ __all__ = [
     "simulate",
     "simulate_outputs",
     "simulate_sets",
+    "simulate_tangents",
     "state_limits",
     "structure_named",
+    "tangent_equations",
 ]

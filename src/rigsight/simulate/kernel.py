@@ -57,7 +57,7 @@ class FittedRecord:
 
 
 class Kernel:
-    """The two integrators of a structure.
+    """The integrators of a structure.
 
     Parameters
     ----------
@@ -93,9 +93,18 @@ class Kernel:
         self._lanes.argtypes = [
             _DOUBLES, _LONG, _DOUBLE, _LONG, _INTS, _DOUBLE, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES,
         ]  # fmt: skip
-        self._normal = loaded.normal_equations
-        self._normal.restype = _INT
-        self._normal.argtypes = [_DOUBLES, _LONG, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES]
+        self.carries_tangents = hasattr(loaded, "tangent_equations")
+        """Whether `tangent_equations` and `simulate_tangents` can be called, or else `normal_equations`."""
+        if self.carries_tangents:
+            self._tangents = loaded.tangent_equations
+            self._tangents.restype = _INT
+            self._tangents.argtypes = [
+                _DOUBLES, _LONG, _DOUBLES, _DOUBLES, _LONG, _DOUBLES, _DOUBLES, _LONG, _DOUBLES, _DOUBLES,
+            ]  # fmt: skip
+        else:
+            self._normal = loaded.normal_equations
+            self._normal.restype = _INT
+            self._normal.argtypes = [_DOUBLES, _LONG, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES]
 
     def simulate_one(
         self,
@@ -211,6 +220,90 @@ class Kernel:
         if failed:
             raise MachineError(f"There is no memory to simulate {n_sets} parameter sets side by side.")
         return products
+
+    def tangent_equations(
+        self, records: Sequence[FittedRecord], p: Floats, dp: Floats, states: Floats, dstates: Floats
+    ) -> Floats:
+        """Simulate one parameter set on records with its derivatives, and return the products that least squares needs.
+
+        Parameters
+        ----------
+        records
+            What is fitted.
+        p
+            Parameters, shape (n_parameters,).
+        dp
+            Their derivatives by each direction, shape (n_parameters, n_directions).
+        states
+            States at the start, shape (n_records, n_states).
+        dstates
+            Their derivatives, shape (n_states, n_directions); the same for all records.
+
+        Returns
+        -------
+        Shape (n_records, 1 + n_directions, 1 + n_directions): products, summed over outputs and samples, of the weighted
+        residual and its derivatives; NaN or infinity where the simulation diverges.
+
+        Raises
+        ------
+        MachineError
+            If there is no memory.
+        """
+        width = 1 + dp.shape[1]
+        products = np.empty((len(records), width, width))
+        self._carry(records, p, dp, states, dstates, products.ctypes.data, None)
+        return products
+
+    def simulate_tangents(
+        self, held: HeldInput, p: Floats, dp: Floats, state: Floats, dstate: Floats,
+        substeps: NDArray[np.intc], n_samples: int,
+    ) -> Floats:  # fmt: skip
+        """Simulate one parameter set with its derivatives.
+
+        Parameters
+        ----------
+        held
+            Input between its samples.
+        p, dp
+            As of `tangent_equations`.
+        state, dstate
+            States at the start, shape (n_states,), and their derivatives, shape (n_states, n_directions).
+        substeps
+            Runge-Kutta steps in each piece of the input, shape (n_pieces,).
+        n_samples
+            Samples of the input.
+
+        Returns
+        -------
+        Shape (n_samples, n_computed, 1 + n_directions): what is computed at each sample, and its derivatives.
+
+        Raises
+        ------
+        MachineError
+            If there is no memory.
+        """
+        out = np.empty((n_samples, self._n_computed, 1 + dp.shape[1]))
+        record = FittedRecord(held, substeps, np.zeros((0, self._n_computed)), np.zeros(self._n_computed))
+        self._carry([record], p, dp, state[None], dstate, None, out.ctypes.data)
+        return out
+
+    def _carry(
+        self, records: Sequence[FittedRecord], p: Floats, dp: Floats, states: Floats, dstates: Floats,
+        products: int | None, out: int | None,
+    ) -> None:  # fmt: skip
+        n_directions, n_states = dp.shape[1], states.shape[1]
+        x = np.zeros((len(records), self._n_states))
+        x[:, :n_states] = states
+        dx = np.zeros((self._n_states, n_directions))
+        dx[:n_states] = dstates
+        p, dp = _doubles(p), _doubles(dp)
+        listed = (_FittedRecord * len(records))(*(record.as_c for record in records))
+        failed = self._tangents(
+            ctypes.addressof(listed), len(records), p.ctypes.data, dp.ctypes.data, p.size, x.ctypes.data, dx.ctypes.data,
+            n_directions, products, out,
+        )  # fmt: skip
+        if failed:
+            raise MachineError(f"There is no memory to simulate {n_directions} derivatives side by side.")
 
 
 def _doubles(values: Any) -> Floats:

@@ -7,6 +7,8 @@
     for fits.
 ``normal_equations``
     The same for many records, of which only what a step of least squares needs is kept: products of residuals and differences.
+``tangent_equations``
+    Instead of it where that is cheaper: one set and the derivatives of its outputs by many directions, carried along.
 
 The equations and the accurate integrator are what exports hold too. No name of a rig or an effect reaches the C text: states,
 parameters and constants are numbered.
@@ -20,8 +22,10 @@ from importlib.resources import files
 
 import sympy as sp
 
+from rigsight.effects.symbols import positive_part
 from rigsight.simulate.expressions import gathered, hoist_constants
-from rigsight.simulate.kinks import FrozenStructure, freeze
+from rigsight.simulate.kinks import FrozenStructure, absolute, freeze
+from rigsight.simulate.linear_forms import linear_forms, slope
 from rigsight.simulate.printing.c import C_LANES, C, limited
 from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
 
@@ -61,6 +65,9 @@ def kernel_source(structure: Structure) -> str:
             equations.text("const double *p", [f"p[{i}]" for i in range(len(structure.parameters))]),
             *map(template, (*ACCURATE, "one.c.txt")),
             filled(template("lanes.c.txt"), {"LANES": str(LANES), **equations.lane_fragments()}),
+            filled(template("tangents.c.txt"), equations.tangent_fragments())
+            if equations.carries_tangents
+            else "",
         ]
     )
 
@@ -171,13 +178,7 @@ class KernelEquations:
 
     def lane_fragments(self) -> dict[str, str]:
         """Return the equations for parameter sets side by side, by their key in the template."""
-        structure = self.structure
-        sign = {} if self.frozen.friction_mode is None else {_FRICTION_SIGN: "friction_sign"}
-        names = {**self._names, INPUT: "now->u[0]", INPUT_RATE: "now->du[0]", **sign}
-        rates = [
-            sp.Integer(0) if i in self._followed else rate
-            for i, rate in enumerate(self._groups["live_rates"])
-        ]
+        structure, names, rates = self.structure, self._lane_names, self._lane_rates
         followers = {i: self._limits[i] for i in self._followed}
         gained = {
             i: sp.Symbol(f"x[{i}]", real=True) + _symbol(f"{after}") - _symbol(f"{before}")
@@ -187,6 +188,7 @@ class KernelEquations:
         others = {i: limit for i, limit in self._limits.items() if i not in followers}
         integrated = [i for i in range(len(structure.states)) if i not in self._followed]
         return {
+            "TANGENTS": str(int(self.carries_tangents)),
             "N_INTEGRATED": str(len(integrated)),
             "INTEGRATED": ", ".join(map(str, integrated)) or "0",
             "LANE_RATES": _body(("now", "x", "q", "r"), _targets("r", len(rates)), rates, names, lanes=True),
@@ -202,6 +204,82 @@ class KernelEquations:
             ),
             "LANE_PUT_BACK": _body((), *self._put_back("x", others), names, lanes=True),
         }
+
+    @property
+    def carries_tangents(self) -> bool:
+        """Whether derivatives are carried along with the motion, instead of taken as differences of sets side by side.
+
+        Carried along they cost two thirds more where all is sums and products, because a difference needs no derivatives by the
+        constants, and half as much where functions are costly, because these are computed once. Under dry friction they cost
+        the same, and a difference would need a long step: reversals are located to a tolerance. Where states have ends the
+        derivative at one place tells little of the next, however exact it is.
+        """
+        structure = self.structure
+        if self._limits or structure.measured_late is not None:
+            return False
+        expressions = (*self._lane_rates, *self._groups["outputs"])
+        return self.frozen.friction_mode is not None or any(
+            _is_costly(part) for expression in expressions for part in expression.atoms(sp.Function, sp.Pow)
+        )
+
+    def tangent_fragments(self) -> dict[str, str]:
+        """Return how the equations change with states and constants, by key in the template.
+
+        Of each group of equations there are factors, the same for all directions, and changes: sums of products with them.
+        """
+        structure, n = self.structure, len(self.structure.states)
+        of_states = dict(zip(structure.states, _array("z", n), strict=True))
+        of_constants = dict(zip(self.constants, _array("dq", len(self.constants)), strict=True))
+        arriving = {INPUT: INPUT + _EARLIER * INPUT_RATE} if structure.delay is not None else {}
+        rates, outputs = [rate.xreplace(arriving) for rate in self._lane_rates], self._groups["outputs"]
+        groups: dict[str, tuple[Sequence[str], Sequence[sp.Expr], Mapping[sp.Symbol, sp.Symbol]]] = {
+            "RATE": (_targets("r", n), rates, {**of_states, _EARLIER: _symbol("earlier")}),
+            "OUTPUT": (_targets("r", len(outputs)), outputs, of_states),
+            "DELAY": (["const lanes delay"], self._groups["delay"], {}),
+        }
+        fragments = {"PREPARE_CHANGES": self._prepare_changes()}
+        for key, (targets, expressions, own) in groups.items():
+            changes = {**own, **of_constants}
+            forms = linear_forms(expressions, changes, set(self.constants))
+            now = [factor.xreplace({_EARLIER: sp.Integer(0)}) for factor in forms.factors.values()]
+            numbered = {symbol: f"d[{i}]" for i, symbol in enumerate(forms.factors)}
+            names = {**self._lane_names, **numbered, **{change: change.name for change in changes.values()}}
+            fragments[f"N_{key}_FACTORS"] = str(max(1, len(now)))
+            fragments[f"{key}_FACTORS"] = _body((), _targets("d", len(now)), now, names, lanes=True)
+            fragments[f"{key}_CHANGES"] = _body((), targets, forms.sums, names, lanes=True)
+        return fragments
+
+    def _prepare_changes(self) -> str:
+        """How constants change with parameters: each common part with its change behind it."""
+        parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
+        shared, reduced = sp.cse(list(self.constants.values()), symbols=parts, optimizations=None)
+        names = {symbol: f"p[{i}]" for i, symbol in enumerate(self.structure.parameter_symbols)}
+        changes = {symbol: _symbol(f"d{name}") for symbol, name in names.items()}
+        lines: list[str] = []
+
+        def change(expression: sp.Expr) -> str:
+            present = [symbol for symbol in changes if symbol in expression.free_symbols]
+            total = sp.Add(*(slope(expression, symbol) * changes[symbol] for symbol in present))
+            return C.expression(total, {**names, **{own: own.name for own in changes.values()}})
+
+        for part, expression in shared:
+            lines += [
+                f"const double {part} = {C.expression(expression, names)};",
+                f"const double d{part} = {change(expression)};",
+            ]
+            names[part], changes[part] = part.name, _symbol(f"d{part}")
+        lines += [f"dq[{i}] = {change(expression)};" for i, expression in enumerate(reduced)]
+        return "\n".join(f"    {line}" for line in lines)
+
+    @cached_property
+    def _lane_names(self) -> dict[sp.Symbol, str]:
+        sign = {} if self.frozen.friction_mode is None else {_FRICTION_SIGN: "friction_sign"}
+        return {**self._names, INPUT: "now->u[0]", INPUT_RATE: "now->du[0]", **sign}
+
+    @cached_property
+    def _lane_rates(self) -> list[sp.Expr]:
+        rates = self._groups["live_rates"]
+        return [sp.Integer(0) if i in self._followed else rate for i, rate in enumerate(rates)]
 
     def _put_back(self, array: str, limits: Mapping[int, sp.Expr]) -> tuple[list[str], list[sp.Expr]]:
         states = self.structure.states
@@ -287,10 +365,22 @@ class KernelEquations:
 
 _FRICTION_SIGN = sp.Symbol("friction_sign", real=True)
 _INPUT_CURVATURE = sp.Symbol("input_curvature", real=True)
+_EARLIER = sp.Symbol("earlier_input", real=True)
+
+
+def _is_costly(part: sp.Expr) -> bool:
+    """Return True for a function or power that takes many times as long as a product."""
+    if isinstance(part, sp.Pow):
+        return not part.exp.is_Integer
+    return not isinstance(part, (sp.Abs, sp.sign, positive_part, limited, absolute))
 
 
 def _symbol(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
+
+
+def _array(name: str, count: int) -> list[sp.Symbol]:
+    return [_symbol(element) for element in _targets(name, count)]
 
 
 def _targets(array: str, count: int) -> list[str]:

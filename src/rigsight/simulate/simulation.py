@@ -196,7 +196,7 @@ def normal_equations(
     Parameters
     ----------
     structure
-        Rig and effects; no sensor is late, as what it shows is interpolated between samples afterwards.
+        Rig and effects that carry no tangents; no sensor is late, as what it shows is interpolated between samples afterwards.
     records
         What is fitted.
     p
@@ -216,6 +216,88 @@ def normal_equations(
     if structure.measured_late is not None:
         raise ValueError("What a late sensor shows is known once all of a record is simulated.")
     return kernel_of(structure).normal_equations(records, p, initial_states)
+
+
+def carries_tangents(structure: Structure) -> bool:
+    """Return True if the kernel of a structure carries derivatives along, False if it takes differences of sets."""
+    return kernel_of(structure).carries_tangents
+
+
+def tangent_equations(
+    structure: Structure,
+    records: Sequence[FittedRecord],
+    p: NDArray[np.float64],
+    dp: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+    initial_slopes: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the products of weighted residuals and their derivatives that a step of least squares needs of some records.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects, which carry tangents.
+    records
+        What is fitted.
+    p
+        Shape (n_parameters,).
+    dp
+        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
+    initial_states
+        Shape (n_records, n_states).
+    initial_slopes
+        Their derivatives, shape (n_states, n_directions); the same for all records.
+
+    Returns
+    -------
+    Shape (n_records, 1 + n_directions, 1 + n_directions), see `Kernel.tangent_equations`.
+    """
+    return kernel_of(structure).tangent_equations(records, p, dp, initial_states, initial_slopes)
+
+
+def simulate_tangents(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    dp: NDArray[np.float64],
+    initial_state: NDArray[np.float64],
+    initial_slope: NDArray[np.float64],
+    n_samples: int,
+    substeps: int | Substeps,
+) -> NDArray[np.float64]:
+    """Simulate one parameter set with its derivatives by any directions of parameters and initial states.
+
+    They are those of the equations, carried along with the motion: the reversal of a velocity under dry friction and the jump of
+    a held input that arrives late included. No step is chosen.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects, which carry tangents.
+    held
+        Input between its samples.
+    p
+        Shape (n_parameters,).
+    dp
+        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
+    initial_state
+        Shape (n_states,).
+    initial_slope
+        Its derivatives, shape (n_states, n_directions).
+    n_samples
+        Samples of the record.
+    substeps
+        Runge-Kutta steps per piece of the input, see `choose_substeps`.
+
+    Returns
+    -------
+    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, and behind them their derivatives; NaN or infinity where the
+    simulation diverges.
+    """
+    steps = Substeps.per_piece(
+        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
+    )
+    return kernel_of(structure).simulate_tangents(held, p, dp, initial_state, initial_slope, steps, n_samples)
 
 
 def choose_substeps(

@@ -1,0 +1,82 @@
+"""How do expressions answer to small changes of what they hold: their derivatives, and the sums that changes are put into."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from rigsight.simulate.kinks import absolute
+
+_TINY = sp.Float(1e-300)
+"""Beside a magnitude that is divided by or of which a logarithm is taken: at zero it is then multiplied by zero."""
+
+
+@dataclass(frozen=True)
+class LinearForms:
+    """Changes of expressions as sums of products.
+
+    Attributes
+    ----------
+    factors
+        Symbol -> the derivative it stands for; they are the same for all changes.
+    sums
+        Change of each expression, of factors, constants and changes.
+    """
+
+    factors: Mapping[sp.Symbol, sp.Expr]
+    sums: tuple[sp.Expr, ...]
+
+
+def linear_forms(
+    expressions: Sequence[sp.Expr], changes: Mapping[sp.Symbol, sp.Expr], constants: set[sp.Symbol]
+) -> LinearForms:
+    """Return how expressions change with what they hold, their signs held.
+
+    Parameters
+    ----------
+    expressions
+        What changes.
+    changes
+        Symbol -> its change.
+    constants
+        Symbols that may stand in the sums as they are.
+    """
+    factors: dict[sp.Expr, sp.Symbol] = {}
+
+    def factor(derivative: sp.Expr) -> sp.Expr:
+        if derivative.is_number or derivative in constants:
+            return derivative
+        return factors.setdefault(derivative, sp.Symbol(f"d{len(factors)}", real=True))
+
+    sums = []
+    for expression in expressions:
+        own = [s for s in changes if s in expression.free_symbols]
+        terms = [factor(slope(expression, symbol)) * changes[symbol] for symbol in own]
+        sums.append(sp.Add(*terms))
+    return LinearForms({symbol: derivative for derivative, symbol in factors.items()}, tuple(sums))
+
+
+def slope(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Return a derivative that is finite where a magnitude is zero; the jump of a sign is an event, or none."""
+    # Term by term: sympy takes as long for a derivative that is zero as for another one.
+    terms = [term for term in sp.Add.make_args(expression) if symbol in term.free_symbols]
+    total = sp.Add(*(sp.diff(term, symbol) for term in terms))
+    return total.replace(sp.DiracDelta, lambda *_: sp.Integer(0)).replace(_is_singular, _guarded)
+
+
+def _is_singular(part: sp.Expr) -> bool:
+    if isinstance(part, sp.log):
+        return isinstance(part.args[0], (sp.Abs, absolute))
+    if not (part.is_Pow and isinstance(part.base, (sp.Abs, absolute))):
+        return False
+    return bool(part.exp.as_coeff_Add()[0] < 0)
+
+
+def _guarded(part: sp.Expr) -> sp.Expr:
+    if isinstance(part, sp.log):
+        return sp.log(part.args[0] + _TINY)
+    whole = part.exp + 1
+    # The power itself is there already: another logarithm and exponential would cost as much as all else.
+    return part.base**whole / (part.base + _TINY) if whole.free_symbols else (part.base + _TINY) ** part.exp
