@@ -105,4 +105,4 @@ def test_an_unknown_rig_is_told(tmp_path: Path, run: Run) -> None:
     write_matlab(tmp_path / "run.mat", ROWS, {})
     code, _, stderr = run("init", tmp_path, "--model", "bicycle")
     assert code == 2
-    assert "running_gear, axis, element" in stderr
+    assert "axis, element, running_gear" in stderr

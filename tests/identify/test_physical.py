@@ -19,7 +19,7 @@ from rigsight.identify import (
 )
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.running_gear import creep_factor
+from rigsight.rigs.conicity import creep_factor
 from rigsight.simulate import compose, simulate
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}

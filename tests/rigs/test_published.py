@@ -9,8 +9,8 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import RIGS
+from rigsight.rigs.conicity import conicity, creep_factor
 from rigsight.rigs.published import parse_published_set, published_sets
-from rigsight.rigs.running_gear import conicity, creep_factor
 from rigsight.simulate import compose, parameter_vector
 
 GOOD = """

@@ -210,8 +210,8 @@ class _Bench:
         for i, (name, dimension) in enumerate(
             zip(structure.state_names, structure.state_dimensions, strict=True)
         ):
-            if rig.lateral is not None and name == rig.lateral.symbol.name:
-                state[i] = values["y_off"] + evaluated(rig.lateral.static_gain, values) * rest
+            if rig.follower is not None and name == rig.follower.symbol.name:
+                state[i] = values["y_off"] + evaluated(rig.follower.static_gain, values) * rest
             elif name.rpartition(".")[2] in sensors:
                 state[i] = rest
             elif dimension == "" and rng is not None:

@@ -19,6 +19,7 @@ from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
 from rigsight.cli.inspect import inspect
+from rigsight.cli.rigs import list_rigs
 from rigsight.cli.signals import ended_by_signals
 from rigsight.cli.simulate import simulate
 from rigsight.cli.vary import vary
@@ -36,6 +37,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "vary": vary,
     "blind": blind,
     "effects": list_effects,
+    "rigs": list_rigs,
 }
 """In the order in which ``rigsight --help`` shows them."""
 

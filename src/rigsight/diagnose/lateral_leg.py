@@ -69,9 +69,9 @@ def fit_lateral_leg(bench: Workbench, given: Mapping[str, float]) -> LateralLeg 
         Parameters of the given simulation.
     """
     rig = bench.rig
-    if rig.lateral is None:
+    if rig.follower is None:
         return None
-    names = (rig.outputs[0].name, rig.lateral.symbol.name)
+    names = (rig.outputs[0].name, rig.follower.symbol.name)
     fitted_to = [r for r in bench.estimation if names[1] in r]
     scored_on = [r for r in bench.scoring if names[1] in r]
     if not fitted_to or not scored_on:
@@ -110,7 +110,7 @@ def fit_lateral_leg(bench: Workbench, given: Mapping[str, float]) -> LateralLeg 
 
 def _given(rig: Rig, values: Mapping[str, float]) -> _Numbers:
     """Return rate, gain and offset of the rig's own lateral equation."""
-    lateral = rig.lateral
+    lateral = rig.follower
     assert lateral is not None
     rates = lateral.gain * lateral.creepage
     numbers = {s: values[s.name] for s in rates.free_symbols if s.name in values}

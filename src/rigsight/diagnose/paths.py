@@ -16,6 +16,7 @@ from rigsight.diagnose.gap_parts import PathPart
 from rigsight.diagnose.lateral_leg import LateralLeg, fit_lateral_leg
 from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Place
 from rigsight.metrics import rms
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -49,8 +50,8 @@ def path_parts(bench: Workbench, before: Scored, linear: Scored, after: Scored) 
         )
     ]
     leg = fit_lateral_leg(bench, before.fit.values)
-    if leg is not None and rig.lateral is not None:
-        parts.append(_lateral_part(bench, leg, motion, rig.lateral.symbol.name))
+    if leg is not None and rig.follower is not None:
+        parts.append(_lateral_part(bench, leg, motion, rig.follower.symbol.name))
     return tuple(parts)
 
 
@@ -96,7 +97,7 @@ def _times(value: float, part: PathPart) -> str:
 
 
 def _words(rig: Rig) -> str:
-    return rig.dynamics_name.replace("_", " ")
+    return rig.place_name(Place.DYNAMICS).replace("_", " ")
 
 
 def _motion_alone(bench: Workbench, linear: Scored) -> Scored:

@@ -89,7 +89,7 @@ def discover(
     say("library")
     bench = Bench(
         # What the motion knows nothing of would be simulated in every fit.
-        rig=replace(task.rig, lateral=None, outputs=task.rig.outputs[:1]),
+        rig=task.rig.motion_alone(),
         estimation=tuple(_without_downstream(task.rig, record) for record in estimation),
         held_out=tuple(_without_downstream(task.rig, record) for record in held_out),
         values=values,

@@ -10,6 +10,8 @@ from rigsight.effects.effect import Signature as Signature
 from rigsight.effects.effect import Start as Start
 from rigsight.effects.effect import State as State
 from rigsight.effects.effect import SumAndDifference as SumAndDifference
+from rigsight.effects.placed import kind_of as kind_of
+from rigsight.effects.placed import placed as placed
 
 __all__ = [
     "CATALOGUE",
@@ -22,4 +24,6 @@ __all__ = [
     "State",
     "SumAndDifference",
     "effect_named",
+    "kind_of",
+    "placed",
 ]

@@ -167,6 +167,8 @@ class Effect:
         Parameter values that simplify the equations (an exponent of 1): tried first, released later.
     needs_inertia
         True if it makes no sense where the motion is prescribed.
+    at
+        Name of the joint, drive, sensor or state of a rig at which it acts; None for the first of its kind.
     """
 
     name: str
@@ -190,6 +192,7 @@ class Effect:
     starts: tuple[Start, ...] = ()
     special_cases: dict[str, float] = field(default_factory=dict)
     needs_inertia: bool = False
+    at: str | None = None
 
     @property
     def parents(self) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from scipy.stats import norm
 from rigsight.errors import InputError
 from rigsight.identify.physical import LEVEL
 from rigsight.rigs import ROLLING, evaluated
-from rigsight.rigs.running_gear import creep_factor
+from rigsight.rigs.conicity import creep_factor
 
 PLAUSIBLE = 0.3
 """Conicities of profiled wheels [rad]; an interval that covers them all tells nothing. A choice, far above the thesis's 0.05."""

@@ -15,15 +15,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.identify.equation_error import solve_in_frequency, spectra_of
 from rigsight.records.record import Record
-from rigsight.rigs import AXIS, RIGS, ROLLING, Rig, evaluated
+from rigsight.rigs import Follower, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
-_OUTPUTS = frozenset(signal.name for rig in RIGS.values() if rig.is_driven for signal in rig.outputs)
+_UNKNOWN = 1.0
+"""Value of a parameter of which the records say nothing."""
 _STILL = 1e-12
 """Range of a signal relative to its size that is rounding."""
 
@@ -49,12 +51,9 @@ def linear_start(
     InputError
         If the records do not move the rig.
     """
-    if rig.name == "running_gear":
-        found = _running_gear(rig, records, constants)
-    elif rig.name == "axis":
-        found = _axis(records, constants, no_spring=known.get("k") == 0.0)
-    else:
-        found = _element(records)
+    found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)
+    if rig.follower is not None:
+        found |= _followed(rig, rig.follower, records, constants, found)
     parameters = {p.name: p for p in rig.parameters}
     clipped = {
         name: float(np.clip(value, parameters[name].lower, parameters[name].upper))
@@ -63,50 +62,86 @@ def linear_start(
     return {**clipped, **known}
 
 
-def _running_gear(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> dict[str, float]:
-    gain = evaluated(rig.motion.drive_gain, constants)
-    inertia, damping, stiffness = second_order(records, "u", "psi", gain)
-    psi_mean = float(np.mean([np.mean(r["psi"]) for r in records]))
-    u_mean = float(np.mean([np.mean(r["u"]) for r in records]))
-    found = {
-        "J_z": inertia,
-        "k_d": damping,
-        "k_c": stiffness,
-        "psi_off": psi_mean - gain * u_mean / stiffness,
-        "l_0": 0.25,
-        "c_y": 1.0,
-        "y_off": 0.0,
-    }
-    with_y = [record for record in records if "y" in record]
-    if with_y:
-        slope, rate = first_order(with_y, "psi", "y")
-        found["c_y"] = slope / constants["v"]
-        found["l_0"] = slope / (2.0 * rate)
-        y_mean = float(np.mean([np.mean(r["y"]) for r in with_y]))
-        at_rest = evaluated(ROLLING.static_gain, found)
-        found["y_off"] = y_mean - at_rest * float(np.mean([np.mean(r["psi"]) for r in with_y]))
+def _driven(
+    rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
+    motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
+    gain = evaluated(motion.drive_gain, constants)
+    no_spring = known.get(str(motion.stiffness)) == 0.0
+    inertia, damping, stiffness = second_order(records, source, response, gain, no_spring)
+    offset = 0.0 if no_spring else _mean(records, response) - gain * _mean(records, source) / stiffness
+    assert motion.inertia is not None
+    numbers = ((motion.inertia, inertia), (motion.damping, damping), (motion.stiffness, stiffness))
+    found: dict[str, float] = {}
+    for expression, value in (*numbers, (motion.rest, offset), (motion.bias, 0.0)):
+        found |= _solved(expression, value, {**constants, **found})
     return found
 
 
-def _axis(records: Sequence[Record], constants: Mapping[str, float], no_spring: bool) -> dict[str, float]:
-    gain = evaluated(AXIS.motion.drive_gain, constants)
-    inertia, damping, stiffness = second_order(records, "u", "x", gain, no_spring)
-    x_mean = float(np.mean([np.mean(r["x"]) for r in records]))
-    u_mean = float(np.mean([np.mean(r["u"]) for r in records]))
-    offset = 0.0 if no_spring else x_mean - gain * u_mean / stiffness
-    return {"m": inertia, "d": damping, "k": stiffness, "x_off": offset, "force_off": 0.0}
+def _followed(
+    rig: Rig,
+    follower: Follower,
+    records: Sequence[Record],
+    constants: Mapping[str, float],
+    found: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the parameters of the state that follows the motion."""
+    motion, name = rig.outputs[0].name, follower.symbol.name
+    own = (
+        {symbol.name for symbol in (follower.gain * follower.creepage).free_symbols}
+        - set(constants)
+        - set(found)
+    )
+    own -= {rig.motion.displacement.name, name}
+    seen = [record for record in records if name in record]
+    if not seen:
+        return {p: 0.0 if p in _offsets(follower) else _UNKNOWN for p in own}
+    slope, rate = first_order(seen, motion, name)
+    solved = _solved(follower.gain, slope, constants)
+    solved |= _solved(follower.feedback, rate / slope, {**constants, **solved})
+    static = evaluated(follower.static_gain, {**constants, **solved})
+    return solved | dict.fromkeys(_offsets(follower), _mean(seen, name) - static * _mean(seen, motion))
 
 
-def _element(records: Sequence[Record]) -> dict[str, float]:
-    for name in ("x", "force"):
+def _offsets(follower: Follower) -> set[str]:
+    return {symbol.name for symbol in follower.displacement.free_symbols if symbol != follower.symbol}
+
+
+def _solved(expression: sp.Expr, value: float, known: Mapping[str, float]) -> dict[str, float]:
+    """Return the one number that an expression lacks, so that it has a value; several are taken as equal."""
+    lacking = sorted(
+        (symbol for symbol in expression.free_symbols if symbol.name not in known),
+        key=lambda symbol: str(symbol.name),
+    )
+    if not lacking:
+        return {}
+    unknown = sp.Symbol("unknown", real=True)
+    equation = expression.subs(
+        {symbol: known[symbol.name] for symbol in expression.free_symbols if symbol not in lacking}
+    )
+    solutions = [
+        s for s in sp.solve(equation.subs(dict.fromkeys(lacking, unknown)) - value, unknown) if s.is_real
+    ]
+    return {symbol.name: float(solutions[-1]) if solutions else _UNKNOWN for symbol in lacking}
+
+
+def _mean(records: Sequence[Record], name: str) -> float:
+    return float(np.mean([np.mean(record[name]) for record in records]))
+
+
+def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
+    motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
+    for name in (source, response):
         _check_moves(records, name)
     rows, forces = [], []
     for record in records:
-        x, v = smooth_motion(record["x"], record.dt)
+        x, v = smooth_motion(record[source], record.dt)
         rows.append(np.column_stack([v, x, np.ones_like(x)]))
-        forces.append(record["force"])
+        forces.append(record[response])
     solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(forces), rcond=None)[0]
-    return dict(zip(("d", "k", "force_off"), map(float, solution), strict=True))
+    return dict(
+        zip(map(str, (motion.damping, motion.stiffness, motion.bias)), map(float, solution), strict=True)
+    )
 
 
 def _check_moves(records: Sequence[Record], name: str) -> None:
@@ -138,8 +173,10 @@ def second_order(
 
 
 def first_order(records: Sequence[Record], source: str, response: str) -> tuple[float, float]:
-    """Return slope and rate of ``y' = slope x - rate y`` that fit best."""
-    tau, unity = _equation_error(records, source, response, (1, 0), 1.0)
+    """Return slope and rate of ``y' = slope x - rate y`` that fit best; x is measured too."""
+    # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
+    smooth = [replace(record, hold="band_limited") for record in records]
+    tau, unity = _equation_error(smooth, source, response, (1, 0), 1.0)
     slope, rate = 1.0 / tau, unity / tau
     return float(abs(slope)), float(abs(rate) or 1.0)
 
@@ -150,9 +187,6 @@ def _equation_error(
     """Solve ``sum_i a_i (j omega)^order_i X = gain U + transient`` for the a_i."""
     for name in (source, response):
         _check_moves(records, name)
-    if source in _OUTPUTS:
-        # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
-        records = [replace(record, hold="band_limited") for record in records]
     blocks = [spectra_of(record, source, response) for record in records]
     terms = [[(order, block.response) for order in orders] for block in blocks]
     return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks]).coefficients

@@ -1,17 +1,24 @@
 """Rigs as declarations: signals, parameters, equations, and the places where effects can act."""
 
-from rigsight.rigs.axis import AXIS as AXIS
-from rigsight.rigs.element import ELEMENT as ELEMENT
+from rigsight.rigs.built_in import AXIS as AXIS
+from rigsight.rigs.built_in import ELEMENT as ELEMENT
+from rigsight.rigs.built_in import RIGS as RIGS
+from rigsight.rigs.built_in import ROLLING as ROLLING
+from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
+from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
-from rigsight.rigs.rig import Lateral as Lateral
+from rigsight.rigs.mechanism import Drive as Drive
+from rigsight.rigs.mechanism import Joint as Joint
+from rigsight.rigs.mechanism import Sensor as Sensor
+from rigsight.rigs.mechanism import acceleration as acceleration
+from rigsight.rigs.mechanism import force_symbol as force_symbol
+from rigsight.rigs.mechanism import reading_symbol as reading_symbol
+from rigsight.rigs.rig import Follower as Follower
 from rigsight.rigs.rig import Motion as Motion
 from rigsight.rigs.rig import Rig as Rig
-from rigsight.rigs.rig import Signal as Signal
-from rigsight.rigs.running_gear import ROLLING as ROLLING
-from rigsight.rigs.running_gear import RUNNING_GEAR as RUNNING_GEAR
-
-RIGS: dict[str, Rig] = {rig.name: rig for rig in (RUNNING_GEAR, AXIS, ELEMENT)}
+from rigsight.rigs.rig_file import read_rig_file as read_rig_file
+from rigsight.rigs.signal import Signal as Signal
 
 __all__ = [
     "AXIS",
@@ -19,10 +26,18 @@ __all__ = [
     "RIGS",
     "ROLLING",
     "RUNNING_GEAR",
-    "Lateral",
+    "Drive",
+    "Follower",
+    "Joint",
     "Motion",
     "Rig",
+    "Sensor",
     "Signal",
+    "acceleration",
     "evaluated",
+    "force_symbol",
+    "read_rig_file",
+    "reading_symbol",
     "relative_slopes",
+    "rig_file_text",
 ]

@@ -14,7 +14,6 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter, ParameterSet
 from rigsight.rigs import RIGS
-from rigsight.rigs.running_gear import creep_factor
 
 _KEYS = ("title", "source", "rig", "amplitude", "notes", "constants", "parameters", "effects")
 
@@ -115,8 +114,7 @@ def _checked(name: str, content: dict[str, Any]) -> PublishedSet:
         key: alternatives[key].check(v) for key, v in content["parameters"].items() if key in alternatives
     }
     own = {key: value for key, value in content["parameters"].items() if key not in given}
-    if "delta_0" in given:
-        own["c_y"] = creep_factor(given["delta_0"], constants["r_0"], constants["b"])
+    own |= rig.in_own_parameters(given, constants)
     return PublishedSet(
         name=name,
         title=str(content["title"]),

@@ -1,28 +1,24 @@
-"""What a rig is: signals, constants, parameters and the equations into which effects are placed."""
+"""What a rig is: signals, numbers to know and to identify, and the mechanism into whose places effects are put."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import sympy as sp
 
 from rigsight.effects.effect import Effect, Place
 from rigsight.parameters import Parameter
+from rigsight.rigs.evaluation import evaluated
+from rigsight.rigs.mechanism import Drive, Joint, Mechanism, RateState, Sensor
+from rigsight.rigs.signal import Signal
 from rigsight.units import unit_text
 
 
 @dataclass(frozen=True)
-class Signal:
-    """A recorded quantity: its name in equations and files, its unit, and what it is."""
-
-    name: str
-    unit: str
-    description: str
-
-
-@dataclass(frozen=True)
 class Motion:
-    """The degree of freedom on which dynamics effects act.
+    """The single degree of freedom of a rig with one joint, or the motion that is prescribed to it.
 
     ``inertia * x'' = drive_gain * u + bias - spring(x - rest) - damping * x' - effects``; without an inertia the motion is
     prescribed and the right-hand side's torques are the output.
@@ -48,8 +44,8 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Lateral:
-    """The lateral displacement that rolling makes of the motion: ``y' = gain * creepage``.
+class Follower:
+    """A first-order state that follows the motion: ``y' = gain * creepage``.
 
     Attributes
     ----------
@@ -78,6 +74,25 @@ class Lateral:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """A number that people know in the place of one of the rig's own.
+
+    Attributes
+    ----------
+    parameter
+        The number.
+    gives
+        Name of the parameter that follows from it.
+    value
+        That parameter, of the number and of constants.
+    """
+
+    parameter: Parameter
+    gives: str
+    value: sp.Expr
+
+
+@dataclass(frozen=True)
 class Rig:
     """A rig as a declaration.
 
@@ -87,47 +102,109 @@ class Rig:
         Name in campaigns (``rig.model``).
     summary
         One plain sentence.
-    inputs, outputs
-        Recorded signals; all inputs and the first output are required in a record.
+    inputs
+        Recorded signals that drive it; all are required in a record.
     constants
         Known numbers of the rig; one with a default may be left out of a campaign.
     parameters
         Numbers to identify, in the order of the equations.
-    alternative_parameters
-        Accepted in a campaign instead of one of `parameters`, see `from_alternative`.
-    motion
-        The degree of freedom on which dynamics effects act.
-    lateral
-        The lateral displacement that the motion drives, if the rig has one.
-    units
-        Unit of each base quantity: x, force, input, time, and others that its dimensions use.
-    dynamics_name
-        How a result calls `Place.DYNAMICS` on this rig.
+    mechanism
+        Its equations.
+    alternatives
+        Accepted in a campaign in the place of one of `parameters`.
     """
 
     name: str
     summary: str
     inputs: tuple[Signal, ...]
-    outputs: tuple[Signal, ...]
     constants: tuple[Parameter, ...]
     parameters: tuple[Parameter, ...]
-    motion: Motion
-    units: dict[str, str]
-    alternative_parameters: tuple[Parameter, ...] = ()
-    lateral: Lateral | None = None
-    dynamics_name: str = "dynamics"
+    mechanism: Mechanism
+    alternatives: tuple[Alternative, ...] = ()
+
+    @cached_property
+    def outputs(self) -> tuple[Signal, ...]:
+        """What is recorded of it; the first is required in a record."""
+        return tuple(Signal(sensor.name, sensor.unit, sensor.about) for sensor in self.mechanism.sensors)
+
+    @property
+    def alternative_parameters(self) -> tuple[Parameter, ...]:
+        """The numbers that are accepted in the place of one of `parameters`."""
+        return tuple(alternative.parameter for alternative in self.alternatives)
+
+    def in_own_parameters(
+        self, given: Mapping[str, float], constants: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Return given values with alternatives turned into the parameters that follow from them."""
+        own = dict(given)
+        for alternative in self.alternatives:
+            name = alternative.parameter.name
+            if name in own:
+                numbers = {**constants, name: own.pop(name)}
+                own[alternative.gives] = evaluated(alternative.value, numbers)
+        return own
 
     @property
     def is_driven(self) -> bool:
         """True if an input moves a mass, False if the motion is prescribed."""
-        return self.motion.inertia is not None
+        return bool(self.mechanism.free)
+
+    @cached_property
+    def has_one_motion(self) -> bool:
+        """True for one joint along the one coordinate, one input, no other force and no feedback: `motion` says it all."""
+        mechanism = self.mechanism
+        if len(mechanism.coordinates) != 1 or len(mechanism.joints) != 1 or len(mechanism.inputs) != 1:
+            return False
+        told = {sp.Symbol(name, real=True) for name in mechanism.inputs}
+        return (
+            mechanism.potential == 0
+            and mechanism.joints[0].motion == mechanism.coordinates[0].symbol
+            and not mechanism.mass_matrix.free_symbols & {mechanism.coordinates[0].symbol}
+            and [drive.signal in told for drive in mechanism.drives] in ([], [True])
+        )
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The one degree of freedom.
+
+        Raises
+        ------
+        ValueError
+            If the rig has several joints or coordinates.
+        """
+        mechanism = self.mechanism
+        if len(mechanism.coordinates) != 1 or len(mechanism.joints) != 1:
+            raise ValueError(f"{self.name} has several joints or coordinates.")
+        (coordinate,), (joint,) = mechanism.coordinates, mechanism.joints
+        drive_gain, inertia = sp.S.Zero, None
+        if mechanism.free:
+            (drive,) = mechanism.drives
+            drive_gain = sp.diff(drive.force, sp.Symbol(drive.name, real=True))
+            inertia = mechanism.mass_matrix[0, 0]
+        bias = -joint.force if mechanism.free else joint.force
+        return Motion(
+            coordinate.symbol,
+            coordinate.rate,
+            joint.stiffness,
+            joint.damping,
+            drive_gain,
+            joint.rest,
+            bias,
+            inertia,
+        )
+
+    @cached_property
+    def follower(self) -> Follower | None:
+        """The first-order state that follows the motion, if the rig has one."""
+        if not self.has_one_motion:
+            return None
+        found = (_follower(state, self.motion) for state in self.mechanism.states)
+        return next((follower for follower in found if follower is not None), None)
 
     @property
     def downstream(self) -> dict[sp.Symbol, sp.Expr]:
-        """Further states driven by the motion, with their rates without effects."""
-        return (
-            {} if self.lateral is None else {self.lateral.symbol: self.lateral.gain * self.lateral.creepage}
-        )
+        """States driven by the motion of which it knows nothing, with their rates without effects."""
+        return {state.symbol: state.rate for state in self.mechanism.states}
 
     @property
     def downstream_parameters(self) -> frozenset[str]:
@@ -137,22 +214,89 @@ class Rig:
         own = {symbol.name for part in parts if part is not None for symbol in part.free_symbols}
         return frozenset(parameter.name for parameter in self.parameters if parameter.name not in own)
 
-    def with_unit(self, parameter: Parameter) -> Parameter:
-        """Return the parameter with its unit on this rig.
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each base quantity of its first joint: x, force, input, time, and length where a state follows."""
+        return self.units_at(self.mechanism.joints[0].name)
+
+    def units_at(self, place: str) -> dict[str, str]:
+        """Return the unit of each base quantity at a joint, a drive or a sensor.
+
+        Parameters
+        ----------
+        place
+            Its name; at a drive or sensor x and force are those of the first joint.
+        """
+        mechanism = self.mechanism
+        joint = next((joint for joint in mechanism.joints if joint.name == place), mechanism.joints[0])
+        coordinates = [c for c in mechanism.coordinates if c.symbol in joint.motion.free_symbols]
+        x = coordinates[0].unit if coordinates else "1"
+        units = {"x": x, "force": "N m" if x == "rad" else "N", "time": "s"}
+        if self.is_driven and self.inputs:
+            drive = next((drive for drive in mechanism.drives if drive.name == place), None)
+            source = drive.signal if drive is not None else sp.Symbol(self.inputs[0].name, real=True)
+            # What a control law gives has no unit that stands anywhere.
+            units["input"] = next(
+                (s.unit for s in self.inputs if sp.Symbol(s.name, real=True) == source), "1"
+            )
+        if mechanism.states:
+            units["length"] = mechanism.states[0].unit
+        return units
+
+    def motion_alone(self) -> Rig:
+        """Return the rig without the states that follow its motion, their sensors and their parameters in the equations."""
+        followers = {state.symbol for state in self.mechanism.states}
+        sensors = tuple(s for s in self.mechanism.sensors if not s.reads.free_symbols & followers)
+        kept = {sensor.name for sensor in sensors} | {drive.name for drive in self.mechanism.drives}
+        order = tuple(name for name in self.mechanism.order if name in kept)
+        return replace(self, mechanism=replace(self.mechanism, states=(), sensors=sensors, order=order))
+
+    def with_unit(self, parameter: Parameter, place: str | None = None) -> Parameter:
+        """Return the parameter with its unit on this rig, at a place or at its first joint.
 
         The base quantity "drive" is a force of the size of the drive's, where "force" is one of the size of the spring's.
         """
-        units = {**self.units, "drive": self.units["force"]}
+        units = self.units if place is None else self.units_at(place)
+        units = {**units, "drive": units["force"]}
         return replace(parameter, unit=unit_text(parameter.dimension, units))
 
     def place_name(self, place: Place) -> str:
         """Return how results call a place on this rig."""
-        return self.dynamics_name if place is Place.DYNAMICS else place.value
+        return self.mechanism.joints[0].name if place is Place.DYNAMICS else place.value
+
+    def places(self, kind: Place) -> tuple[str, ...]:
+        """Return the names of the joints, drives, sensors or states at which effects of a kind can act."""
+        mechanism = self.mechanism
+        found: Sequence[Drive | Joint | Sensor | RateState] = mechanism.joints
+        if kind is Place.ACTUATOR:
+            found = mechanism.drives
+        elif kind is Place.SENSOR:
+            found = mechanism.sensors
+        elif kind is Place.LATERAL_DYNAMICS:
+            found = mechanism.states
+        return tuple(place.name for place in found)
+
+    def acts_at(self, effect: Effect) -> str:
+        """Return the name of the joint, drive, sensor or state at which an effect acts; the first where it names none."""
+        return effect.at if effect.at is not None else self.places(effect.place)[0]
 
     def offers(self, effect: Effect) -> bool:
         """Return True if the effect makes sense on this rig."""
+        if effect.at is not None and effect.at not in self.places(effect.place):
+            return False
         if effect.place is Place.LATERAL_DYNAMICS:
-            return self.lateral is not None
+            return self.follower is not None
         if self.is_driven:
             return True
         return effect.place is Place.DYNAMICS and not effect.needs_inertia
+
+
+def _follower(state: RateState, motion: Motion) -> Follower | None:
+    """Return how a state follows the motion; None where its rate is not a sum of the two, each with a factor."""
+    gain, back = sp.diff(state.rate, motion.displacement), sp.diff(state.rate, state.symbol)
+    moving = {motion.displacement, motion.velocity, state.symbol}
+    if gain == 0 or back == 0 or (gain.free_symbols | back.free_symbols) & moving:
+        return None
+    creepage, feedback = sp.expand(state.rate / gain), -back / gain
+    displacement = sp.simplify((motion.displacement - creepage) / feedback)
+    return Follower(state.symbol, displacement, motion.displacement - displacement * feedback, gain, feedback)

@@ -6,6 +6,8 @@ a gain error that grows with frequency.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -26,13 +28,13 @@ _LONGEST_KEPT = 50_000
 
 @dataclass(frozen=True)
 class HeldInput:
-    """An input between its samples.
+    """An input, or several, between its samples.
 
     Attributes
     ----------
     coefficients
-        Shape (n_intervals + 1, 4): ``c0 + c1 tau + c2 tau^2 + c3 tau^3`` with tau [s] from the start of each interval; row 0
-        is the input before the record, held at its first value.
+        Shape (n_intervals + 1, 4), of several inputs (n_intervals + 1, n_inputs, 4): ``c0 + c1 tau + c2 tau^2 + c3 tau^3`` with
+        tau [s] from the start of each interval; row 0 is the input before the record, held at its first value.
     interval
         Length of an interval [s].
     per_sample
@@ -111,6 +113,38 @@ def hold_motion(values: NDArray[np.float64], rates: NDArray[np.float64], dt: flo
     rows[1:, 2] = (3.0 * rise - 2.0 * first - last) / dt**2
     rows[1:, 3] = (first + last - 2.0 * rise) / dt**3
     return HeldInput(rows, dt, 1, continuous=True)
+
+
+def together(inputs: Sequence[HeldInput]) -> HeldInput:
+    """Return several inputs as one; pieces are divided where others are shorter."""
+    if len(inputs) == 1:
+        return inputs[0]
+    per_sample = math.lcm(*(held.per_sample for held in inputs))
+    divided = [_divided(held, per_sample // held.per_sample) for held in inputs]
+    return HeldInput(
+        np.stack([held.coefficients for held in divided], axis=1),
+        divided[0].interval,
+        per_sample,
+        continuous=all(held.continuous for held in inputs),
+    )
+
+
+def _divided(held: HeldInput, parts: int) -> HeldInput:
+    """Return an input in pieces of which each is one of so many equal parts of the ones before."""
+    if parts == 1:
+        return held
+    interval = held.interval / parts
+    c0, c1, c2, c3 = held.coefficients[1:].T
+    rows = []
+    for part in range(parts):
+        s = part * interval
+        rows.append(
+            [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3), c2 + 3.0 * s * c3, c3]
+        )
+    pieces = np.moveaxis(np.array(rows), 2, 0).reshape(-1, 4)
+    return HeldInput(
+        np.vstack([held.coefficients[:1], pieces]), interval, held.per_sample * parts, held.continuous
+    )
 
 
 def _band_limited_nodes(

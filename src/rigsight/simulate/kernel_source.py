@@ -27,7 +27,7 @@ from rigsight.simulate.expressions import gathered, hoist_constants
 from rigsight.simulate.kinks import FrozenStructure, absolute, freeze
 from rigsight.simulate.linear_forms import linear_forms, slope
 from rigsight.simulate.printing.c import C_LANES, C, limited
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
+from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure, input_symbols
 
 LANES = 32
 """Parameter sets that advance together: what they share is computed once, and their vectors hide each other's latency."""
@@ -132,8 +132,8 @@ class KernelEquations:
             "SIZE_STATES": max(1, n_states),
             "N_MODES": n_modes,
             "SIZE_MODES": max(1, n_modes),
-            "N_INPUTS": 1,
-            "SIZE_INPUTS": 1,
+            "N_INPUTS": len(structure.rig.inputs),
+            "SIZE_INPUTS": max(1, len(structure.rig.inputs)),
             "SIZE_CONSTANTS": max(1, len(self.constants)),
             "N_COMPUTED": len(structure.computed_outputs),
             "FRICTION": -1 if friction is None else friction,
@@ -274,7 +274,7 @@ class KernelEquations:
     @cached_property
     def _lane_names(self) -> dict[sp.Symbol, str]:
         sign = {} if self.frozen.friction_mode is None else {_FRICTION_SIGN: "friction_sign"}
-        return {**self._names, INPUT: "now->u[0]", INPUT_RATE: "now->du[0]", **sign}
+        return {**self._names, **sign}
 
     @cached_property
     def _lane_rates(self) -> list[sp.Expr]:
@@ -293,10 +293,13 @@ class KernelEquations:
             "s": self.frozen.modes,
             "q": tuple(self.constants),
         }
+        inputs = {
+            symbol: f"now->{array}[{i}]"
+            for i in range(len(self.structure.rig.inputs))
+            for symbol, array in zip(input_symbols(i), ("u", "du", "ddu"), strict=True)
+        }
         return {
-            INPUT: "now->u[0]",
-            INPUT_RATE: "now->du[0]",
-            _INPUT_CURVATURE: "now->ddu[0]",
+            **inputs,
             TIME: "now->time",
             **{s: f"{array}[{i}]" for array, symbols in numbered.items() for i, s in enumerate(symbols)},
         }
@@ -315,10 +318,11 @@ class KernelEquations:
         """Return the total derivative of an expression by time, between events."""
         along = {
             **dict(zip(self.structure.states, self._rate_symbols, strict=True)),
-            INPUT: INPUT_RATE,
-            INPUT_RATE: _INPUT_CURVATURE,
             TIME: sp.Integer(1),
         }
+        for i in range(len(self.structure.rig.inputs)):
+            value, rate, curvature = input_symbols(i)
+            along |= {value: rate, rate: curvature}
         present = expression.free_symbols
         return sum(
             (sp.diff(expression, s) * rate for s, rate in along.items() if s in present), start=sp.Integer(0)
@@ -352,7 +356,10 @@ class KernelEquations:
     @cached_property
     def _followed(self) -> dict[int, tuple[str, str]]:
         """States with a range whose rate is that of a motion: how C writes the motion before and after."""
-        motions: dict[sp.Expr, tuple[str, str]] = {INPUT_RATE: ("from->u[0]", "now->u[0]")}
+        motions: dict[sp.Expr, tuple[str, str]] = {
+            input_symbols(i)[1]: (f"from->u[{i}]", f"now->u[{i}]")
+            for i in range(len(self.structure.rig.inputs))
+        }
         for i, equation in enumerate(self.structure.equations):
             if equation.limit is None:
                 motions.setdefault(equation.rate, (f"x[{i}]", f"y[{i}]"))
@@ -364,7 +371,6 @@ class KernelEquations:
 
 
 _FRICTION_SIGN = sp.Symbol("friction_sign", real=True)
-_INPUT_CURVATURE = sp.Symbol("input_curvature", real=True)
 _EARLIER = sp.Symbol("earlier_input", real=True)
 
 

@@ -1,18 +1,18 @@
-"""How do effects enter a rig's equations? One walk along the signal path, which leaves an `EquationTree`.
+"""How do effects enter a rig's equations? One walk along its places, which leaves an `EquationTree`.
 
-The path is ``input -> delays -> static drive effects -> lags -> drive -> dynamics -> lateral displacement -> sensors ->
-delays of the sensors``.
+At a drive: ``signal -> delays -> static effects and lags -> generalized force``. At a joint: ``motion -> what stands between it
+and the spring -> spring -> what changes its torque``, other torques beside. At a sensor: ``reading -> effects -> delays``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from rigsight.effects import Effect
+from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
-from rigsight.rigs import Rig
+from rigsight.rigs import Drive, Joint, Rig, Sensor, acceleration, force_symbol, reading_symbol
 from rigsight.simulate.equation_tree import (
     Definition,
     EquationsOfMotion,
@@ -22,7 +22,7 @@ from rigsight.simulate.equation_tree import (
     Output,
     late,
 )
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+from rigsight.simulate.structure import TIME, input_symbols
 
 
 def equation_tree(
@@ -63,31 +63,27 @@ class _Binder:
         self._symbols = symbols
         self._unique = unique
         self._fixed = {name: sp.nsimplify(value) for name, value in fixed.items()}
-        self._rig_names = {p.name for p in (*rig.constants, *rig.parameters)}
-        motion = rig.motion
-        self.displacement = motion.displacement if rig.is_driven else INPUT
-        self.velocity = motion.velocity if rig.is_driven else INPUT_RATE
-        self.x = self.displacement - self.rig(motion.rest)
-        self.stiffness = self.rig(motion.stiffness)
-        self._canonical: dict[sp.Symbol, sp.Expr] = {
-            canonical.x: self.x,
-            canonical.v: self.velocity,
-            canonical.t: TIME,
-            canonical.k: self.stiffness,
+        mechanism = rig.mechanism
+        own: dict[sp.Symbol, sp.Expr] = {
+            sp.Symbol(p.name, real=True): symbols[p.name] for p in (*rig.constants, *rig.parameters)
         }
-        if motion.inertia is not None:
-            self._canonical[canonical.m] = self.rig(motion.inertia)
+        inputs = {name: input_symbols(index) for index, name in enumerate(mechanism.inputs)}
+        own |= {sp.Symbol(name, real=True): value for name, (value, _, _) in inputs.items()}
+        for coordinate in mechanism.prescribed:
+            moved = (coordinate.symbol, coordinate.rate, acceleration(coordinate))
+            own |= dict(zip(moved, inputs[str(coordinate.prescribed_by)], strict=True))
+        self._own = own
+        for symbol, expression in mechanism.signals.items():
+            own[symbol] = self.rig(expression)
 
     def rig(self, expression: sp.Expr) -> sp.Expr:
         """Bind an expression of the rig's declaration."""
-        return expression.xreplace(
-            {s: self._symbols[s.name] for s in expression.free_symbols if s.name in self._rig_names}
-        )
+        return expression.xreplace({s: self._own[s] for s in expression.free_symbols if s in self._own})
 
     def effect(self, effect: Effect, expression: sp.Expr, signals: Mapping[str, sp.Expr]) -> sp.Expr:
-        """Bind an expression of an effect; `signals` override canonical symbols by name."""
+        """Bind an expression of an effect; `signals` are what canonical symbols stand for, by name."""
         states = {state.symbol for state in effect.states}
-        replacement: dict[sp.Symbol, sp.Expr] = dict(self._canonical)
+        replacement: dict[sp.Symbol, sp.Expr] = {canonical.t: TIME}
         for symbol in expression.free_symbols:
             name = self._unique.get((effect.name, symbol.name))
             if symbol in states:
@@ -100,135 +96,212 @@ class _Binder:
 
 
 class _Path:
-    """Collects definitions and states while it follows the signals from the input to the sensors."""
+    """Collects definitions and states while it follows the signals from the inputs to the sensors."""
 
     def __init__(self, binder: _Binder, rig: Rig, effects: tuple[Effect, ...]) -> None:
         self._binder = binder
         self._rig = rig
         self._effects = effects
         self._definitions: list[Definition] = []
+        self._values: dict[sp.Symbol, sp.Expr] = {}
+        """What drives, sensors and joint forces are, by the symbols under which others read them."""
 
     def tree(self) -> EquationTree:
         """Walk the path."""
-        binder, rig, motion = self._binder, self._rig, self._rig.motion
-        drive, lags = self._drive(INPUT)
-        spring, memories = self._spring(binder.x, binder.velocity)
-        torques, more = self._torques()
-        memories += more
-        damping = binder.rig(motion.damping) * binder.velocity
-        bias = [] if motion.bias == 0 else [binder.rig(motion.bias)]
-        if motion.inertia is None:
-            return EquationTree(
-                inputs=(INPUT, INPUT_RATE),
-                definitions=tuple(self._definitions),
-                motion=EquationsOfMotion(),
-                states=tuple(memories),
-                outputs=(Output(rig.outputs[0].name, (damping, spring, *torques, *bias)),),
-            )
-        lateral = self._lateral()
-        reading, sensors = self._sensor(binder.displacement)
-        resisting = (-term for term in (damping, spring, *torques))
+        mechanism = self._rig.mechanism
+        drives = {drive.name: drive for drive in mechanism.drives}
+        sensors = {sensor.name: sensor for sensor in mechanism.sensors}
+        lags: list[FirstOrderState] = []
+        of_sensors: list[FirstOrderState] = []
+        memories: list[FirstOrderState] = []
+        readings: dict[str, tuple[sp.Expr, ...]] = {}
+        of_joints = {force_symbol(joint.name) for joint in mechanism.joints}
+        last = [
+            name
+            for name in mechanism.order
+            if name in sensors and sensors[name].reads.free_symbols & of_joints
+        ]
+        for name in mechanism.order:
+            if name in drives:
+                lags += self._drive(drives[name])
+            elif name not in last:
+                readings[name] = self._sensor(sensors[name], {}, of_sensors)
+        resisting = {joint.name: self._joint(joint, memories) for joint in mechanism.joints}
+        followers = self._followers()
+        for name in last:
+            readings[name] = self._sensor(sensors[name], resisting, of_sensors)
         return EquationTree(
-            inputs=(INPUT,),
+            inputs=self._inputs(),
             definitions=tuple(self._definitions),
-            motion=EquationsOfMotion(
-                coordinates=(motion.displacement,),
-                velocities=(motion.velocity,),
-                mass=sp.ImmutableMatrix([[binder.rig(motion.inertia)]]),
-                terms=((binder.rig(motion.drive_gain) * drive, *resisting, *bias),),
-            ),
-            states=(*lateral, *memories, *lags, *sensors),
-            outputs=(
-                Output(rig.outputs[0].name, (reading,)),
-                *(Output(state.symbol.name, (state.symbol,)) for state in lateral),
-            ),
+            motion=self._motion(resisting) if mechanism.free else EquationsOfMotion(),
+            states=(*followers, *memories, *lags, *of_sensors),
+            outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
         )
 
-    def _drive(self, source: sp.Symbol) -> tuple[sp.Symbol, list[FirstOrderState]]:
+    def _inputs(self) -> tuple[sp.Symbol, ...]:
+        mechanism, found = self._rig.mechanism, []
+        prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
+        for index, name in enumerate(mechanism.inputs):
+            value, rate, _ = input_symbols(index)
+            found += [value, rate] if name in prescribing else [value]
+        return tuple(found)
+
+    def _motion(self, resisting: Mapping[str, tuple[sp.Expr, ...]]) -> EquationsOfMotion:
+        """Return Lagrange's equations with the forces of drives and joints by virtual work."""
+        mechanism, free = self._rig.mechanism, self._rig.mechanism.free
+        terms: list[list[sp.Expr]] = [[] for _ in free]
+        for drive in mechanism.drives:
+            self._add(terms, drive.along, [self._bound(drive.force)])
+        for joint in mechanism.joints:
+            self._add(terms, joint.motion, [-term for term in resisting[joint.name]])
+        for own, force in zip(terms, mechanism.generalized_forces(), strict=True):
+            if force != 0:
+                own.append(self._bound(force))
+        return EquationsOfMotion(
+            coordinates=tuple(c.symbol for c in free),
+            velocities=tuple(c.rate for c in free),
+            mass=sp.ImmutableMatrix(mechanism.mass_matrix.applyfunc(self._bound)),
+            terms=tuple(map(tuple, terms)),
+        )
+
+    def _add(self, terms: Sequence[list[sp.Expr]], along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
+        for own, coordinate in zip(terms, self._rig.mechanism.free, strict=True):
+            slope = self._bound(sp.diff(along, coordinate.symbol))
+            own += [slope * force for force in forces if slope != 0]
+
+    def _bound(self, expression: sp.Expr) -> sp.Expr:
+        """Bind an expression of the rig, drives and sensors as they are behind their effects."""
+        return self._binder.rig(expression).xreplace(self._values)
+
+    def _at(self, place: str, *kinds: Place) -> list[Effect]:
+        return [e for e in self._effects if e.place in kinds and self._rig.acts_at(e) == place]
+
+    def _drive(self, drive: Drive) -> list[FirstOrderState]:
         """Chain the actuator effects: what is static or a lag may as well act on what is late already."""
-        lags: list[FirstOrderState] = []
-        for effect in self._effects:
+        source, lags = self._bound(drive.signal), []
+        effects = self._at(drive.name, Place.ACTUATOR)
+        for effect in effects:
             if effect.delay is not None:
-                source = self._define(
-                    Kind.DRIVE, effect, late(source, self._binder.effect(effect, effect.delay, {}))
-                )
-        for effect in self._effects:
+                delay = self._binder.effect(effect, effect.delay, self._of_motion())
+                source = self._define(Kind.DRIVE, effect, late(source, delay))
+        for effect in effects:
             if effect.drive is not None:
-                signals = {"u": source}
+                signals = {**self._of_motion(), "u": source}
                 lags += self._states(effect, signals)
                 source = self._define(Kind.DRIVE, effect, self._binder.effect(effect, effect.drive, signals))
-        return source, lags
+        self._values[sp.Symbol(drive.name, real=True)] = source
+        return lags
 
-    def _spring(self, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr, list[FirstOrderState]]:
+    def _joint(self, joint: Joint, memories: list[FirstOrderState]) -> tuple[sp.Expr, ...]:
+        """Return the forces that resist the motion of a joint; the states of its effects are appended."""
+        signals = self._signals(joint)
+        effects = self._at(joint.name, Place.DYNAMICS, Place.DISTURBANCE)
+        spring = self._spring(effects, signals, memories)
+        torques = []
+        for effect in effects:
+            if effect.torque is not None:
+                torques.append(
+                    self._define(Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals))
+                )
+                memories += self._states(effect, signals)
+        damping, force = self._bound(joint.damping) * signals["v"], self._bound(joint.force)
+        return tuple(term for term in (damping, spring, *torques, force) if term != 0)
+
+    def _signals(self, joint: Joint) -> dict[str, sp.Expr]:
+        """Return what effects read of the motion of a joint."""
+        mechanism = self._rig.mechanism
+        x = self._bound(joint.motion) - self._bound(joint.rest)
+        signals = {"x": x, "v": self._bound(mechanism.rate(joint.motion)), "k": self._bound(joint.stiffness)}
+        inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)
+        if inertia is not None:
+            signals["m"] = self._bound(inertia)
+        return signals
+
+    def _of_motion(self) -> dict[str, sp.Expr]:
+        """Return what effects at a drive, a sensor or a state read of the motion: that of the first joint."""
+        return self._signals(self._rig.mechanism.joints[0])
+
+    def _spring(
+        self, effects: Sequence[Effect], signals: Mapping[str, sp.Expr], memories: list[FirstOrderState]
+    ) -> sp.Expr:
         """Chain what stands between displacement and spring, then what changes the spring's torque."""
-        memories: list[FirstOrderState] = []
-        for effect in self._effects:
+        deflection, rate = signals["x"], signals["v"]
+        for effect in effects:
             if effect.deflection is not None:
-                own = self._states(effect, {"x": deflection, "v": rate})
+                own = self._states(effect, {**signals, "x": deflection, "v": rate})
                 before = sp.Symbol("deflection_before", real=True)
-                after = self._binder.effect(effect, effect.deflection, {"x": before})
+                after = self._binder.effect(effect, effect.deflection, {**signals, "x": before})
                 rate = sp.diff(after, before).xreplace({before: deflection}) * rate + sum(
                     (sp.diff(after, state.symbol) * state.limited_rate for state in own), start=sp.Integer(0)
                 )
                 deflection = self._define(Kind.DEFLECTION, effect, after.xreplace({before: deflection}))
                 rate = self._define(Kind.DEFLECTION_RATE, effect, rate, rate_of=deflection)
                 memories += own
-        torque = self._binder.stiffness * deflection
-        for effect in self._effects:
+        torque = signals["k"] * deflection
+        for effect in effects:
             if effect.spring is not None:
-                signals = {"spring_torque": torque, "deflection": deflection, "deflection_rate": rate}
+                chained = {
+                    **signals,
+                    "spring_torque": torque,
+                    "deflection": deflection,
+                    "deflection_rate": rate,
+                }
                 torque = self._define(
-                    Kind.SPRING, effect, self._binder.effect(effect, effect.spring, signals)
+                    Kind.SPRING, effect, self._binder.effect(effect, effect.spring, chained)
                 )
-                memories += self._states(effect, signals)
-        return torque, memories
+                memories += self._states(effect, chained)
+        return torque
 
-    def _torques(self) -> tuple[list[sp.Symbol], list[FirstOrderState]]:
-        torques: list[sp.Symbol] = []
-        memories: list[FirstOrderState] = []
-        for effect in self._effects:
-            if effect.torque is not None:
-                torques.append(
-                    self._define(Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, {}))
+    def _followers(self) -> list[FirstOrderState]:
+        """Return the rig's own states; effects change the rate of the one that follows the motion."""
+        follower, found = self._rig.follower, []
+        for state in self._rig.mechanism.states:
+            if follower is None or state.symbol != follower.symbol:
+                found.append(FirstOrderState(state.symbol, (self._bound(state.rate),), "", None, None))
+                continue
+            signals = {
+                **self._of_motion(),
+                "creepage": self._bound(follower.creepage),
+                "creep_gain": self._bound(follower.gain),
+                "lateral_displacement": self._bound(follower.displacement),
+                "lateral_feedback": self._bound(follower.feedback),
+            }
+            linear = signals["creep_gain"] * signals["creepage"]
+            # Each effect gives the whole rate; two of them add up what each takes off the linear one.
+            changes = [
+                self._define(
+                    Kind.LATERAL, effect, self._binder.effect(effect, effect.lateral, signals) - linear
                 )
-                memories += self._states(effect, {})
-        return torques, memories
+                for effect in self._effects
+                if effect.lateral is not None
+            ]
+            found.append(FirstOrderState(state.symbol, (linear, *changes), "length", None, None))
+        return found
 
-    def _lateral(self) -> list[FirstOrderState]:
-        """Return the lateral displacement that the motion drives, if the rig has one."""
-        lateral, binder = self._rig.lateral, self._binder
-        if lateral is None:
-            return []
-        signals = {
-            "creepage": binder.rig(lateral.creepage),
-            "creep_gain": binder.rig(lateral.gain),
-            "lateral_displacement": binder.rig(lateral.displacement),
-            "lateral_feedback": binder.rig(lateral.feedback),
-        }
-        linear = signals["creep_gain"] * signals["creepage"]
-        # Each effect gives the whole rate; two of them add up what each takes off the linear one.
-        changes = [
-            self._define(Kind.LATERAL, effect, binder.effect(effect, effect.lateral, signals) - linear)
-            for effect in self._effects
-            if effect.lateral is not None
-        ]
-        return [FirstOrderState(lateral.symbol, (linear, *changes), "length", None, None)]
-
-    def _sensor(self, reading: sp.Symbol) -> tuple[sp.Symbol, list[FirstOrderState]]:
+    def _sensor(
+        self, sensor: Sensor, resisting: Mapping[str, tuple[sp.Expr, ...]], states: list[FirstOrderState]
+    ) -> tuple[sp.Expr, ...]:
         """Chain the sensor effects: the delays come last, as nothing inside the simulation waits for them."""
-        states: list[FirstOrderState] = []
-        for effect in self._effects:
+        effects = self._at(sensor.name, Place.SENSOR)
+        forces = {force_symbol(name): terms for name, terms in resisting.items()}
+        if not effects and sensor.reads in forces:
+            return forces[sensor.reads]
+        reading = self._bound(sensor.reads).xreplace(
+            {force: sp.Add(*terms) for force, terms in forces.items()}
+        )
+        for effect in effects:
             if effect.measured is not None:
-                signals = {"reading": reading}
+                signals = {**self._of_motion(), "reading": reading}
                 states += self._states(effect, signals)
                 reading = self._define(
                     Kind.READING, effect, self._binder.effect(effect, effect.measured, signals)
                 )
-        for effect in self._effects:
+        for effect in effects:
             if effect.measured_late is not None:
-                delay = self._binder.effect(effect, effect.measured_late, {})
+                delay = self._binder.effect(effect, effect.measured_late, self._of_motion())
                 reading = self._define(Kind.READING, effect, late(reading, delay))
-        return reading, states
+        self._values[reading_symbol(sensor.name)] = reading
+        return (reading,)
 
     def _define(
         self, kind: Kind, effect: Effect, expression: sp.Expr, rate_of: sp.Symbol | None = None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError, SimulationError
 from rigsight.records.record import Record
 from rigsight.simulate.composition import without_vanished_effects
-from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion
+from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
 from rigsight.simulate.kernel import FittedRecord
 from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -42,10 +42,16 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
 
     Where the motion is prescribed, it is the smoothing spline through the measured displacement.
     """
-    signal = record[structure.rig.inputs[0].name]
-    if structure.rig.is_driven:
-        return hold_input(signal, record.dt, record.hold)
-    return hold_motion(*smooth_motion(signal, record.dt), record.dt)
+    mechanism = structure.rig.mechanism
+    prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
+    return together(
+        [
+            hold_motion(*smooth_motion(record[name], record.dt), record.dt)
+            if name in prescribing
+            else hold_input(record[name], record.dt, record.hold)
+            for name in mechanism.inputs
+        ]
+    )
 
 
 def simulate(

@@ -15,7 +15,19 @@ from rigsight.simulate.equation_tree import EquationTree, late, rate_within
 
 INPUT = sp.Symbol("input_value", real=True)
 INPUT_RATE = sp.Symbol("input_rate", real=True)
+INPUT_CURVATURE = sp.Symbol("input_curvature", real=True)
+"""The first input of a rig, and its first and second derivative by time."""
 TIME = sp.Symbol("time", real=True)
+
+
+def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
+    """Return the symbols of one of a rig's inputs, of its first and of its second derivative by time."""
+    if index == 0:
+        return INPUT, INPUT_RATE, INPUT_CURVATURE
+    value, rate, curvature = (
+        sp.Symbol(f"{s.name}_{index}", real=True) for s in (INPUT, INPUT_RATE, INPUT_CURVATURE)
+    )
+    return value, rate, curvature
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,6 @@ _SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
 _RATES_APART = 100.0
 """Ratio of sample times from which they are asked about."""
 NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
-# What an alternative parameter determines, and so must not be given beside.
-DETERMINES = {"delta_0": "c_y"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +251,7 @@ def _parameters(where: str, structure: Structure, given: Mapping[str, float]) ->
                     f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
                 )
             checked[parameter.name] = parameter.default
-    for alternative, determined in DETERMINES.items():
+    for alternative, determined in ((a.parameter.name, a.gives) for a in rig.alternatives):
         if alternative in checked and determined in checked:
             raise InputError(
                 f"{where}: rig.parameters.{alternative}: stands beside {determined}, which it determines; "

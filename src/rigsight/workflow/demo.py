@@ -147,8 +147,9 @@ def _csv_text(record: Record) -> str:
 def _campaign_toml(given: PublishedSet) -> str:
     constants = "\n".join(f"{name} = {value!r}" for name, value in given.constants.items())
     numbers = {**given.parameters, **given.given}
-    if "delta_0" in given.given:
-        del numbers["c_y"]
+    for alternative in RUNNING_GEAR.alternatives:
+        if alternative.parameter.name in given.given:
+            del numbers[alternative.gives]
     for own in _GIVEN_EFFECTS.values():
         numbers |= own
     parameters = "\n".join(f"{name} = {value!r}" for name, value in numbers.items())

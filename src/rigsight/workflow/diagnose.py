@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 from rigsight.diagnose import Diagnosis, Task, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
-from rigsight.rigs.running_gear import creep_factor
 from rigsight.workflow.campaign import Campaign, read_campaign
 from rigsight.workflow.fit_journal import FitJournal
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
@@ -142,9 +141,7 @@ def _tell_going_on(count: int, listener: Listener) -> None:
 
 def task_of(campaign: Campaign) -> Task:
     """Return what a campaign asks to be diagnosed, with alternative parameters turned into the rig's own."""
-    given = dict(campaign.parameters)
-    if "delta_0" in given:
-        given["c_y"] = creep_factor(given.pop("delta_0"), campaign.constants["r_0"], campaign.constants["b"])
+    given = campaign.rig.in_own_parameters(campaign.parameters, campaign.constants)
     return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records, campaign.modelled)
 
 

@@ -18,8 +18,7 @@ from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
-from rigsight.rigs.rig import Signal
+from rigsight.rigs import AXIS, RUNNING_GEAR, Rig, Signal
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 

@@ -1,0 +1,53 @@
+"""One effect at one of several places of a rig: ``coulomb_friction@load_bearing``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+from rigsight.effects.effect import Effect, Start
+
+AT = "@"
+
+
+def placed(effect: Effect, place: str) -> Effect:
+    """Return an effect that acts at a named joint, drive or sensor; equal arguments give the same object.
+
+    Effects that it contains as special cases stand at the same place.
+
+    Parameters
+    ----------
+    effect
+        An effect of no place.
+    place
+        Name of the joint, drive, sensor or state.
+    """
+    return _placed(_Same(effect), place)
+
+
+class _Same:
+    """Lets declarations, which hold dictionaries and so cannot be hashed, be keys of a cache by identity."""
+
+    def __init__(self, effect: Effect) -> None:
+        self.effect = effect
+
+    def __hash__(self) -> int:
+        return id(self.effect)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.effect is other.effect
+
+
+@cache
+def _placed(same: _Same, place: str) -> Effect:
+    effect = same.effect
+    starts = tuple(
+        start if start.parent is None else Start(start.values, f"{start.parent}{AT}{place}")
+        for start in effect.starts
+    )
+    return replace(effect, name=f"{effect.name}{AT}{place}", at=place, starts=starts)
+
+
+def kind_of(name: str) -> str:
+    """Return the name of an effect without its place."""
+    return name.partition(AT)[0]

@@ -1,0 +1,248 @@
+"""What is a rig made of? Coordinates and energies, and the joints, drives, sensors and states that act on them or read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import sympy as sp
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A degree of freedom, or a motion that an input prescribes.
+
+    Attributes
+    ----------
+    symbol, rate
+        The coordinate and its time derivative.
+    unit
+        Its SI unit.
+    prescribed_by
+        Name of the input that it follows; None for a degree of freedom.
+    about
+        What it is.
+    """
+
+    symbol: sp.Symbol
+    rate: sp.Symbol
+    unit: str
+    prescribed_by: str | None = None
+    about: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return str(self.symbol.name)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A place where effects of the dynamics act: a motion, and what resists it.
+
+    ``resisting force = stiffness * (motion - rest) + damping * d(motion) + force``
+
+    Attributes
+    ----------
+    name
+        Its name.
+    motion
+        Expression of the coordinates.
+    stiffness, damping, rest
+        Expressions of parameters and constants.
+    force
+        What else resists: constant, or a known law.
+    inertia
+        Inertia that moves with it; None for what the kinetic energy gives.
+    about
+        What it is.
+    """
+
+    name: str
+    motion: sp.Expr
+    stiffness: sp.Expr = sp.S.Zero
+    damping: sp.Expr = sp.S.Zero
+    rest: sp.Expr = sp.S.Zero
+    force: sp.Expr = sp.S.Zero
+    inertia: sp.Expr | None = None
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A place where effects of the actuator act: on the value of a signal, from which a generalized force follows.
+
+    Attributes
+    ----------
+    name
+        Its name, and that of its signal behind the effects.
+    signal
+        What it is told: an input, or a control law.
+    force
+        Expression of its own name and others.
+    along
+        Expression of the coordinates along which the force acts.
+    about
+        What it is.
+    """
+
+    name: str
+    signal: sp.Expr
+    force: sp.Expr
+    along: sp.Expr
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A place where effects of the sensor act, and a column of a record.
+
+    Attributes
+    ----------
+    name
+        Its name, and that of its reading in control laws.
+    reads
+        What an ideal one shows.
+    unit
+        SI unit.
+    about
+        What it is.
+    """
+
+    name: str
+    reads: sp.Expr
+    unit: str
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class RateState:
+    """A first-order state: a filter, an integrator, a pressure.
+
+    Attributes
+    ----------
+    symbol
+        The state.
+    rate
+        Its time derivative.
+    unit
+        SI unit.
+    start
+        Its value at the start of a record.
+    about
+        What it is.
+    """
+
+    symbol: sp.Symbol
+    rate: sp.Expr
+    unit: str
+    start: sp.Expr = sp.S.Zero
+    about: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return str(self.symbol.name)
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """The equations of a rig without effects, as declared.
+
+    Attributes
+    ----------
+    inputs
+        Names of the recorded signals that drive it.
+    coordinates, kinetic, potential
+        Degrees of freedom and energies.
+    joints, drives, sensors, states
+        What acts on the motion, and what reads it.
+    signals
+        Named values in an order in which each reads only those in front of it; drives and sensors are read by their names.
+    initial
+        Start values of coordinates, rates and states by symbol, where they are not those of rest.
+    order
+        Names of drives and sensors in an order in which none reads one behind it.
+    """
+
+    inputs: tuple[str, ...]
+    coordinates: tuple[Coordinate, ...]
+    kinetic: sp.Expr
+    potential: sp.Expr
+    joints: tuple[Joint, ...]
+    drives: tuple[Drive, ...]
+    sensors: tuple[Sensor, ...]
+    states: tuple[RateState, ...] = ()
+    signals: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    initial: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
+
+    @property
+    def free(self) -> tuple[Coordinate, ...]:
+        """The degrees of freedom."""
+        return tuple(c for c in self.coordinates if c.prescribed_by is None)
+
+    @property
+    def prescribed(self) -> tuple[Coordinate, ...]:
+        """The coordinates whose motion an input prescribes."""
+        return tuple(c for c in self.coordinates if c.prescribed_by is not None)
+
+    @cached_property
+    def mass_matrix(self) -> sp.ImmutableMatrix:
+        """``d^2 T / d q' d q'`` of the degrees of freedom, shape (n, n)."""
+        if not self.free:
+            return sp.ImmutableMatrix(0, 0, [])
+        return sp.ImmutableMatrix(
+            sp.hessian(self.kinetic, [c.rate for c in self.free]).applyfunc(sp.simplify)
+        )
+
+    def generalized_forces(self) -> tuple[sp.Expr, ...]:
+        """Return what the energies contribute to ``mass_matrix @ q'' = ...``, one for each degree of freedom.
+
+        By Lagrange's equations ``d/dt dT/dq' - dT/dq + dV/dq = Q``, the part with the accelerations on the other side. The
+        acceleration of a prescribed coordinate is the symbol ``dd(NAME)``.
+        """
+        forces = []
+        for coordinate in self.free:
+            momentum = sp.diff(self.kinetic, coordinate.rate)
+            along = sum((sp.diff(momentum, c.symbol) * c.rate for c in self.coordinates), start=sp.Integer(0))
+            along += sum(
+                (sp.diff(momentum, c.rate) * acceleration(c) for c in self.prescribed), start=sp.Integer(0)
+            )
+            lagrangian = sp.diff(self.kinetic - self.potential, coordinate.symbol)
+            forces.append(sp.simplify(lagrangian - along))
+        return tuple(forces)
+
+    def rate(self, expression: sp.Expr) -> sp.Expr:
+        """Return the time derivative of an expression of the coordinates."""
+        return sum((sp.diff(expression, c.symbol) * c.rate for c in self.coordinates), start=sp.Integer(0))
+
+    def inertia_along(self, expression: sp.Expr) -> sp.Expr | None:
+        """Return the inertia that a force along an expression of the coordinates moves; None where it moves nothing.
+
+        ``1 / (J M^-1 J^T)`` with the slopes J of the expression: O. Khatib, IEEE J. Robot. Autom. 3 (1987) 43.
+        """
+        slopes = sp.Matrix([[sp.diff(expression, c.symbol) for c in self.free]])
+        if all(slope == 0 for slope in slopes):
+            return None
+        mobility = (slopes * self.mass_matrix.LUsolve(slopes.T))[0, 0]
+        return sp.simplify(1 / mobility)
+
+
+def acceleration(coordinate: Coordinate) -> sp.Symbol:
+    """Return the symbol of the second time derivative of a prescribed coordinate."""
+    return sp.Symbol(f"dd({coordinate.name})", real=True)
+
+
+READING = "reading of "
+
+
+def reading_symbol(name: str) -> sp.Symbol:
+    """Return the symbol of what a sensor shows, where a control law reads it."""
+    return sp.Symbol(f"{READING}{name}", real=True)
+
+
+def force_symbol(name: str) -> sp.Symbol:
+    """Return the symbol of all that a joint resists with, where a sensor reads it."""
+    return sp.Symbol(f"force({name})", real=True)

@@ -1,0 +1,126 @@
+"""What may stand in a rig file: its tables and their keys, before any expression is read."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from rigsight.errors import nearest, shown
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Text = Annotated[str, Field(max_length=5000)]
+Formula = Text | Number
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class _InputTable(_Table):
+    unit: Text
+    about: Text = ""
+
+
+class ConstantTable(_Table):
+    """``[constants.NAME]``: a known number."""
+
+    unit: Text
+    about: Text = ""
+    lower: Number | None = None
+    upper: Number | None = None
+    default: Number | None = None
+
+
+class ParameterTable(ConstantTable):
+    """``[parameters.NAME]``: a number to identify."""
+
+    log: bool = False
+
+
+class _AlternativeTable(ConstantTable):
+    gives: Text
+    value: Formula
+
+
+class _CoordinateTable(_Table):
+    unit: Text
+    about: Text = ""
+    prescribed_by: Text | None = None
+    rate: Text | None = None
+
+
+class _EnergyTable(_Table):
+    kinetic: Formula = 0.0
+    potential: Formula = 0.0
+
+
+class _JointTable(_Table):
+    motion: Formula
+    stiffness: Formula = 0.0
+    damping: Formula = 0.0
+    rest: Formula = 0.0
+    force: Formula = 0.0
+    inertia: Formula | None = None
+    about: Text = ""
+
+
+class _DriveTable(_Table):
+    signal: Formula
+    force: Formula
+    along: Formula
+    about: Text = ""
+
+
+class _SensorTable(_Table):
+    reads: Formula
+    unit: Text
+    about: Text = ""
+
+
+class _StateTable(_Table):
+    rate: Formula
+    unit: Text
+    start: Formula = 0.0
+    about: Text = ""
+
+
+class RigTable(_Table):
+    """The whole file."""
+
+    name: Text
+    summary: Text = ""
+    inputs: dict[str, _InputTable] = {}
+    constants: dict[str, ConstantTable] = {}
+    parameters: dict[str, ParameterTable] = {}
+    alternatives: dict[str, _AlternativeTable] = {}
+    coordinates: dict[str, _CoordinateTable] = {}
+    energy: _EnergyTable = _EnergyTable()
+    joints: dict[str, _JointTable] = {}
+    drives: dict[str, _DriveTable] = {}
+    sensors: dict[str, _SensorTable] = {}
+    states: dict[str, _StateTable] = {}
+    signals: dict[str, Formula] = {}
+    initial: dict[str, Formula] = {}
+
+
+def told(error: Any) -> str:
+    """Return one sentence for what pydantic found."""
+    key = str(error["loc"][-1]) if error["loc"] else ""
+    if error["type"] == "extra_forbidden":
+        allowed = _keys_at(error["loc"][:-1])
+        return f"'{key}' is not a key of this table.{nearest(key, allowed)} Allowed: {', '.join(allowed)}"
+    if error["type"] == "missing":
+        return f"'{key}' is missing"
+    return f"{error['msg']}, got {shown(error.get('input'))}"
+
+
+def _keys_at(path: tuple[str | int, ...]) -> list[str]:
+    table: type[_Table] = RigTable
+    tables: dict[str, type[_Table]] = {
+        "inputs": _InputTable, "constants": ConstantTable, "parameters": ParameterTable, "coordinates": _CoordinateTable,
+        "joints": _JointTable, "drives": _DriveTable, "sensors": _SensorTable, "states": _StateTable, "energy": _EnergyTable,
+    }  # fmt: skip
+    if path:
+        table = tables.get(str(path[0]), RigTable)
+    return list(table.model_fields)

@@ -1,0 +1,79 @@
+"""At which line and column of a TOML file does the value of a key stand? tomllib does not say."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+
+Path = tuple[str | int, ...]
+Place = tuple[int, int]
+
+_HEADER = re.compile(r"\s*(\[\[?)([^\[\]]+)\]\]?\s*(?:#.*)?")
+_KEY = re.compile(
+    r"""\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=\s*"""
+)
+_INNER = re.compile(r"""[{,]\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))\s*=\s*""")
+_QUOTED = re.compile(r'"(?:[^"\\]|\\.)*"|' r"'[^']*'")
+
+
+def value_places(text: str) -> dict[Path, Place]:
+    """Return the line and column, from 1, of every value by its path of keys, and of every table's header by its own.
+
+    Values within arrays have no place of their own.
+
+    Parameters
+    ----------
+    text
+        Valid TOML.
+    """
+    places: dict[Path, Place] = {}
+    table: Path = ()
+    lists: dict[Path, int] = {}
+    for number, line in _outside_long_strings(text):
+        header = _HEADER.fullmatch(line)
+        if header:
+            table = _keys(header[2])
+            if header[1] == "[[":
+                lists[table] = lists.get(table, -1) + 1
+                table = (*table, lists[table])
+            places.setdefault(table, (number, line.index("[") + 1))
+            continue
+        key = _KEY.match(line)
+        if key is None:
+            continue
+        path = (*table, *_keys(key[1]))
+        places[path] = (number, key.end() + 1)
+        if line[key.end() : key.end() + 1] == "{":
+            # What stands in quotes may look like a key.
+            plain = _QUOTED.sub(
+                lambda quoted: quoted[0][0] + "_" * (len(quoted[0]) - 2) + quoted[0][-1], line
+            )
+            for inner in _INNER.finditer(plain, key.end()):
+                places[(*path, *_keys(line[inner.start(1) : inner.end(1)]))] = (number, inner.end() + 1)
+    return places
+
+
+def _keys(written: str) -> Path:
+    try:
+        content = tomllib.loads(f"{written} = 0")
+    except tomllib.TOMLDecodeError:
+        return (written.strip(),)
+    keys: list[str | int] = []
+    inner: object = content
+    while isinstance(inner, dict):
+        key, inner = next(iter(inner.items()))
+        keys.append(key)
+    return tuple(keys)
+
+
+def _outside_long_strings(text: str) -> Iterator[tuple[int, str]]:
+    fence = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if fence:
+            fence = "" if fence in line else fence
+            continue
+        yield number, line
+        for mark in ('"""', "'''"):
+            if line.count(mark) % 2:
+                fence = mark

@@ -1,0 +1,31 @@
+"""``rigsight rigs`` lists what comes with rigsight, and prints files that can be copied and changed."""
+
+from __future__ import annotations
+
+import json
+
+from rigsight.rigs.rig_file import rig_of_text
+
+
+def test_rigs_are_listed(run) -> None:
+    code, stdout, _ = run("rigs")
+    assert code == 0
+    assert [line.split()[0] for line in stdout.splitlines()] == ["axis", "element", "running_gear"]
+    assert [rig["name"] for rig in json.loads(run("rigs", "--json")[1])["rigs"]] == [
+        "axis",
+        "element",
+        "running_gear",
+    ]
+
+
+def test_the_file_of_a_rig_is_printed_as_it_can_be_read(run) -> None:
+    code, stdout, _ = run("rigs", "axis")
+    assert code == 0
+    assert rig_of_text(stdout).name == "axis"
+    assert json.loads(run("rigs", "axis", "--json")[1])["file"] == stdout
+
+
+def test_a_rig_that_there_is_not_is_one_message(run) -> None:
+    code, stdout, stderr = run("rigs", "axes")
+    assert (code, stdout) == (2, "")
+    assert "Did you mean 'axis'?" in stderr
