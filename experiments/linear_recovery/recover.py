@@ -36,7 +36,7 @@ from rigsight.identify import (
 )
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.running_gear import creep_factor
+from rigsight.rigs.conicity import creep_factor
 from rigsight.simulate import compose
 
 Array = NDArray[np.float64]
