@@ -1,4 +1,8 @@
-"""Units and characteristic scales of products of powers, written once as ``"force x^-3"``."""
+"""Units and characteristic scales of products of powers, written once as ``"force x^-3"``.
+
+A rig of several joints has a force and a motion at each: ``"force@shaft x@shaft^-3"``. The size of a number that is no product of
+powers of these (a parameter, a coordinate, a state of such a rig) is a base quantity of its own, ``"size@J_m"``.
+"""
 
 from __future__ import annotations
 
@@ -47,6 +51,27 @@ def unit_text(dimension: str, units: Mapping[str, str]) -> str:
         return " ".join(above) or DIMENSIONLESS
     denominator = below[0] if len(below) == 1 and " " not in below[0] else f"({' '.join(below)})"
     return f"{' '.join(above) or '1'}/{denominator}"
+
+
+def at_place(dimension: str, place: str) -> str:
+    """Return a dimension whose base quantities are those at a place: ``"force@shaft x@shaft^-1"``.
+
+    Parameters
+    ----------
+    dimension
+        Product of powers of base quantities, see `parse_dimension`.
+    place
+        Name of a joint, drive or sensor.
+    """
+    return " ".join(
+        f"{base}@{place}^{exponent}" if exponent != 1 else f"{base}@{place}"
+        for base, exponent in parse_dimension(dimension).items()
+    )
+
+
+def size_of(name: str) -> str:
+    """Return the dimension of a number whose size is known by its name alone, see `at_place`."""
+    return f"size@{name}"
 
 
 def characteristic_value(dimension: str, scales: Mapping[str, float]) -> float:

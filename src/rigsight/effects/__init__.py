@@ -12,6 +12,7 @@ from rigsight.effects.effect import State as State
 from rigsight.effects.effect import SumAndDifference as SumAndDifference
 from rigsight.effects.placed import kind_of as kind_of
 from rigsight.effects.placed import placed as placed
+from rigsight.effects.placed import placed_dimension as placed_dimension
 
 __all__ = [
     "CATALOGUE",
@@ -26,4 +27,5 @@ __all__ = [
     "effect_named",
     "kind_of",
     "placed",
+    "placed_dimension",
 ]

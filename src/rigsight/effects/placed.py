@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 from rigsight.effects.effect import Effect, Start
+from rigsight.units import at_place
 
 AT = "@"
 
@@ -51,3 +52,8 @@ def _placed(same: _Same, place: str) -> Effect:
 def kind_of(name: str) -> str:
     """Return the name of an effect without its place."""
     return name.partition(AT)[0]
+
+
+def placed_dimension(effect: Effect, dimension: str) -> str:
+    """Return the dimension of a parameter or state of an effect, at its place if it has one."""
+    return dimension if effect.at is None else at_place(dimension, effect.at)

@@ -189,6 +189,43 @@ class Mechanism:
         return tuple(c for c in self.coordinates if c.prescribed_by is not None)
 
     @cached_property
+    def has_one_motion(self) -> bool:
+        """True for one joint along the one coordinate, moved by one input or following it, without feedback.
+
+        Then ``inertia * x'' = gain * u + bias - stiffness * (x - rest) - damping * x'`` says it all, or, of a prescribed motion, what
+        its joint resists with.
+        """
+        if not len(self.coordinates) == len(self.joints) == len(self.inputs) == 1 or self.potential != 0:
+            return False
+        (coordinate,), (joint,) = self.coordinates, self.joints
+        moving = {coordinate.symbol, coordinate.rate, *(state.symbol for state in self.states)}
+        if joint.motion != coordinate.symbol or (joint.force.free_symbols & moving) or not self.sensors:
+            return False
+        if not self.free:
+            return not self.drives and self.sensors[0].reads == force_symbol(joint.name)
+        return (
+            len(self.drives) == 1
+            and self._is_plain(self.drives[0])
+            and self.drives[0].along == coordinate.symbol
+            and self.sensors[0].reads == coordinate.symbol
+            and not self.mass_matrix.free_symbols & moving
+        )
+
+    def _is_plain(self, drive: Drive) -> bool:
+        """Return True for a drive that is told an input, and whose force goes with it by a constant gain."""
+        own = sp.Symbol(drive.name, real=True)
+        gain = sp.diff(drive.force, own)
+        read = gain.free_symbols | {own, *drive.signal.free_symbols}
+        moving = {c.symbol for c in self.coordinates} | {c.rate for c in self.coordinates}
+        moving |= {state.symbol for state in self.states} | set(self.signals)
+        return (
+            drive.signal == sp.Symbol(self.inputs[0], real=True)
+            and sp.expand(drive.force - gain * own) == 0
+            and own not in gain.free_symbols
+            and not read & moving
+        )
+
+    @cached_property
     def mass_matrix(self) -> sp.ImmutableMatrix:
         """``d^2 T / d q' d q'`` of the degrees of freedom, shape (n, n)."""
         if not self.free:

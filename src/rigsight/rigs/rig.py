@@ -149,19 +149,10 @@ class Rig:
         """True if an input moves a mass, False if the motion is prescribed."""
         return bool(self.mechanism.free)
 
-    @cached_property
+    @property
     def has_one_motion(self) -> bool:
-        """True for one joint along the one coordinate, one input, no other force and no feedback: `motion` says it all."""
-        mechanism = self.mechanism
-        if len(mechanism.coordinates) != 1 or len(mechanism.joints) != 1 or len(mechanism.inputs) != 1:
-            return False
-        told = {sp.Symbol(name, real=True) for name in mechanism.inputs}
-        return (
-            mechanism.potential == 0
-            and mechanism.joints[0].motion == mechanism.coordinates[0].symbol
-            and not mechanism.mass_matrix.free_symbols & {mechanism.coordinates[0].symbol}
-            and [drive.signal in told for drive in mechanism.drives] in ([], [True])
-        )
+        """True if `motion` says all there is to say, see `Mechanism.has_one_motion`."""
+        return self.mechanism.has_one_motion
 
     @cached_property
     def motion(self) -> Motion:
@@ -170,11 +161,11 @@ class Rig:
         Raises
         ------
         ValueError
-            If the rig has several joints or coordinates.
+            If the rig is more than that, see `has_one_motion`.
         """
         mechanism = self.mechanism
-        if len(mechanism.coordinates) != 1 or len(mechanism.joints) != 1:
-            raise ValueError(f"{self.name} has several joints or coordinates.")
+        if not self.has_one_motion:
+            raise ValueError(f"{self.name} is more than one mass, or more than one element.")
         (coordinate,), (joint,) = mechanism.coordinates, mechanism.joints
         drive_gain, inertia = sp.S.Zero, None
         if mechanism.free:
@@ -225,13 +216,15 @@ class Rig:
         Parameters
         ----------
         place
-            Its name; at a drive or sensor x and force are those of the first joint.
+            Its name; at a drive x and force are those of the first joint, at a sensor x is what it reads.
         """
         mechanism = self.mechanism
         joint = next((joint for joint in mechanism.joints if joint.name == place), mechanism.joints[0])
         coordinates = [c for c in mechanism.coordinates if c.symbol in joint.motion.free_symbols]
         x = coordinates[0].unit if coordinates else "1"
-        units = {"x": x, "force": "N m" if x == "rad" else "N", "time": "s"}
+        force = {"rad": "N m", "m": "N"}.get(x, f"J/{x}" if " " not in x else f"J/({x})")
+        reading = next((sensor.unit for sensor in mechanism.sensors if sensor.name == place), x)
+        units = {"x": reading, "force": force, "time": "s"}
         if self.is_driven and self.inputs:
             drive = next((drive for drive in mechanism.drives if drive.name == place), None)
             source = drive.signal if drive is not None else sp.Symbol(self.inputs[0].name, real=True)

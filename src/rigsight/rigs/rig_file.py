@@ -41,6 +41,7 @@ from rigsight.rigs.rig_tables import ConstantTable, ParameterTable, RigTable, to
 from rigsight.rigs.roles import sized_by
 from rigsight.rigs.signal import Signal
 from rigsight.rigs.toml_places import value_places
+from rigsight.units import size_of
 
 LARGEST_FILE = 1_000_000
 _LONGEST_NAME = 60
@@ -136,7 +137,12 @@ class _Reader:
                 self._parameter("constants", name, own, "") for name, own in table.constants.items()
             ),
             parameters=tuple(
-                self._parameter("parameters", name, own, sized_by(name, own.unit, mechanism))
+                self._parameter(
+                    "parameters",
+                    name,
+                    own,
+                    sized_by(name, own.unit, mechanism) if mechanism.has_one_motion else size_of(name),
+                )
                 for name, own in table.parameters.items()
             ),
             mechanism=mechanism,

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from rigsight.effects import Effect
+from rigsight.effects import Effect, placed_dimension
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
 from rigsight.rigs import RIGS, Rig
@@ -95,7 +95,11 @@ def _parameters(
     rig: Rig, effects: tuple[Effect, ...], unique: Mapping[tuple[str, str], str], fixed: Mapping[str, float]
 ) -> tuple[Parameter, ...]:
     of_effects = [
-        replace(rig.with_unit(parameter, rig.acts_at(effect)), name=unique[effect.name, parameter.name])
+        replace(
+            rig.with_unit(parameter, rig.acts_at(effect)),
+            name=unique[effect.name, parameter.name],
+            dimension=placed_dimension(effect, parameter.dimension),
+        )
         for effect in effects
         for parameter in effect.parameters
     ]

@@ -65,15 +65,16 @@ class EquationsOfMotion:
         Mass matrix (n, n) of parameters, coordinates and definitions.
     terms
         For each coordinate the parts of its generalized force with their signs, in the order in which people read them.
-    dimension
-        Dimension text of the coordinates.
+    dimensions, rate_dimensions
+        Dimension texts of the coordinates and of the velocities, n each.
     """
 
     coordinates: tuple[sp.Symbol, ...] = ()
     velocities: tuple[sp.Symbol, ...] = ()
     mass: sp.ImmutableMatrix = field(default_factory=lambda: sp.ImmutableMatrix(0, 0, []))
     terms: tuple[tuple[sp.Expr, ...], ...] = ()
-    dimension: str = "x"
+    dimensions: tuple[str, ...] = ()
+    rate_dimensions: tuple[str, ...] = ()
 
     @property
     def forces(self) -> tuple[sp.Expr, ...]:

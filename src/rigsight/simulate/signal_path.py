@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from rigsight.effects import Effect, Place
+from rigsight.effects import Effect, Place, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Drive, Joint, Rig, Sensor, acceleration, force_symbol, reading_symbol
 from rigsight.simulate.equation_tree import (
@@ -23,6 +23,7 @@ from rigsight.simulate.equation_tree import (
     late,
 )
 from rigsight.simulate.structure import TIME, input_symbols
+from rigsight.units import size_of
 
 
 def equation_tree(
@@ -162,6 +163,10 @@ class _Path:
             velocities=tuple(c.rate for c in free),
             mass=sp.ImmutableMatrix(mechanism.mass_matrix.applyfunc(self._bound)),
             terms=tuple(map(tuple, terms)),
+            dimensions=("x",) if mechanism.has_one_motion else tuple(size_of(c.name) for c in free),
+            rate_dimensions=("x time^-1",)
+            if mechanism.has_one_motion
+            else tuple(size_of(c.rate.name) for c in free),
         )
 
     def _add(self, terms: Sequence[list[sp.Expr]], along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
@@ -257,7 +262,9 @@ class _Path:
         follower, found = self._rig.follower, []
         for state in self._rig.mechanism.states:
             if follower is None or state.symbol != follower.symbol:
-                found.append(FirstOrderState(state.symbol, (self._bound(state.rate),), "", None, None))
+                found.append(
+                    FirstOrderState(state.symbol, (self._bound(state.rate),), size_of(state.name), None, None)
+                )
                 continue
             signals = {
                 **self._of_motion(),
@@ -316,8 +323,8 @@ class _Path:
             FirstOrderState(
                 symbol=state_symbol(effect, s.symbol),
                 terms=(self._binder.effect(effect, s.rate, signals),),
-                dimension=s.dimension,
-                limit=None if s.limit is None else self._binder.effect(effect, s.limit, {}),
+                dimension=placed_dimension(effect, s.dimension),
+                limit=None if s.limit is None else self._binder.effect(effect, s.limit, signals),
                 owner=effect.name,
             )
             for s in effect.states

@@ -72,12 +72,11 @@ class Structure:
     def equations(self) -> tuple[StateEquation, ...]:
         """The states with their rates, dimensions and limits: coordinates, velocities, then the others."""
         tree, motion = self.tree, self.tree.motion
-        rate_dimension = f"{motion.dimension} time^-1"
-        coordinates = zip(motion.coordinates, motion.velocities, strict=True)
-        velocities = zip(motion.velocities, motion.accelerations, strict=True)
+        coordinates = zip(motion.coordinates, motion.velocities, motion.dimensions, strict=True)
+        velocities = zip(motion.velocities, motion.accelerations, motion.rate_dimensions, strict=True)
         return (
-            *(StateEquation(symbol, rate, motion.dimension) for symbol, rate in coordinates),
-            *(StateEquation(symbol, tree.flattened(rate), rate_dimension) for symbol, rate in velocities),
+            *(StateEquation(*coordinate) for coordinate in coordinates),
+            *(StateEquation(symbol, tree.flattened(rate), size) for symbol, rate, size in velocities),
             *(
                 StateEquation(state.symbol, tree.flattened(state.rate), state.dimension, state.limit)
                 for state in tree.states
