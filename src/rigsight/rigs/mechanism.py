@@ -192,8 +192,8 @@ class Mechanism:
     def has_one_motion(self) -> bool:
         """True for one joint along the one coordinate, moved by one input or following it, without feedback.
 
-        Then ``inertia * x'' = gain * u + bias - stiffness * (x - rest) - damping * x'`` says it all, or, of a prescribed motion, what
-        its joint resists with.
+        Then ``inertia * x'' = gain * u + bias - stiffness * (x - rest) - damping * x'`` says it all, or, of a
+        prescribed motion, what its joint resists with.
         """
         if not len(self.coordinates) == len(self.joints) == len(self.inputs) == 1 or self.potential != 0:
             return False
