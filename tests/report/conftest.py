@@ -69,7 +69,8 @@ def candidate(effects: tuple[str, ...], probability: float, excess: float, **fie
         "success": True,
         "message": "converged",
     }
-    return Candidate(**{**values, **fields})
+    fields = {**values, **fields}
+    return Candidate(**{"where": tuple("yaw_dynamics" for _ in fields["effects"]), **fields})
 
 
 def figures(output: str, scale: float = 1.0) -> dict[str, Any]:
@@ -279,8 +280,8 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
         "advised": {
             **one,
             "advice": (
-                Advice(("coulomb_friction",), "sweep", 1.25, (0.5, 40.0), "psi", 23.4),
-                Advice(("stribeck_friction",), "sine", 0.5, (3.0, 3.0), "psi", 0.04),
+                Advice(("coulomb_friction",), "sweep", "u", 1.25, (0.5, 40.0), "psi", 23.4),
+                Advice(("stribeck_friction",), "sine", "u", 0.5, (3.0, 3.0), "psi", 0.04),
             ),
             "data_quality": DataQuality(
                 (

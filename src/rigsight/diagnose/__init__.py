@@ -1,8 +1,9 @@
 """Where the gap between simulation and rig lies, which effect causes it, how far it shrinks."""
 
+from rigsight.diagnose.candidates import candidates_on as candidates_on
 from rigsight.diagnose.diagnosis import diagnose as diagnose
 from rigsight.diagnose.result import Candidate as Candidate
 from rigsight.diagnose.result import Diagnosis as Diagnosis
 from rigsight.diagnose.task import Task as Task
 
-__all__ = ["Candidate", "Diagnosis", "Task", "diagnose"]
+__all__ = ["Candidate", "Diagnosis", "Task", "candidates_on", "diagnose"]

@@ -32,9 +32,10 @@ _SLOW, _FAST = 0.1, 5.0
 @dataclass(frozen=True)
 class _Experiment:
     waveform: str
+    source: str
     amplitude: float
     band: tuple[float, float] | None
-    u: NDArray[np.float64]
+    inputs: Mapping[str, NDArray[np.float64]]
 
 
 def advise(
@@ -67,7 +68,15 @@ def advise(
         if scored:
             (output, size), experiment = max(scored, key=lambda pair: pair[0][1])
             found.append(
-                Advice(rival.names, experiment.waveform, experiment.amplitude, experiment.band, output, size)
+                Advice(
+                    rival.names,
+                    experiment.waveform,
+                    experiment.source,
+                    experiment.amplitude,
+                    experiment.band,
+                    output,
+                    size,
+                )
             )
     return tuple(found)
 
@@ -76,10 +85,8 @@ def _separations(
     bench: Workbench, chosen: Scored, rival: Scored, experiment: _Experiment, noise: Mapping[str, float]
 ) -> Iterator[tuple[str, float]]:
     hold: Hold = bench.estimation[0].hold
-    source = bench.rig.inputs[0]
-    record = Record(
-        "advice", bench.estimation[0].dt, {source.name: experiment.u}, {source.name: source.unit}, hold=hold
-    )
+    units = {source.name: source.unit for source in bench.rig.inputs}
+    record = Record("advice", bench.estimation[0].dt, experiment.inputs, units, hold=hold)
     try:
         one, other = (simulate(m.fit.structure, m.fit.values, record, accuracy=1e-5) for m in (chosen, rival))
     except SimulationError:
@@ -89,13 +96,10 @@ def _separations(
 
 
 def _menu(bench: Workbench) -> Iterator[_Experiment]:
-    source = bench.rig.inputs[0].name
     dt = bench.estimation[0].dt
     omega = 1.0 / bench.scales["time"]
     n_samples = max(200, min(40_000, round(_PERIODS * 2.0 * math.pi / omega / dt)))
     t = dt * np.arange(n_samples, dtype=np.float64)
-    middle = float(np.median(np.concatenate([record[source] for record in bench.estimation])))
-    largest = max(float(np.max(np.abs(record[source] - middle))) for record in bench.estimation)
     fast = min(_FAST * omega, 0.4 * math.pi / dt)
     drives: tuple[tuple[str, tuple[float, float] | None, Callable[[float], NDArray[np.float64]]], ...] = (
         ("sweep", (_SLOW * omega, fast), lambda a: linear_sweep(t, a, _SLOW * omega, fast)),
@@ -104,6 +108,15 @@ def _menu(bench: Workbench) -> Iterator[_Experiment]:
     )
     if bench.rig.is_driven:
         drives += (("step", None, lambda a: step(t, a, 0.1 * float(t[-1]))),)
-    for share in _AMPLITUDES:
-        for waveform, band, drive in drives:
-            yield _Experiment(waveform, share * largest, band, middle + drive(share * largest))
+    recorded = {
+        signal.name: np.concatenate([record[signal.name] for record in bench.estimation])
+        for signal in bench.rig.inputs
+    }
+    middles = {name: float(np.median(samples)) for name, samples in recorded.items()}
+    rest = {name: np.full(n_samples, middle) for name, middle in middles.items()}
+    for source, samples in recorded.items():
+        largest = float(np.max(np.abs(samples - middles[source])))
+        for share in _AMPLITUDES:
+            for waveform, band, drive in drives:
+                moved = {**rest, source: middles[source] + drive(share * largest)}
+                yield _Experiment(waveform, source, share * largest, band, moved)

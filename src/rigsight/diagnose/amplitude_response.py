@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from rigsight.diagnose.finding import AmplitudeDependence
+from rigsight.diagnose.windows import leading_output
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response
 from rigsight.records.record import Record
@@ -37,7 +38,13 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
     """
     if not rig.is_driven:
         return AmplitudeDependence("cannot tell", "An element has no frequency response of a driven motion.")
-    source, response = rig.inputs[0].name, rig.outputs[0].name
+    if len(rig.inputs) != 1 or not records:
+        return AmplitudeDependence(
+            "cannot tell",
+            "Only the frequency responses of a rig with one input are compared between amplitudes.",
+        )
+    source, response = rig.inputs[0].name, leading_output(rig, records)
+    records = [record for record in records if response in record]
     pair = _extremes(records, source)
     if pair is None:
         return AmplitudeDependence(

@@ -9,6 +9,7 @@ from rigsight.diagnose.amplitude_response import amplitude_dependence
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.input_timing import input_timing
 from rigsight.diagnose.sensor_faults import sensor_faults
+from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.records.record import Record
 
@@ -31,7 +32,7 @@ def data_quality(bench: Workbench, records: Sequence[Record], linear: Scored) ->
     """
     timing = input_timing(bench, (), linear.fit)
     faults = [finding for record in records for finding in sensor_faults(bench.rig, record)]
-    response = bench.rig.outputs[0].name
+    response = leading_output(bench.rig, records)
     faulty = {finding.record for finding in faults if finding.signal == response}
     # A channel at fault distorts as an effect would.
     healthy = [record for record in records if record.name not in faulty]

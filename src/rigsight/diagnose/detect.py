@@ -70,8 +70,8 @@ def noise_floors(
 def _noise_floor(
     rig: Rig, output: str, records: Sequence[Record], drifts: bool, at_rest: bool
 ) -> tuple[float, str, Stretches]:
-    source = rig.inputs[0].name
-    repeated = _repeated(source, output, records)
+    sources = [signal.name for signal in rig.inputs]
+    repeated = _repeated(sources, output, records)
     if drifts:
         repeated = [(_without_drift(group), dt) for group, dt in repeated]
     if repeated:
@@ -83,38 +83,44 @@ def _noise_floor(
     if not rig.is_driven:
         # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
         top = min(top, float(np.median([_roughness(record[output]) for record in records])))
-    quiet = [q for record in records if at_rest for q in _quiet_stretches(record, source, output)]
+    quiet = [q for record in records if at_rest for q in _quiet_stretches(record, sources, output)]
     if quiet:
         deviations = [float(np.std(stretch)) for stretch, _ in quiet]
         return max(float(np.median(deviations)), top), AT_REST, tuple(quiet)
     return top, _WHITE_ONLY, ()
 
 
-def _repeated(source: str, output: str, records: Sequence[Record]) -> list[tuple[NDArray[np.float64], float]]:
+def _repeated(
+    sources: Sequence[str], output: str, records: Sequence[Record]
+) -> list[tuple[NDArray[np.float64], float]]:
     """Return groups of answers to the same input, shape (n_repetitions, n_samples), within records and from one to the next."""
     segments = []
     for record in records:
-        period = repeated_period(record[source])
+        driven = inputs_of(record, sources)
+        if not np.any(np.ptp(driven, axis=0)):
+            continue  # of a rig left alone each motion is another
+        period = _common_period(driven)
         if period is None:
-            segments.append((record[source], record[output], False, record.dt))
+            segments.append((driven, record[output], False, record.dt))
             continue
         count = record.n_samples // period
         # The first period still holds the transient.
         for i in range(1 if count > 1 else 0, count):
             part = slice(i * period, (i + 1) * period)
-            segments.append((record[source][part], record[output][part], count > 1, record.dt))
+            segments.append((driven[part], record[output][part], count > 1, record.dt))
     groups: list[tuple[NDArray[np.float64], float]] = []
     used: set[int] = set()
     for i, (first_input, first_output, first_settled, dt) in enumerate(segments):
         if i in used:
             continue
-        size = float(np.std(first_input)) or 1.0
+        size = np.std(first_input, axis=0)
+        size[size == 0.0] = 1.0
         group, settled = [first_output], first_settled
         for j in range(i + 1, len(segments)):
             other_input, other_output, other_settled, _ = segments[j]
-            if other_input.size != first_input.size or j in used:
+            if other_input.shape != first_input.shape or j in used:
                 continue
-            if np.max(np.abs(other_input - first_input)) <= _SAME_INPUT * size:
+            if np.all(np.max(np.abs(other_input - first_input), axis=0) <= _SAME_INPUT * size):
                 group.append(other_output)
                 settled = settled and other_settled
                 used.add(j)
@@ -125,6 +131,18 @@ def _repeated(source: str, output: str, records: Sequence[Record]) -> list[tuple
     return groups
 
 
+def inputs_of(record: Record, sources: Sequence[str]) -> NDArray[np.float64]:
+    """Return the inputs of a record side by side, shape (n_samples, n_inputs); one it lacks rests."""
+    rest = np.zeros(record.n_samples)
+    return np.column_stack([record.signals.get(name, rest) for name in sources] or [rest])
+
+
+def _common_period(driven: NDArray[np.float64]) -> int | None:
+    """Return after how many samples all inputs repeat themselves that do not rest; None if they do not."""
+    periods = {repeated_period(column) for column in driven.T if np.ptp(column) > 0.0}
+    return periods.pop() if len(periods) == 1 else None
+
+
 def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return answers to one input without the parabolas by which they differ: a constant force moves a free mass on one."""
     t = np.linspace(-1.0, 1.0, group.shape[1])
@@ -133,15 +151,18 @@ def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(group - np.polynomial.polynomial.polyval(t, drift))
 
 
-def _quiet_stretches(record: Record, source: str, output: str) -> list[tuple[NDArray[np.float64], float]]:
+def _quiet_stretches(
+    record: Record, sources: Sequence[str], output: str
+) -> list[tuple[NDArray[np.float64], float]]:
     """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
-    samples = record[source]
-    span = float(np.ptp(samples))
-    still = np.abs(np.diff(samples)) <= _QUIET_INPUT * span
+    samples = inputs_of(record, sources)
+    span = np.ptp(samples, axis=0)
+    still = np.all(np.abs(np.diff(samples, axis=0)) <= _QUIET_INPUT * span, axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        if np.ptp(samples[start : stop + 1]) > _QUIET_INPUT * span or stop - start < _MIN_QUIET:
+        moved = np.ptp(samples[start : stop + 1], axis=0)
+        if np.any(moved > _QUIET_INPUT * span) or stop - start < _MIN_QUIET:
             continue
         settled = record[output][start + (stop - start) // 2 if start > 0 else start : stop]
         if settled.size < _MIN_QUIET // 2:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.advise import advise
+from rigsight.diagnose.candidates import candidates_on
 from rigsight.diagnose.detect import AT_REST, noise_floors
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.grow import Prepare
@@ -84,24 +85,25 @@ def diagnose(
     say = progress or (lambda _: None)
     if not task.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
+    effects = candidates_on(task.rig, effects, task.modelled)
     notes = [note for record in task.records for note in record.notes]
     scored_on = "validation" if task.validation else "estimation"
     if not task.validation:
         notes.append(
             "There is no validation record: errors are those of the records that were fitted, and too good."
         )
-    floors = noise_floors(task.rig, task.records, drifts=not task.has_spring)
+    floors = noise_floors(task.rig, task.records, drifts=task.drifts)
     say("noise floor")
 
     rng = np.random.default_rng(seed)
-    windowing = Windowing(None if task.has_spring else window_length(task.rig, task.estimation))
+    windowing = Windowing(window_length(task.rig, task.estimation) if task.drifts else None)
     found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
     if any(floor.method == AT_REST for floor in floors) and _least_left(found) < _REFUTES:
         notes.append(
             f"A model leaves {_least_left(found):.2g} of what the rig does while its input rests, so that was motion and no "
             "noise (a loose rig wanders, what pulsates goes on): the noise floor is taken from the top of the spectrum instead."
         )
-        floors = noise_floors(task.rig, task.records, drifts=not task.has_spring, at_rest=False)
+        floors = noise_floors(task.rig, task.records, drifts=task.drifts, at_rest=False)
         found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
     if found.windowing.cycles is not None:
         notes.append(
@@ -125,7 +127,7 @@ def diagnose(
     diagnosis = _assembled(task, found, floors, notes, scored_on, rng)
     lacking = None
     if found.judgement.verdict == "unknown":
-        lacking = _missing_force(found.bench, found.linear, not task.has_spring, rng)
+        lacking = _missing_force(found.bench, found.linear, task.absent_spring is not None, rng)
     return replace(diagnosis, data_quality=found.quality, missing_force=lacking)
 
 
@@ -137,7 +139,7 @@ def _missing_force(
     bench: Workbench, linear: Scored, no_spring: bool, rng: np.random.Generator
 ) -> MissingForce | None:
     """Return the shape of what is lacking; beside effects that are modelled already the rig's own terms do not stand alone."""
-    if bench.modelled:
+    if bench.modelled or not bench.rig.has_one_motion:
         return None
     noise = bench.noise[bench.rig.outputs[0].name]
     return missing_force(bench.rig, bench.estimation, linear.fit.values, bench.scales, noise, rng, no_spring)
@@ -181,7 +183,7 @@ def _assembled(
     chosen = judgement.model.effects if is_effect else ()
     tied = tuple(model.names for model in ranking.tied) if is_effect else ()
     places = judgement.model.effects if judgement.verdict in ("effect", "unknown") else ()
-    where = tuple(dict.fromkeys(rig.place_name(effect.place) for effect in places))
+    where = tuple(rig.where(effect) for effect in places)
     return Diagnosis(
         title=task.title,
         rig=rig.name,
@@ -231,6 +233,7 @@ def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate
     estimation = Scored(model.effects, model.fit, model.fit.residuals, (), 0.0)
     return Candidate(
         effects=model.names,
+        where=tuple(bench.rig.where(effect) for effect in model.effects),
         probability=probability,
         validation_nrmse={
             name: nrmse(_column(bench.rig, model, name), values) if model.residuals else float("inf")

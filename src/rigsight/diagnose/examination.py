@@ -19,7 +19,7 @@ from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge, most_left
-from rigsight.diagnose.windows import Windowing
+from rigsight.diagnose.windows import Windowing, leading_output
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
@@ -163,6 +163,10 @@ def _singly(
         raise SimulationError(
             f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
         )
+    if not task.rig.has_one_motion:
+        # What moves between the sensors, and which forces do it, is known once the equations fit.
+        fitted = {**task.constants, **linear.fit.values}
+        bench = replace(bench, scales=characteristic_scales(task.rig, task.estimation, fitted))
     say("re-identified")
     before = _before(task, bench, linear)
     if task.given:
@@ -193,7 +197,7 @@ def _grown(
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
     """Return the models in windows of a few cycles."""
-    output = task.rig.outputs[0].name
+    output = leading_output(task.rig, task.records)
     windowing = Windowing.by_cycles(output, noise[output])
     bench = _bench(task, noise, windowing, models.bench.memory, models.bench.threads)
     linear = fit_linear(bench, models.linear.fit.values)
@@ -220,7 +224,7 @@ def _bench(
     return Workbench(
         rig=task.rig,
         estimation=fitted,
-        look=liveliest(fitted, task.rig.outputs[0].name),
+        look=liveliest(fitted, leading_output(task.rig, task.estimation)),
         scoring=windowing.cut(task.validation or task.estimation),
         scales=characteristic_scales(task.rig, task.estimation, start),
         noise=noise,
@@ -233,7 +237,7 @@ def _bench(
 
 
 def _start(task: Task) -> dict[str, float]:
-    held = {} if task.has_spring else {"k": 0.0}
+    held = {} if task.absent_spring is None else {task.absent_spring: 0.0}
     start = {**task.constants, **linear_start(task.rig, task.estimation, task.constants, held)}
     # Numbers fitted without the effects that the simulation has are farther off than those it came with.
     return {**start, **task.given} if task.modelled else start
@@ -241,7 +245,9 @@ def _start(task: Task) -> dict[str, float]:
 
 def _held(task: Task) -> frozenset[str]:
     """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
-    held = set() if task.has_spring else {"k"}
+    held = set() if task.absent_spring is None else {task.absent_spring}
+    if not task.rig.has_one_motion:
+        return frozenset(held)
     unmeasured = [
         symbol
         for symbol in task.rig.downstream
@@ -299,7 +305,7 @@ def _with_offset_rivals(
         return ranking
     rivals = []
     for effect in effects:
-        if effect.signature.even_harmonics and bench.rig.offers(effect):
+        if effect.signature.even_harmonics and bench.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
     return rank([*ranking.order, *rivals], noise, rng, gap)

@@ -137,7 +137,7 @@ def input_timing(
     None where the motion is prescribed, the records' holds differ, or the model cannot be fitted to the stretches.
     """
     given = {record.hold for record in bench.look}
-    if not bench.rig.is_driven or len(given) != 1:
+    if not bench.rig.is_driven or not bench.rig.inputs or len(given) != 1:
         return None
     (declared,) = given
     as_given = _excess(bench, base, bench.look)
@@ -177,6 +177,8 @@ def _shifted(
     bench: Workbench, effects: tuple[Effect, ...], base: FitResult
 ) -> tuple[float | None, float | None]:
     """Return the fitted shift and what is left with it."""
+    if not bench.rig.has_one_motion:
+        return None, None  # with control loops and several drives a shift is no delay of one input
     names = {effect.name for effect in (*bench.modelled, *effects)}
     dt = bench.look[0].dt
     if names & set(_DELAYS) or any(not math.isclose(record.dt, dt, rel_tol=1e-6) for record in bench.look):

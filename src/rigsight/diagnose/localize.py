@@ -60,12 +60,12 @@ def localize(
     """
     stretches = {floor.output: _long_enough(floor.stretches) for floor in floors}
     scored = [trace for trace in traces if trace.role == scored_on]
-    by_path = path_parts(bench, before, linear, after)
+    by_path = path_parts(bench, before, linear, after) if bench.rig.has_one_motion else ()
     return Localization(
         by_record=tuple(_by_record(traces, scored_on, bench.noise, rng)),
         by_amplitude=tuple(_by_amplitude(bench, traces, scored_on)),
         by_band=tuple(_by_band(scored, bench.noise, stretches)),
-        by_state=state_parts(bench, linear, scored),
+        by_state=state_parts(bench, linear, scored) if bench.rig.has_one_motion else (),
         by_time=tuple(_by_time(scored, bench.noise)),
         by_path=by_path,
         sentence=path_sentence(by_path, bench.rig),
@@ -99,7 +99,7 @@ def _by_record(
 
 
 def _by_amplitude(bench: Workbench, traces: Sequence[Trace], scored_on: str) -> list[AmplitudePart]:
-    units = {"amplitude": bench.rig.inputs[0].unit}
+    units = {"amplitude": bench.rig.inputs[0].unit if bench.rig.inputs else "1"}
     known = {(trace.role != scored_on, trace.amplitude) for trace in traces if trace.amplitude is not None}
     parts = []
     for fitted, amplitude in sorted(known):
@@ -245,7 +245,10 @@ def _share(part: float, total: float) -> float:
 
 
 def _input(trace: Trace) -> NDArray[np.float64]:
-    return next(iter(trace.inputs.values()))
+    """Return what drives a record: of several inputs the one that moves most beside its own middle."""
+    if not trace.inputs:
+        return np.zeros(trace.t.size)
+    return max(trace.inputs.values(), key=lambda samples: float(np.ptp(samples)))
 
 
 def _unit(bench: Workbench, output: str) -> str:

@@ -53,7 +53,10 @@ def is_one_law(model: Scored) -> bool:
     model
         With any number of effects.
     """
-    return len(model.effects) > 1 and (_one_force(model.effects) or _one_linear_system(model))
+    at_one_place = len({effect.at for effect in model.effects}) == 1
+    return len(model.effects) > 1 and (
+        (at_one_place and _one_force(model.effects)) or _one_linear_system(model)
+    )
 
 
 def _one_force(effects: Sequence[Effect]) -> bool:

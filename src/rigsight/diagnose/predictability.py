@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.errors import SimulationError
 from rigsight.records.record import Record
@@ -38,10 +39,10 @@ def growth_of_disturbances(
 
     Returns
     -------
-    The largest RMS change of the first output over a scored record, in units of its noise floor; 1 for the linear equations, 0
+    The largest RMS change of the leading output over a scored record, in units of its noise floor; 1 for the linear equations, 0
     where a model cannot be simulated.
     """
-    if not bench.rig.is_driven:
+    if not bench.rig.is_driven or not bench.rig.inputs:
         return 0.0
     largest = 0.0
     for index, record in enumerate(bench.scoring):
@@ -56,19 +57,22 @@ def growth_of_disturbances(
 def _growth(
     bench: Workbench, linear: Scored, model: Scored, index: int, record: Record, rng: np.random.Generator
 ) -> float:
-    source = bench.rig.inputs[0].name
+    source, output = bench.rig.inputs[0].name, leading_output(bench.rig, [record])
+    column = [signal.name for signal in bench.rig.outputs].index(output)
     pole = np.exp(-record.dt / bench.scales["time"])
     disturbance = lfilter([1.0 - pole], [1.0, -pole], rng.standard_normal(record.n_samples))
     disturbance *= 1e-3 * bench.scales["input"] / float(np.std(disturbance))
-    through = _change(linear, index, record, source, disturbance)
-    noise = bench.noise[bench.rig.outputs[0].name]
-    return _change(model, index, record, source, disturbance * (noise / through)) / noise
+    through = _change(linear, index, record, source, disturbance, column)
+    if through == 0.0:
+        return 0.0  # an input that this record's sensors do not see
+    noise = bench.noise[output]
+    return _change(model, index, record, source, disturbance * (noise / through), column) / noise
 
 
 def _change(
-    model: Scored, index: int, record: Record, source: str, disturbance: NDArray[np.float64]
+    model: Scored, index: int, record: Record, source: str, disturbance: NDArray[np.float64], column: int
 ) -> float:
-    """Return the RMS change of the first output that a disturbance beside the input makes."""
+    """Return the RMS change of an output that a disturbance beside the input makes."""
     structure = model.fit.structure
     p = np.array([model.fit.values[name] for name in structure.names])
     calm, disturbed = (
@@ -79,7 +83,7 @@ def _change(
             model.initial_states[index],
             record.n_samples,
             _ACCURACY,
-        )[:, 0]
+        )[:, column]
         for extra in (0.0, disturbance)
     )
     return float(np.sqrt(np.mean((disturbed - calm) ** 2)))

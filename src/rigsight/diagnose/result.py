@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.gap_parts import Localization
 from rigsight.discover import MissingForce
+from rigsight.effects import kind_of
 
 Verdict = Literal["effect", "parameters", "none", "unknown"]
 Stage = Literal["before", "reidentified", "after"]
@@ -67,7 +68,10 @@ class Candidate:
     Attributes
     ----------
     effects
-        Names, strongest first; empty for the re-identified equations without an effect.
+        Names, strongest first, with ``@place`` where a rig has several places; empty for the re-identified equations without an
+        effect.
+    where
+        Place of each.
     probability
         That this set is the cause, given the records and the candidates tried.
     validation_nrmse, estimation_nrmse
@@ -81,6 +85,7 @@ class Candidate:
     """
 
     effects: tuple[str, ...]
+    where: tuple[str, ...]
     probability: float
     validation_nrmse: dict[str, float]
     estimation_nrmse: dict[str, float]
@@ -98,14 +103,15 @@ class Advice:
     ----------
     rival
         Names of the rival's effects.
-    waveform, amplitude, band
-        What to drive with: amplitude in the unit of the input, band [rad/s] where the waveform has one.
+    waveform, source, amplitude, band
+        What to drive which input with: amplitude in the unit of the input, band [rad/s] where the waveform has one.
     output, separation
         Where the two differ most, and the RMS difference of their predictions there in standard deviations of the noise.
     """
 
     rival: tuple[str, ...]
     waveform: str
+    source: str
     amplitude: float
     band: tuple[float, float] | None
     output: str
@@ -116,6 +122,7 @@ class Advice:
         return {
             "rival": list(self.rival),
             "waveform": self.waveform,
+            "input": self.source,
             "amplitude": _number(self.amplitude),
             "band": None if self.band is None else [_number(omega) for omega in self.band],
             "output": self.output,
@@ -188,7 +195,8 @@ class Diagnosis:
     title, rig
         Campaign title and rig name.
     verdict, effects, where, ambiguous_with, candidates, gap
-        As in ``diagnosis.json``; candidates are sorted, best first.
+        As in ``diagnosis.json``, but names of effects are with ``@place`` where a rig has several places; candidates are sorted,
+        best first.
     noise_floors
         Per output.
     traces
@@ -246,7 +254,7 @@ class Diagnosis:
             "title": self.title,
             "rig": self.rig,
             "verdict": self.verdict,
-            "effects": list(self.effects),
+            "effects": list(map(kind_of, self.effects)),
             "where": list(self.where),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
             "candidates": [_candidate(candidate) for candidate in self.candidates],
@@ -287,7 +295,8 @@ class Diagnosis:
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
-        "effects": list(candidate.effects),
+        "effects": list(map(kind_of, candidate.effects)),
+        "where": list(candidate.where),
         "probability": _number(candidate.probability),
         "validation_nrmse": {k: _number(v) for k, v in candidate.validation_nrmse.items()},
         "estimation_nrmse": {k: _number(v) for k, v in candidate.estimation_nrmse.items()},

@@ -8,11 +8,12 @@ from collections.abc import Iterator, Mapping
 import sympy as sp
 
 from rigsight.diagnose.persistent_line import persistent_line
+from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Workbench
-from rigsight.effects import Effect
+from rigsight.effects import Effect, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.identify import FitResult
-from rigsight.rigs import evaluated
+from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
@@ -49,7 +50,14 @@ def start_values(
 def _line(bench: Workbench, base: FitResult) -> float | None:
     if len(base.residuals) != len(bench.estimation):
         return None
-    return persistent_line([r[:, 0] for r in base.residuals], [record.dt for record in bench.estimation])
+    output = leading_output(bench.rig, bench.estimation)
+    column = [signal.name for signal in bench.rig.outputs].index(output)
+    seen = [
+        (residual[:, column], record.dt)
+        for residual, record in zip(base.residuals, bench.estimation, strict=True)
+        if output in record
+    ]
+    return persistent_line([residual for residual, _ in seen], [dt for _, dt in seen])
 
 
 def _plain_starts(
@@ -65,10 +73,10 @@ def _plain_starts(
         for start in effect.starts:
             origin = base if start.parent is None else parents.get(start.parent)
             if origin is not None and start.parent != effect.name:
-                own = _evaluated(bench, start.values, _known(origin, start.parent))
+                own = _evaluated(bench, effect, start.values, _known(origin, start.parent))
                 yield with_own_values(structure, effect, origin, {**rest, **own})
         return
-    sizes = [characteristic_value(p.dimension, bench.scales) for p in fitted]
+    sizes = [characteristic_value(placed_dimension(effect, p.dimension), bench.scales) for p in fitted]
     for combination in itertools.product(*(p.starts for p in fitted)):
         own = {p.name: c * size for p, c, size in zip(fitted, combination, sizes, strict=True)}
         yield with_own_values(structure, effect, base, {**rest, **own})
@@ -114,22 +122,34 @@ def _known(origin: FitResult, parent: str | None) -> dict[str, float]:
 
 
 def _evaluated(
-    bench: Workbench, formulas: Mapping[str, sp.Expr], values: Mapping[str, float]
+    bench: Workbench, effect: Effect, formulas: Mapping[str, sp.Expr], values: Mapping[str, float]
 ) -> dict[str, float]:
-    stiffness = bench.rig.motion.stiffness
-    numbers = {
-        canonical.k: values[stiffness.name],
-        canonical.drive_size: bench.scales["drive"],
-        canonical.x_size: bench.scales["x"],
-        canonical.v_size: bench.scales["x"] / bench.scales["time"],
-        canonical.time_size: bench.scales["time"],
+    joint = joint_of(bench.rig, effect)
+    sizes = {
+        base: characteristic_value(placed_dimension(effect, base), bench.scales)
+        for base in ("drive", "x", "time")
     }
-    inertia = bench.rig.motion.inertia
-    if inertia is not None:
+    numbers = {
+        canonical.k: evaluated(joint.stiffness, values),
+        canonical.drive_size: sizes["drive"],
+        canonical.x_size: sizes["x"],
+        canonical.v_size: sizes["x"] / sizes["time"],
+        canonical.time_size: sizes["time"],
+    }
+    inertia = joint.inertia if joint.inertia is not None else bench.rig.mechanism.inertia_along(joint.motion)
+    if inertia is not None and not inertia.free_symbols & _moving(bench.rig):
         numbers[canonical.m] = evaluated(inertia, values)
     result = {}
     for name, formula in formulas.items():
         own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}
         value = float(formula.subs({**numbers, **own}))
-        result[stiffness.name if name == "k" else name] = value
+        if name != "k":
+            result[name] = value
+        elif isinstance(joint.stiffness, sp.Symbol):
+            # A stiffness that several parameters make keeps the values that they have.
+            result[str(joint.stiffness.name)] = value
     return result
+
+
+def _moving(rig: Rig) -> set[sp.Symbol]:
+    return {coordinate.symbol for coordinate in rig.mechanism.coordinates}

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
+from rigsight.diagnose.drift import can_drift
 from rigsight.effects import Effect
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -48,6 +50,17 @@ class Task:
         return tuple(record for record in self.records if record.role == "validation")
 
     @property
-    def has_spring(self) -> bool:
-        """False for an axis that is given without one."""
-        return not (self.rig.name == "axis" and self.given.get("k") == 0.0)
+    def absent_spring(self) -> str | None:
+        """Name of the stiffness of one driven mass that is given without a spring."""
+        if not (self.rig.has_one_motion and self.rig.is_driven):
+            return None
+        stiffness = self.rig.motion.stiffness
+        name = str(getattr(stiffness, "name", ""))
+        return name if self.given.get(name) == 0.0 else None
+
+    @cached_property
+    def drifts(self) -> bool:
+        """True where nothing brings the rig back, so that in free run each error of a force is integrated twice."""
+        if self.rig.has_one_motion:
+            return self.absent_spring is not None
+        return can_drift(self.rig, {**self.constants, **self.given})

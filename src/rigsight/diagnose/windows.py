@@ -78,14 +78,22 @@ class Windowing:
         return [*edges, record.n_samples]
 
 
+def leading_output(rig: Rig, records: Sequence[Record]) -> str:
+    """Return the first of the outputs that most records hold: its motion tells cycles and lively stretches."""
+    return max(
+        (signal.name for signal in rig.outputs), key=lambda name: sum(name in record for record in records)
+    )
+
+
 def window_length(rig: Rig, records: Sequence[Record]) -> float:
     """Return a window length [s] that holds several of the typical periods of the velocity.
 
     An axis without a spring integrates every error of the force twice; a window keeps that drift small against the motion.
     """
     periods = []
+    output = leading_output(rig, records)
     for record in records:
-        velocity = np.gradient(record[rig.outputs[0].name], record.dt)
+        velocity = np.gradient(record[output], record.dt)
         velocity -= np.mean(velocity)
         power = np.abs(np.fft.rfft(velocity)) ** 2
         frequency = np.fft.rfftfreq(velocity.size, record.dt)

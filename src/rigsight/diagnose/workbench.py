@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.candidates import candidates_on
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
@@ -112,7 +113,7 @@ class Workbench:
     def free_parameters(self, structure: Structure) -> list[str]:
         """Return what a fit of this structure moves from the start."""
         names = {p.name for p in self.rig.parameters} - self.held
-        if self.rig.is_driven:
+        if self.rig.has_one_motion and self.rig.is_driven:
             rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
             if not self._has_spring and not any(_sees_position(e) for e in structure.effects):
                 names -= rest
@@ -134,7 +135,7 @@ class Workbench:
         """
         bent = any(_sees_position(e) and not e.signature.even_harmonics for e in structure.effects)
         even = any(_sees_position(e) and e.signature.even_harmonics for e in structure.effects)
-        if not (self.rig.is_driven and self._has_spring and bent and not even):
+        if not (self.rig.has_one_motion and self.rig.is_driven and self._has_spring and bent and not even):
             return []
         return sorted(self._bias - self.held)
 
@@ -147,12 +148,14 @@ class Workbench:
         return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
 
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
-        """Return the effects that make sense on this rig; without a spring none that changes it."""
+        """Return the effects that make sense on this rig, each at each place; without a spring none that changes it."""
+        offered = candidates_on(self.rig, effects, self.modelled)
+        if not self.rig.has_one_motion:
+            return offered
         return [
             effect
-            for effect in effects
-            if self.rig.offers(effect)
-            and effect not in self.modelled
+            for effect in offered
+            if effect not in self.modelled
             and (effect.lateral is None or not self.rig.downstream_parameters <= self.held)
             and (self._has_spring or (effect.spring is None and effect.deflection is None))
         ]

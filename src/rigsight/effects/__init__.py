@@ -10,11 +10,13 @@ from rigsight.effects.effect import Signature as Signature
 from rigsight.effects.effect import Start as Start
 from rigsight.effects.effect import State as State
 from rigsight.effects.effect import SumAndDifference as SumAndDifference
+from rigsight.effects.placed import AT as AT
 from rigsight.effects.placed import kind_of as kind_of
 from rigsight.effects.placed import placed as placed
 from rigsight.effects.placed import placed_dimension as placed_dimension
 
 __all__ = [
+    "AT",
     "CATALOGUE",
     "Effect",
     "Energy",

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rigsight.diagnose.gap_parts import GapPart
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap, Stage
 from rigsight.diagnose.verdict import AT_FLOOR
+from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
 
 TIMES = "\u00d7"
@@ -41,11 +42,12 @@ def listed(items: Iterable[str], last: str = "and") -> str:
 
 
 def effect_label(name: str) -> str:
-    """Return an effect's name for people: ``"Bouc-Wen hysteresis"``."""
-    label = name.replace("_", " ")
+    """Return an effect's name for people: ``"Bouc-Wen hysteresis"``, ``"Coulomb friction at load_bearing"``."""
+    kind, _, place = name.partition(AT)
+    label = kind.replace("_", " ")
     for written, proper in _PROPER_NAMES.items():
         label = label.replace(written, proper)
-    return label
+    return f"{label} at {place}" if place else label
 
 
 def effects_label(effects: Sequence[str]) -> str:
@@ -60,7 +62,7 @@ def sentence_case(text: str) -> str:
 
 def place_label(where: str) -> str:
     """Return a place with its preposition: ``"in the yaw dynamics"``."""
-    return _PLACES.get(where, f"in {where.replace('_', ' ')}")
+    return _PLACES.get(where, f"at {where}")
 
 
 def verdict_name(diagnosis: Diagnosis) -> str:
@@ -167,7 +169,9 @@ def _first(diagnosis: Diagnosis) -> str:
 
 
 def _effect_sentence(diagnosis: Diagnosis) -> str:
-    places = listed(dict.fromkeys(map(place_label, diagnosis.where)))
+    # An effect of a rig with several places is called with its place.
+    named = [w for e, w in zip(diagnosis.effects, diagnosis.where, strict=False) if AT not in e]
+    places = listed(dict.fromkeys(map(place_label, named)))
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
     left = times_floor(excess(diagnosis, "after"))
@@ -214,14 +218,15 @@ def told_unit(unit: str) -> str:
 
 def advice_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return, for each rival, the experiment that would tell it from the named effects."""
-    unit = next(iter(diagnosis.units.values()), "")
+    several = len({name for trace in diagnosis.traces for name in trace.inputs}) > 1
     sentences = []
     for advice in diagnosis.advice:
+        unit = diagnosis.units.get(advice.source, "")
         size = f"amplitude {advice.amplitude:.3g} {told_unit(unit)}".strip()
-        band = ""
+        band = f" on {advice.source}" if several else ""
         if advice.band is not None:
             low, high = advice.band
-            band = f" at {low:.3g} rad/s" if low == high else f" from {low:.3g} to {high:.3g} rad/s"
+            band += f" at {low:.3g} rad/s" if low == high else f" from {low:.3g} to {high:.3g} rad/s"
         rival = effects_label(advice.rival)
         if advice.separation < _SEPARATES:
             sentences.append(

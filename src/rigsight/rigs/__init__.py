@@ -17,6 +17,7 @@ from rigsight.rigs.mechanism import reading_symbol as reading_symbol
 from rigsight.rigs.rig import Follower as Follower
 from rigsight.rigs.rig import Motion as Motion
 from rigsight.rigs.rig import Rig as Rig
+from rigsight.rigs.rig import joint_of as joint_of
 from rigsight.rigs.rig_file import read_rig_file as read_rig_file
 from rigsight.rigs.signal import Signal as Signal
 
@@ -36,6 +37,7 @@ __all__ = [
     "acceleration",
     "evaluated",
     "force_symbol",
+    "joint_of",
     "read_rig_file",
     "reading_symbol",
     "relative_slopes",

@@ -269,6 +269,12 @@ class Rig:
             found = mechanism.states
         return tuple(place.name for place in found)
 
+    def where(self, effect: Effect) -> str:
+        """Return how results call the place of an effect."""
+        if effect.at is not None or not self.has_one_motion:
+            return self.acts_at(effect)
+        return self.place_name(effect.place)
+
     def acts_at(self, effect: Effect) -> str:
         """Return the name of the joint, drive, sensor or state at which an effect acts; the first where it names none."""
         return effect.at if effect.at is not None else self.places(effect.place)[0]
@@ -279,9 +285,31 @@ class Rig:
             return False
         if effect.place is Place.LATERAL_DYNAMICS:
             return self.follower is not None
+        if not self.places(effect.place) or not self._suits(effect):
+            return False
         if self.is_driven:
             return True
         return effect.place is Place.DYNAMICS and not effect.needs_inertia
+
+    def _suits(self, effect: Effect) -> bool:
+        """Return False for an effect of a spring or of a mass at a joint that has none."""
+        if effect.at is None or effect.place not in (Place.DYNAMICS, Place.DISTURBANCE):
+            return True
+        mechanism = self.mechanism
+        joint = joint_of(self, effect)
+        if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
+            return False
+        return (
+            not effect.needs_inertia
+            or joint.inertia is not None
+            or mechanism.inertia_along(joint.motion) is not None
+        )
+
+
+def joint_of(rig: Rig, effect: Effect) -> Joint:
+    """Return the joint at which an effect acts; the first one for an effect at a drive, a sensor or a state."""
+    joints = rig.mechanism.joints
+    return next((joint for joint in joints if joint.name == effect.at), joints[0])
 
 
 def _follower(state: RateState, motion: Motion) -> Follower | None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.workflow.campaign import Campaign, read_campaign
@@ -108,7 +108,7 @@ def diagnose_campaign(
     SimulationError
         If the given simulation cannot be run.
     """
-    candidates = [e for e in effects if campaign.rig.offers(e) and e not in campaign.modelled]
+    candidates = candidates_on(campaign.rig, effects, campaign.modelled)
     prepare_kernels(structures_to_try(campaign.rig, candidates, campaign.modelled), n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     journal = (

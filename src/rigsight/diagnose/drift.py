@@ -1,0 +1,58 @@
+"""Does something bring a rig back wherever it is put, or does it drift?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import sympy as sp
+from scipy.linalg import null_space
+
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+from rigsight.simulate.structure import TIME, input_symbols
+
+_DRAWS = 3
+_SINGULAR = 1e-9
+"""Smallest singular value of the scaled stiffness, relative to its largest, that is rounding."""
+
+
+def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
+    """Return True if a rig can rest at another place without another force, and a sensor shows it.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    known
+        Values of constants and parameters; the others are drawn: what matters is which are zero.
+    """
+    structure = compose(rig)
+    motion = structure.tree.motion
+    if not motion.coordinates:
+        return False
+    states = [equation.symbol for equation in structure.equations if equation.symbol not in motion.velocities]
+    rates = [e.rate for e in structure.equations if e.symbol not in motion.coordinates]
+    slopes = sp.Matrix([*rates, *structure.outputs]).jacobian(states)
+    symbols = sorted(slopes.free_symbols, key=str)
+    function = sp.lambdify(symbols, slopes, "numpy")
+    rng = np.random.default_rng(0)
+    still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
+    defaults = {p.name: p.default for p in (*rig.constants, *rig.parameters) if p.default is not None}
+    values = {f"p_{name}": value for name, value in {**defaults, **known}.items()}
+    for _ in range(_DRAWS):
+        numbers = [
+            0.0 if symbol in still else values.get(str(symbol), float(rng.uniform(0.2, 0.8)))
+            for symbol in symbols
+        ]
+        with np.errstate(all="ignore"):
+            matrix = np.asarray(function(*numbers), dtype=np.float64)
+        if not np.all(np.isfinite(matrix)):
+            continue
+        balance, shown = matrix[: len(rates)], matrix[len(rates) :]
+        size = np.linalg.norm(balance, axis=0)
+        size[size == 0.0] = 1.0
+        free = null_space(balance / size, rcond=_SINGULAR)
+        if not np.any(np.abs((shown / size) @ free) > _SINGULAR * np.max(np.abs(shown), initial=1.0)):
+            return False
+    return True
