@@ -10,6 +10,7 @@ from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.coordinates import Coordinates
+from rigsight.identify.first_states import first_state
 from rigsight.identify.separate_states import SeparateStates
 from rigsight.records import Record
 from rigsight.rigs import AXIS
@@ -48,7 +49,10 @@ def test_the_gradient_is_that_of_the_cost_with_settled_states(windows: tuple[Rec
     linear = compose(AXIS)
     fit = GreyBoxFit(linear, windows, characteristic_scales(AXIS, windows, TRUTH), {"x": NOISE})
     coordinates = Coordinates.of(linear, ("m", "d", "k"), TRUTH, fit.scales)
-    places = [record.first_state / fit.data.unlimited_sizes[:, 0] for record in fit.data.records]
+    places = [
+        first_state(fit.structure, record.record, {}) / fit.data.unlimited_sizes[:, 0]
+        for record in fit.data.records
+    ]
     low, high = [p - 20.0 for p in places], [p + 20.0 for p in places]
     theta = coordinates.from_values(TRUTH)
 

@@ -199,13 +199,18 @@ class Coordinates:
 
 
 def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
-    """Return where the spring's stiffness and its elastic share stand, if a search moves both; of several effects the first."""
-    stiffness = structure.rig.motion.stiffness.name
+    """Return where a spring's stiffness and its elastic share stand, if a search moves both; of several effects the first.
+
+    The spring is that of the joint at which the effect acts; one whose stiffness is no plain parameter has no such place.
+    """
+    rig = structure.rig
+    stiffness_at = {joint.name: joint.stiffness for joint in rig.mechanism.joints}
     for effect in structure.effects:
         if effect.elastic_share is not None:
             share = structure.parameter_name(effect, effect.elastic_share)
-            if stiffness in free and share in free:
-                return _Split(free.index(stiffness), free.index(share))
+            stiffness = stiffness_at[rig.acts_at(effect)]
+            if stiffness.is_Symbol and stiffness.name in free and share in free:
+                return _Split(free.index(stiffness.name), free.index(share))
     return None
 
 

@@ -2,31 +2,137 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
+from rigsight.effects import Place
+from rigsight.identify.rig_equations import RigEquations, equations_of
+from rigsight.identify.typical_size import size_of_signal
 from rigsight.records.record import Record
+from rigsight.rigs import evaluated
 from rigsight.simulate import Structure
+from rigsight.units import parse_dimension
+
+Floats = NDArray[np.float64]
 
 _FIRST_SAMPLES = 7
 _RESTING = 1e-3
 """Share of its range within which an input rests."""
+_PULL = 1e-3
+"""Weight of the equilibrium beside that of a sensor: it decides only what no sensor tells."""
+_MOST_EVALUATIONS = 100
+_HUGE = 1e6
 
 
-def first_state(structure: Structure, record: Record) -> NDArray[np.float64]:
-    """Guess the initial state from the first samples: measured outputs, their slope, no memory, settled lags.
+def first_state(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
+    """Guess the initial state from the first samples: readings, their slopes, no memory, settled lags.
 
     Parameters
     ----------
     structure
         Rig and effects.
     record
-        Holds the first output.
+        May lack sensors.
+    values
+        Constants and parameters by name.
 
     Returns
     -------
     Shape (n_states,), in the units of the states.
     """
+    rig = structure.rig
+    if rig.has_one_motion:
+        return _of_one_motion(structure, record)
+    equations = equations_of(rig)
+    return _with_effects(structure, record, equations, values, rig_state(equations, record, values))
+
+
+def state_at_rest(structure: Structure, record: Record, guess: Floats, values: Mapping[str, float]) -> Floats:
+    """Return the guess without motion, shape (n_states,): what the sensors show on average for as long as the inputs rest.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    record
+        May lack sensors.
+    guess
+        From `first_state`.
+    values
+        Constants and parameters by name.
+    """
+    rig = structure.rig
+    state = guess.copy()
+    if not rig.is_driven:
+        return state
+    count = _resting_samples(record, [signal.name for signal in rig.inputs])
+    if not rig.has_one_motion:
+        equations = equations_of(rig)
+        own = rig_state(equations, record, values, resting=count)
+        state[: own.size] = own
+        return state
+    state[0], state[1] = float(np.mean(record[rig.outputs[0].name][:count])), 0.0
+    for i, name in enumerate(structure.state_names):
+        if name in record and i > 1:
+            state[i] = float(np.mean(record[name][:count]))
+    return state
+
+
+def rig_state(
+    equations: RigEquations, record: Record, values: Mapping[str, float], resting: int | None = None
+) -> Floats:
+    """Return the state of a rig without effects that agrees best with the first samples of its sensors.
+
+    What they do not tell is that of the static equilibrium under the first input.
+
+    Parameters
+    ----------
+    equations
+        The rig's.
+    record
+        May lack sensors.
+    values
+        Constants and parameters by name.
+    resting
+        Samples during which nothing moves; None for a rig that may move from the first one on.
+
+    Returns
+    -------
+    Shape (n_states,).
+    """
+    p = equations.parameters(values, record)
+    u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
+    begin = _equilibrium(equations, u, p)
+    seen = [i for i, name in enumerate(equations.sensor_names) if name in record]
+    if not seen or begin.size == 0:
+        return begin
+    names = [equations.sensor_names[i] for i in seen]
+    shown = np.array([_level_and_slope(record[name], record.dt, resting) for name in names])
+    sizes = np.array([_sizes(record[name], record.dt) for name in names])
+    scale = _state_scale(equations, begin, u, p, seen, sizes)
+    n, still = equations.n_coordinates, resting is not None
+
+    def full(moved: Floats) -> Floats:
+        state: Floats = begin + scale * moved
+        if still:
+            state[n : 2 * n] = 0.0
+        return state
+
+    def left(moved: Floats) -> Floats:
+        z = full(moved)[:, None]
+        level = (equations.readings(z, u, p)[seen, 0] - shown[:, 0]) / sizes[:, 0]
+        if still:
+            return np.concatenate([level, _PULL * moved])
+        slope = (equations.reading_slopes(z, u, p)[seen, 0] - shown[:, 1]) / sizes[:, 1]
+        return _finite(np.concatenate([level, slope, _PULL * moved]))
+
+    return full(least_squares(left, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
+
+
+def _of_one_motion(structure: Structure, record: Record) -> Floats:
     state = np.zeros(len(structure.states))
     if not structure.rig.is_driven:
         return state
@@ -45,26 +151,104 @@ def first_state(structure: Structure, record: Record) -> NDArray[np.float64]:
     return state
 
 
-def state_at_rest(structure: Structure, record: Record, guess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the guess without motion, shape (n_states,): the mean of the outputs for as long as the input rests.
+def _equilibrium(equations: RigEquations, u: Floats, p: Floats) -> Floats:
+    """Return where the rig rests under an input, nearest to where its file starts it; what nothing holds stays there."""
+    n, state = equations.n_coordinates, np.zeros(equations.n_states)
+    values = dict(zip(equations.structure.names, p, strict=True))
+    for symbol, expression in equations.rig.mechanism.initial.items():
+        state[equations.state_names.index(symbol.name)] = evaluated(expression, values)
+    for own in equations.rig.mechanism.states:
+        state[equations.state_names.index(own.name)] = evaluated(own.start, values)
+    held = np.ones(state.size, dtype=bool)
+    held[n : 2 * n] = False
+    resting = np.where(held, state, 0.0)
 
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    record
-        Holds the first output.
-    guess
-        From `first_state`.
-    """
-    state = guess.copy()
-    if not structure.rig.is_driven:
-        return state
-    drive = record[structure.rig.inputs[0].name]
-    moving = np.flatnonzero(np.abs(drive - drive[0]) > _RESTING * float(np.ptp(drive)))
-    count = max(_FIRST_SAMPLES, int(moving[0]) if moving.size else record.n_samples)
-    state[0], state[1] = float(np.mean(record[structure.rig.outputs[0].name][:count])), 0.0
-    for i, name in enumerate(structure.state_names):
-        if name in record and i > 1:
-            state[i] = float(np.mean(record[name][:count]))
+    def unbalanced(place: Floats) -> Floats:
+        z = resting.copy()
+        z[held] = place
+        rates = equations.rates(z[:, None], np.where(_is_rate(u), 0.0, u), p)[n:, 0]
+        return _finite(rates)
+
+    if np.any(held):
+        found = least_squares(unbalanced, state[held], x_scale="jac", max_nfev=_MOST_EVALUATIONS)
+        if found.success:
+            state[held] = found.x
     return state
+
+
+def _finite(values: Floats) -> Floats:
+    """Return values of which those that are no number are large."""
+    return np.nan_to_num(values, nan=_HUGE, posinf=_HUGE, neginf=-_HUGE)
+
+
+def _is_rate(u: Floats) -> NDArray[np.bool_]:
+    """Return which rows of inputs with their derivatives are derivatives."""
+    return (np.arange(u.shape[0]) % 3 > 0)[:, None]
+
+
+def _level_and_slope(signal: Floats, dt: float, resting: int | None) -> tuple[float, float]:
+    if resting is not None:
+        return float(np.mean(signal[:resting])), 0.0
+    count = min(_FIRST_SAMPLES, signal.size)
+    if count < 2:
+        return float(signal[0]), 0.0
+    slope, level = np.polyfit(np.arange(count) * dt, signal[:count], 1)
+    return float(level), float(slope)
+
+
+def _sizes(signal: Floats, dt: float) -> tuple[float, float]:
+    """Return the size of a reading and of its slope; never zero."""
+    size = size_of_signal([signal]) or 1.0
+    slope = size_of_signal([np.gradient(signal, dt)]) if signal.size > 1 else 0.0
+    return size, slope or size / (signal.size * dt)
+
+
+def _state_scale(
+    equations: RigEquations, state: Floats, u: Floats, p: Floats, seen: Sequence[int], sizes: Floats
+) -> Floats:
+    """Return the size that each state has by the sensor that shows it best, one where none does, shape (n_states,)."""
+    by_state = np.abs(equations.readings_by_state(state[:, None], u, p)[seen, :, 0])
+    n, scale = equations.n_coordinates, np.full(state.size, np.inf)
+    for row, (size, slope) in zip(by_state, sizes, strict=True):
+        with np.errstate(divide="ignore"):
+            scale = np.minimum(scale, np.where(row > 0.0, size / row, np.inf))
+            scale[n : 2 * n] = np.minimum(scale[n : 2 * n], np.where(row[:n] > 0.0, slope / row[:n], np.inf))
+    return np.where(np.isfinite(scale), scale, 1.0)
+
+
+def _with_effects(
+    structure: Structure, record: Record, equations: RigEquations, values: Mapping[str, float], own: Floats
+) -> Floats:
+    """Return the states of a structure: those of its rig, lags of its effects settled, and no memory."""
+    state = np.zeros(len(structure.states))
+    state[: own.size] = own
+    lagging = [
+        (i, effect)
+        for effect in structure.effects
+        for i, name in enumerate(structure.state_names)
+        if name.startswith(f"{effect.name}.") and effect.place in (Place.ACTUATOR, Place.SENSOR)
+    ]
+    if not lagging:
+        return state
+    p = equations.parameters(values, record)
+    u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
+    signals = equations.at_places(own[:, None], u, p)
+    readings = dict(zip(equations.sensor_names, equations.readings(own[:, None], u, p)[:, 0], strict=True))
+    for i, effect in lagging:
+        place = structure.rig.acts_at(effect)
+        bases = {base.partition("@")[0] for base in parse_dimension(structure.state_dimensions[i])}
+        if effect.place is Place.ACTUATOR and bases == {"input"}:
+            state[i] = float(signals[f"signal@{place}"][0])
+        elif effect.place is Place.SENSOR and bases == {"x"}:
+            state[i] = float(readings[place])
+    return state
+
+
+def _resting_samples(record: Record, inputs: Sequence[str]) -> int:
+    """Return how many samples pass before an input moves."""
+    first = record.n_samples
+    for name in inputs:
+        drive = record[name]
+        moving = np.flatnonzero(np.abs(drive - drive[0]) > _RESTING * float(np.ptp(drive)))
+        first = min(first, int(moving[0])) if moving.size else first
+    return max(_FIRST_SAMPLES, first)

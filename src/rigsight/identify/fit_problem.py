@@ -56,15 +56,12 @@ class RecordData:
         Shape (n_samples, n_outputs), NaN where an output was not measured.
     weights
         Reciprocal noise of each output, 0 where it was not measured.
-    first_state
-        Guess of the initial state, shape (n_states,).
     """
 
     record: Record
     held: HeldInput
     measured: NDArray[np.float64]
     weights: NDArray[np.float64]
-    first_state: NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ class GreyBoxFit:
     structure
         Rig and effects.
     records
-        Records to fit; a record may lack any output but the first.
+        Records to fit; a record may lack sensors, of a rig of one motion any but the first.
     scales
         Size of each base quantity, see `characteristic_scales`.
     output_noise
@@ -131,8 +131,7 @@ class GreyBoxFit:
         missing = np.full(record.n_samples, np.nan)
         measured = np.column_stack([record.signals.get(n, missing) for n in names])
         weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
-        guess = first_state(self.structure, record)
-        return RecordData(record, record_input(self.structure, record), measured, weights, guess)
+        return RecordData(record, record_input(self.structure, record), measured, weights)
 
     def fit(
         self,
@@ -178,7 +177,7 @@ class GreyBoxFit:
         else:
             problem.substeps = [n if isinstance(n, Substeps) else Substeps(n) for n in substeps]
         if not np.isfinite(problem.at(theta).cost):
-            return self._failed(coordinates, theta, "The start values cannot be simulated.")
+            return self._failed(problem, theta, "The start values cannot be simulated.")
         if theta.size == 0:
             return self._result(problem, theta, True, "Nothing to fit.", finish)
 
@@ -229,7 +228,7 @@ class GreyBoxFit:
         problem = SeparateStates(self.data, coordinates, begin.places, begin.lower, begin.upper)
         problem.choose_substeps(begin.theta)
         if not np.isfinite(problem.settle_anew(begin.theta[:n_free])):
-            return self._failed(coordinates, begin.theta, "The start values cannot be simulated.")
+            return self._failed(problem, begin.theta, "The start values cannot be simulated.")
 
         def search() -> _Outcome:
             own, success, message = begin.theta[:n_free], True, "Nothing to fit but initial states."
@@ -298,14 +297,14 @@ class GreyBoxFit:
 
     def _first_states(self, start: Mapping[str, float]) -> list[NDArray[np.float64]]:
         """Return each record's guess; of several for states with a range, and of moving and resting, the best."""
-        guesses = [d.first_state for d in self.data.records]
+        guesses = [first_state(self.structure, d.record, start) for d in self.data.records]
         if not np.any(self.data.limited):
             return guesses
         p = np.array([start[name] for name in self.structure.names])
         ranges = np.where(self.data.limited, self.data.state_sizes(p[:, None])[:, 0], 0.0)
         found = []
         for data, guess in zip(self.data.records, guesses, strict=True):
-            at_rest = state_at_rest(self.structure, data.record, guess)
+            at_rest = state_at_rest(self.structure, data.record, guess, start)
             lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
             n_samples = data.record.n_samples
             with np.errstate(all="ignore"):
@@ -317,7 +316,8 @@ class GreyBoxFit:
             found.append(lanes[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else guess)
         return found
 
-    def _failed(self, coordinates: Coordinates, theta: NDArray[np.float64], message: str) -> FitResult:
+    def _failed(self, problem: Problem, theta: NDArray[np.float64], message: str) -> FitResult:
+        coordinates = problem.coordinates
         p = coordinates.to_parameters(theta[: len(coordinates.free)])
         n = len(coordinates.free)
         return FitResult(
@@ -326,7 +326,7 @@ class GreyBoxFit:
             message=message,
             values=dict(zip(self.structure.names, map(float, p), strict=True)),
             standard_errors=dict.fromkeys(coordinates.free, float("inf")),
-            initial_states=tuple(d.first_state for d in self.data.records),
+            initial_states=tuple(problem.states(theta)),
             cost=float("inf"),
             n_samples=self.n_samples,
             n_evaluations=1,
@@ -350,7 +350,7 @@ class GreyBoxFit:
             try:
                 residuals = tuple(self.data.of_each_record(lambda i: self._left(i, p, states[i])))
             except SimulationError as error:
-                return self._failed(coordinates, theta, str(error))
+                return self._failed(problem, theta, str(error))
             cost = float(
                 sum(
                     np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self.data.records, strict=True)

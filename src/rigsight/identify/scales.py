@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigsight.identify.place_scales import scales_at_places
+from rigsight.identify.typical_size import typical_size
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
-
-_MOST = 98.0
 
 
 def characteristic_scales(
@@ -26,17 +25,31 @@ def characteristic_scales(
     records
         Estimation records.
     values
-        Constants and identified linear parameters of the rig, by name.
+        Constants and identified parameters of the rig, by name.
 
     Returns
     -------
     ``x`` displacement, ``input``, ``drive`` (force of the drive), ``force`` (of the spring), ``time`` [s] (reciprocal of the
-    angular frequency of the motion) and ``length`` (size of the second output, 1 where there is none).
+    angular frequency of the motion) and ``length`` (size of the rig's own first state, 1 where there is none), each as it is and
+    at every joint, drive, sensor and state (``force@shaft``); for a rig of more than one motion also ``size@NAME`` for each of
+    its parameters, coordinates, rates (``size@d(NAME)``) and states.
     """
-    if not rig.is_driven:
-        return _prescribed(rig, records)
-    displacement = _size([record[rig.outputs[0].name] for record in records])
-    drive_input = _size([record[rig.inputs[0].name] for record in records])
+    if not rig.has_one_motion:
+        return scales_at_places(rig, records, values)
+    plain = _of_one_motion(rig, records, values) if rig.is_driven else _prescribed(rig, records)
+    mechanism = rig.mechanism
+    places = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
+    scales = {**plain, **{f"{base}@{place}": size for place in places for base, size in plain.items()}}
+    seen = {output.name: [r[output.name] for r in records if output.name in r] for output in rig.outputs}
+    for name in [*seen, *(state.name for state in mechanism.states if state.name not in seen)]:
+        reading = typical_size(seen[name]) if seen.get(name) else plain["x"]
+        scales |= {f"{base}@{name}": size for base, size in {**plain, "x": reading}.items()}
+    return scales
+
+
+def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
+    displacement = typical_size([record[rig.outputs[0].name] for record in records])
+    drive_input = typical_size([record[rig.inputs[0].name] for record in records])
     motion = rig.motion
     gain, stiffness, inertia = (
         evaluated(part, values) for part in (motion.drive_gain, motion.stiffness, motion.inertia)
@@ -46,7 +59,7 @@ def characteristic_scales(
     length = 1.0
     if len(rig.outputs) > 1:
         seconds = [r[rig.outputs[1].name] for r in records if rig.outputs[1].name in r]
-        length = _size(seconds) if seconds else 1.0
+        length = typical_size(seconds) if seconds else 1.0
     return {
         "x": displacement,
         "input": drive_input,
@@ -59,9 +72,9 @@ def characteristic_scales(
 
 def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
     motions = [smooth_motion(r[rig.inputs[0].name], r.dt) for r in records]
-    displacement = _size([x for x, _ in motions])
-    velocity = _size([v for _, v in motions])
-    force = _size([r[rig.outputs[0].name] for r in records])
+    displacement = typical_size([x for x, _ in motions])
+    velocity = typical_size([v for _, v in motions])
+    force = typical_size([r[rig.outputs[0].name] for r in records])
     return {
         "x": displacement,
         "force": force,
@@ -72,14 +85,10 @@ def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
     }
 
 
-def _size(signals: Sequence[NDArray[np.float64]]) -> float:
-    """Return what all but the rarest deviations from the middle stay below; never zero."""
-    deviations = np.concatenate([np.abs(signal - np.median(signal)) for signal in signals])
-    size = float(np.percentile(deviations, _MOST)) or float(np.max(deviations))
-    return size or 1.0
-
-
 def _typical_omega(rig: Rig, records: Sequence[Record]) -> float:
     name = rig.outputs[0].name
-    ratios = [_size([np.gradient(record[name], record.dt)]) / _size([record[name]]) for record in records]
+    ratios = [
+        typical_size([np.gradient(record[name], record.dt)]) / typical_size([record[name]])
+        for record in records
+    ]
     return float(np.median(ratios))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, get_args
@@ -47,6 +47,8 @@ class Record:
         The file it was read from, None for a simulated record.
     notes
         What was found or repaired while reading, one sentence each.
+    constants
+        Known numbers of the rig that differ from record to record (a payload), by name; they replace the campaign's.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class Record:
     hold: Hold = "foh"
     source: Path | None = None
     notes: tuple[str, ...] = ()
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.dt) and self.dt > 0.0):
@@ -87,6 +90,7 @@ class Record:
             )
         object.__setattr__(self, "signals", MappingProxyType(signals))
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        object.__setattr__(self, "constants", MappingProxyType(self._checked_constants()))
 
     def _checked(self, signal: str, samples: ArrayLike) -> NDArray[np.float64]:
         """Return a private, read-only copy: a caller that goes on writing to its array must not change the record."""
@@ -104,9 +108,18 @@ class Record:
         array.flags.writeable = False
         return array
 
+    def _checked_constants(self) -> dict[str, float]:
+        for constant, value in self.constants.items():
+            if not math.isfinite(value):
+                raise InputError(
+                    f"Record '{self.name}': constant '{constant}' must be finite, got {value!r}."
+                )
+        return {constant: float(value) for constant, value in self.constants.items()}
+
     # A mappingproxy cannot be pickled, and records travel to worker processes.
     def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "signals": dict(self.signals), "units": dict(self.units)}
+        own = {"signals": dict(self.signals), "units": dict(self.units), "constants": dict(self.constants)}
+        return {**self.__dict__, **own}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)

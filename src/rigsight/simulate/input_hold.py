@@ -53,6 +53,20 @@ class HeldInput:
         """Pieces of the record."""
         return int(self.coefficients.shape[0]) - 1
 
+    def at_samples(self, n_samples: int) -> NDArray[np.float64]:
+        """Return each input with its first and second derivative by time at the samples, shape (3 n_inputs, n_samples).
+
+        They are those of the piece that begins there; at the last sample those of the piece that ends there.
+        """
+        rows = self.coefficients.reshape(self.n_pieces + 1, -1, 4)
+        starts = rows[1 :: self.per_sample][: n_samples - 1]
+        tau, (c0, c1, c2, c3) = (self.interval if self.n_pieces else 0.0), rows[-1].T
+        values = [c0 + tau * (c1 + tau * (c2 + tau * c3)), c1 + tau * (2.0 * c2 + 3.0 * tau * c3)]
+        last = np.stack([*values, c2 + 3.0 * tau * c3])
+        found = np.concatenate([starts[:, :, :3], last.T[None]])
+        found[:, :, 2] *= 2.0
+        return np.moveaxis(found, 0, 2).reshape(-1, found.shape[0])
+
 
 def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput:
     """Return the input between its samples.

@@ -51,6 +51,24 @@ def equation_tree(
     return _Path(_Binder(rig, symbols, unique, fixed), rig, effects).tree()
 
 
+def bound_to(
+    rig: Rig, symbols: Mapping[str, sp.Symbol], expressions: Sequence[sp.Expr]
+) -> tuple[sp.Expr, ...]:
+    """Return expressions of a rig's declaration in the symbols of its structure, drives and sensors without effects.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    symbols
+        Symbol of each parameter of the structure by its name there.
+    expressions
+        Of the rig's own names; none reads the force of a joint.
+    """
+    path = _Path(_Binder(rig, symbols, {}, {}), rig, ())
+    return path.bound(expressions)
+
+
 class _Binder:
     """Replaces the symbols of rig and effect declarations by those of one structure."""
 
@@ -138,6 +156,18 @@ class _Path:
             states=(*followers, *memories, *lags, *of_sensors),
             outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
         )
+
+    def bound(self, expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
+        """Return expressions with what drives and sensors are in front of any joint."""
+        mechanism = self._rig.mechanism
+        drives = {drive.name: drive for drive in mechanism.drives}
+        sensors = {sensor.name: sensor for sensor in mechanism.sensors}
+        for name in mechanism.order:
+            if name in drives:
+                self._drive(drives[name])
+            else:
+                self._sensor(sensors[name], {}, [])
+        return tuple(self._bound(expression) for expression in expressions)
 
     def _inputs(self) -> tuple[sp.Symbol, ...]:
         mechanism, found = self._rig.mechanism, []

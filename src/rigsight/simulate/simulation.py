@@ -43,6 +43,9 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
     Where the motion is prescribed, it is the smoothing spline through the measured displacement.
     """
     mechanism = structure.rig.mechanism
+    if not mechanism.inputs:
+        # What only decays reads nothing, but pieces of time it needs all the same.
+        return hold_input(np.zeros(record.n_samples), record.dt, "zoh")
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
     return together(
         [

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.identify.coordinates import Coordinates
+from rigsight.identify.first_states import first_state
 from rigsight.identify.fit_result import FitResult
 from rigsight.identify.grey_box import GreyBoxFit
 from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
@@ -172,7 +173,8 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float6
     p = np.array([coordinates.to_parameters(theta) for theta in thetas]).T
     total = np.zeros(thetas.shape[0])
     for data in look.data.records:
-        states = np.repeat(data.first_state[:, None], thetas.shape[0], axis=1)
+        first = first_state(look.structure, data.record, {})
+        states = np.repeat(first[:, None], thetas.shape[0], axis=1)
         outputs = simulate_sets(look.structure, data.held, p, states, data.record.n_samples, _SUBSTEPS)
         with np.errstate(invalid="ignore", over="ignore"):
             # An offset is the refinement's business, not the search's.

@@ -1,0 +1,276 @@
+"""What do a rig's equations, without effects, say in numbers? Its rates, its readings and its forces as functions of arrays."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.records.record import Record
+from rigsight.rigs import Joint, Rig
+from rigsight.simulate import compose, parameter_vector, record_input
+from rigsight.simulate.equation_tree import Output
+from rigsight.simulate.input_hold import HeldInput
+from rigsight.simulate.signal_path import bound_to
+from rigsight.simulate.structure import TIME, input_symbols
+
+Floats = NDArray[np.float64]
+
+_KEPT = 32
+"""Rigs whose functions are kept: to write them down takes a tenth of a second, and every fit asks for them."""
+_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
+_known: OrderedDict[int, tuple[Rig, RigEquations]] = OrderedDict()
+
+
+def equations_of(rig: Rig) -> RigEquations:
+    """Return the equations of a rig as functions; those of the same rig are the same object."""
+    found = _known.get(id(rig))
+    if found is None:
+        found = _known[id(rig)] = (rig, RigEquations(rig))
+        while len(_known) > _KEPT:
+            _known.popitem(last=False)
+    return found[1]
+
+
+class RigEquations:
+    """The equations of a rig without effects.
+
+    All functions take the states ``z`` of shape (n_states, n_samples), the inputs ``u`` of shape (3 n_inputs, n_samples) (each
+    with its first and second derivative by time) and the parameter vector ``p`` of `structure`, shape (n_parameters,).
+
+    Parameters
+    ----------
+    rig
+        The rig.
+
+    Attributes
+    ----------
+    structure
+        The rig with a sensor for each of its states behind its own, so that one simulation shows them all.
+    n_coordinates
+        Degrees of freedom; coordinates come first among the states, then their rates, then the rig's own states.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        mechanism = rig.mechanism
+        free = mechanism.free
+        own = [*(c.symbol for c in free), *(c.rate for c in free), *(s.symbol for s in mechanism.states)]
+        alone = compose(rig)
+        shown = tuple(Output(f"state {symbol.name}", (symbol,)) for symbol in own)
+        self.structure = replace(alone, tree=replace(alone.tree, outputs=(*alone.tree.outputs, *shown)))
+        self.n_coordinates = len(free)
+        self.sensor_names = tuple(sensor.name for sensor in mechanism.sensors)
+        self.state_names = tuple(symbol.name for symbol in own)
+
+    @property
+    def n_states(self) -> int:
+        """Coordinates, rates and own states."""
+        return len(self.structure.states)
+
+    def parameters(self, values: Mapping[str, float], record: Record) -> Floats:
+        """Return the parameter vector of values by name with the record's own constants; a missing one has its default."""
+        return parameter_vector(self.structure, {**values, **record.constants})
+
+    def inputs_of(self, record: Record) -> tuple[HeldInput, Floats]:
+        """Return a record's inputs between samples, and at them with their derivatives, shape (3 n_inputs, n_samples)."""
+        held = record_input(self.structure, record)
+        return held, held.at_samples(record.n_samples)[: 3 * len(self.rig.inputs)]
+
+    def accelerations(self, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return the second derivatives of the coordinates, shape (n_coordinates, n_samples)."""
+        n = self.n_coordinates
+        if n == 0:
+            return np.zeros((0, z.shape[1]))
+        mass = self.mass(z, u, p)
+        forces = np.moveaxis(self._evaluated(self._forces, z, u, p), 0, 1)
+        with np.errstate(all="ignore"):
+            solved = np.linalg.solve(mass, forces[:, :, None])
+        return np.asarray(solved[:, :, 0].T, dtype=np.float64)
+
+    def mass(self, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return the mass matrix, shape (n_samples, n_coordinates, n_coordinates)."""
+        n = self.n_coordinates
+        return np.moveaxis(self._evaluated(self._mass, z, u, p).reshape(n, n, z.shape[1]), 2, 0)
+
+    def rates(self, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return the derivatives of the states by time, shape (n_states, n_samples)."""
+        n = self.n_coordinates
+        own = self._evaluated(self._own_rates, z, u, p)
+        return np.concatenate([z[n : 2 * n], self.accelerations(z, u, p), own])
+
+    def readings(self, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return what the rig's sensors show, shape (n_sensors, n_samples)."""
+        return self._evaluated(self._readings, z, u, p)
+
+    def reading_slopes(self, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return the derivatives of what the sensors show by time, shape (n_sensors, n_samples)."""
+        n_sensors = len(self.sensor_names)
+        by_state = self._evaluated(self._by_state, z, u, p).reshape(n_sensors, self.n_states, z.shape[1])
+        by_input = self._evaluated(self._by_input, z, u, p).reshape(n_sensors, u.shape[0], z.shape[1])
+        own = np.einsum("ijk,jk->ik", by_state, self.rates(z, u, p))
+        return np.asarray(own + np.einsum("ijk,jk->ik", by_input, _input_rates(u)))
+
+    def readings_by_state(self, z: Floats, u: Floats, p: Floats) -> Floats:
+        """Return the derivatives of what the sensors show by the states, shape (n_sensors, n_states, n_samples)."""
+        return self._evaluated(self._by_state, z, u, p).reshape(
+            len(self.sensor_names), self.n_states, z.shape[1]
+        )
+
+    def at_places(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
+        """Return motion and forces of joints and drives, shape (n_samples,) each.
+
+        ``motion@J`` (from rest), ``rate@J``, ``spring@J``, ``damper@J``, ``own@J`` (what else resists) of a joint, ``signal@D``
+        and ``force@D`` of a drive.
+        """
+        rows = self._evaluated(self._of_places[1], z, u, p)
+        return dict(zip(self._of_places[0], rows, strict=True))
+
+    def slopes_along(self, z: Floats, u: Floats, p: Floats) -> dict[str, Floats]:
+        """Return how the motion of each joint, and what each drive acts along, changes with the degrees of freedom.
+
+        Shape (n_coordinates, n_samples) each.
+        """
+        rows = self._evaluated(self._along, z, u, p).reshape(-1, self.n_coordinates, z.shape[1])
+        mechanism = self.rig.mechanism
+        places = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
+        return dict(zip(places, rows, strict=True))
+
+    def changes_of_equations(
+        self, z: Floats, u: Floats, p: Floats, accelerations: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return how large each equation's parts are, and how each parameter changes it.
+
+        The equations are those of motion (as forces), of the own states (as rates) and of the sensors.
+
+        Returns
+        -------
+        The largest part of each equation at each sample, shape (n_equations, n_samples), and the derivatives by the parameters,
+        shape (n_equations, n_parameters, n_samples).
+        """
+        parts, slopes, ends = self._of_parameters
+        arguments = [*z, *u, 0.0, *p, *accelerations]
+        rows = _rows(parts(*arguments), z.shape[1])
+        largest = [
+            np.max(np.abs(rows[first:last]), axis=0)
+            for first, last in zip([0, *ends[:-1]], ends, strict=True)
+        ]
+        by_parameter = _rows(slopes(*arguments), z.shape[1])
+        return np.array(largest), by_parameter.reshape(len(ends), p.size, z.shape[1])
+
+    def _evaluated(self, function: Any, z: Floats, u: Floats, p: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            return _rows(function(*z, *u, 0.0, *p), z.shape[1])
+
+    @cached_property
+    def _arguments(self) -> list[sp.Symbol]:
+        inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
+        return [*self.structure.states, *inputs, TIME, *self.structure.parameter_symbols]
+
+    def _function(self, expressions: list[sp.Expr], *further: sp.Symbol) -> Any:
+        return sp.lambdify([*self._arguments, *further], expressions, modules=[_FUNCTIONS, "numpy"], cse=True)
+
+    @cached_property
+    def _mass(self) -> Any:
+        return self._function([self.structure.tree.flattened(e) for e in self.structure.tree.motion.mass])
+
+    @cached_property
+    def _forces(self) -> Any:
+        tree = self.structure.tree
+        return self._function([tree.flattened(force) for force in tree.motion.forces])
+
+    @cached_property
+    def _own_rates(self) -> Any:
+        tree = self.structure.tree
+        return self._function([tree.flattened(state.rate) for state in tree.states])
+
+    @cached_property
+    def _sensor_expressions(self) -> list[sp.Expr]:
+        return list(self.structure.outputs[: len(self.sensor_names)])
+
+    @cached_property
+    def _readings(self) -> Any:
+        return self._function(self._sensor_expressions)
+
+    @cached_property
+    def _by_state(self) -> Any:
+        return self._function(
+            [sp.diff(e, symbol) for e in self._sensor_expressions for symbol in self.structure.states]
+        )
+
+    @cached_property
+    def _by_input(self) -> Any:
+        inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
+        return self._function([sp.diff(e, symbol) for e in self._sensor_expressions for symbol in inputs])
+
+    @cached_property
+    def _of_places(self) -> tuple[list[str], Any]:
+        mechanism = self.rig.mechanism
+        wanted: dict[str, sp.Expr] = {}
+        for joint in mechanism.joints:
+            wanted |= _of_joint(joint, self.rig)
+        for drive in mechanism.drives:
+            wanted |= {f"signal@{drive.name}": drive.signal, f"force@{drive.name}": drive.force}
+        return list(wanted), self._function(self._bound(list(wanted.values())))
+
+    @cached_property
+    def _along(self) -> Any:
+        mechanism = self.rig.mechanism
+        moved = [*(joint.motion for joint in mechanism.joints), *(drive.along for drive in mechanism.drives)]
+        slopes = [sp.diff(motion, c.symbol) for motion in moved for c in mechanism.free]
+        return self._function(self._bound(slopes))
+
+    def _bound(self, expressions: list[sp.Expr]) -> list[sp.Expr]:
+        structure = self.structure
+        symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
+        return list(bound_to(self.rig, symbols, expressions))
+
+    @cached_property
+    def _of_parameters(self) -> tuple[Any, Any, list[int]]:
+        tree, names = self.structure.tree, self.rig.mechanism.free
+        motion = tree.motion
+        accelerations = [sp.Symbol(f"acceleration {c.name}", real=True) for c in names]
+        parts: list[list[sp.Expr]] = []
+        for i, terms in enumerate(motion.terms):
+            inertial = [motion.mass[i, j] * a for j, a in enumerate(accelerations)]
+            parts.append([tree.flattened(part) for part in (*inertial, *(-term for term in terms))])
+        parts += [[tree.flattened(term) for term in state.terms] for state in tree.states]
+        parts += [list(sp.Add.make_args(e)) for e in self._sensor_expressions]
+        slopes = [sp.diff(sp.Add(*own), p) for own in parts for p in self.structure.parameter_symbols]
+        # One part of them may be lacking: an equation of motion without any force.
+        parts = [own or [sp.S.Zero] for own in parts]
+        ends = list(np.cumsum([len(own) for own in parts]))
+        together = self._function([part for own in parts for part in own], *accelerations)
+        return together, self._function(slopes, *accelerations), [int(end) for end in ends]
+
+
+def _of_joint(joint: Joint, rig: Rig) -> dict[str, sp.Expr]:
+    motion, rate = joint.motion - joint.rest, rig.mechanism.rate(joint.motion)
+    return {
+        f"motion@{joint.name}": motion,
+        f"rate@{joint.name}": rate,
+        f"spring@{joint.name}": joint.stiffness * motion,
+        f"damper@{joint.name}": joint.damping * rate,
+        f"own@{joint.name}": joint.force,
+    }
+
+
+def _rows(values: Any, n_samples: int) -> Floats:
+    """Return what a function of arrays gives, shape (n_rows, n_samples); a part of it may be constant."""
+    found = np.empty((len(values), n_samples))
+    for row, value in zip(found, values, strict=True):
+        row[:] = value
+    return found
+
+
+def _input_rates(u: Floats) -> Floats:
+    """Return the derivatives of inputs by time; that of the second derivative is unknown."""
+    rates = np.zeros_like(u)
+    rates[0::3], rates[1::3] = u[1::3], u[2::3]
+    return rates

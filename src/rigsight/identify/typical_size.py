@@ -1,0 +1,51 @@
+"""How large is a signal, apart from its middle and its rarest values?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+_MOST = 98.0
+_STILL = 1e-12
+"""Range of a signal relative to its size that is rounding."""
+
+
+def typical_size(signals: Sequence[NDArray[np.float64]]) -> float:
+    """Return what all but the rarest deviations from the middle stay below; never zero.
+
+    Parameters
+    ----------
+    signals
+        Each of shape (n_samples,).
+    """
+    deviations = np.concatenate([np.abs(signal - np.median(signal)) for signal in signals])
+    size = float(np.percentile(deviations, _MOST)) or float(np.max(deviations))
+    return size or 1.0
+
+
+def size_about_zero(signals: Sequence[NDArray[np.float64]]) -> float:
+    """Return what all but the rarest values stay below; zero for a signal that is.
+
+    Parameters
+    ----------
+    signals
+        Each of shape (n_samples,).
+    """
+    values = np.concatenate([np.abs(signal) for signal in signals])
+    return float(np.percentile(values, _MOST)) or float(np.max(values))
+
+
+def size_of_signal(signals: Sequence[NDArray[np.float64]]) -> float:
+    """Return the typical size of deviations from the middle, of what is constant its distance from zero; zero if it is zero.
+
+    Parameters
+    ----------
+    signals
+        Each of shape (n_samples,).
+    """
+    largest = max(float(np.max(np.abs(signal))) for signal in signals)
+    if max(float(np.ptp(signal)) for signal in signals) <= _STILL * largest:
+        return largest
+    return typical_size(signals)
