@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.records.record import Record
@@ -172,3 +173,28 @@ def test_what_only_decays_needs_no_input() -> None:
     found = GreyBoxFit(compose(rig), [record], scales, {"angle": NOISE}).fit(start, ["l", "d"])
     assert found.weighted_rms == pytest.approx(1.0, abs=0.05)
     assert found.values["l"] == pytest.approx(0.4, rel=1e-3)
+
+
+def test_records_of_known_different_payload_are_fitted_together() -> None:
+    rig = rig_of("servo")
+    noise = 1e-3
+    records = []
+    for index, payload in enumerate((0.5, 1.0, 1.8)):
+        clean = made(rig, {**SERVO, "m": payload}, {"goal": np.roll(chirp(0.6), 100 * index)}, noise)
+        records.append(Record(f"run {index}", DT, clean.signals, {}, constants={"m": payload}))
+    start = {**SERVO, "J": 0.024, "k_v": 2.7, "d": 0.25, "angle_off": 0.0, "m": 7.0}
+    fit = GreyBoxFit(compose(rig), records, characteristic_scales(rig, records, start), {"angle": noise})
+    found = fit.fit(start, [p.name for p in rig.parameters])
+    assert found.weighted_rms == pytest.approx(1.0, abs=0.03)
+    for name in ("J", "k_v", "d", "angle_off"):
+        assert abs(found.values[name] - SERVO[name]) < 5.0 * found.standard_errors[name]
+    # Each is simulated with its own payload; that of the campaign, 7 kg, belongs to none.
+    shown = simulate(compose(rig), found.values, records[0], found.initial_states[0])
+    assert np.std(shown["angle"] - records[0]["angle"]) == pytest.approx(noise, rel=0.05)
+
+
+def test_a_constant_that_the_rig_does_not_have_is_refused() -> None:
+    rig = rig_of("servo")
+    record = Record("run", DT, {"goal": chirp()}, {}, constants={"payload": 1.0})
+    with pytest.raises(InputError, match=r"'run': constant.*'payload'"):
+        simulate(compose(rig), SERVO, record)

@@ -26,7 +26,10 @@ class FitMemory(Protocol):
 def record_digest(record: Record) -> str:
     """Return a hash of all that a fit takes from a record."""
     digest = hashlib.blake2b(digest_size=16)
-    digest.update(json.dumps([record.n_samples, record.dt, record.hold, sorted(record.signals)]).encode())
+    told: list[Any] = [record.n_samples, record.dt, record.hold, sorted(record.signals)]
+    # Without any of its own, what was remembered before there were such constants stays known.
+    told += [sorted(record.constants.items())] if record.constants else []
+    digest.update(json.dumps(told).encode())
     for name in sorted(record.signals):
         digest.update(np.ascontiguousarray(record[name]).tobytes())
     return digest.hexdigest()

@@ -6,106 +6,33 @@ longer, the current parameters and every shifted one are lanes of its side-by-si
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import FINE_STEP, STEP, Coordinates
-from rigsight.identify.idle_threads import IdleThreads
+from rigsight.identify.fit_data import FitData, weighted
 from rigsight.identify.symmetric_eigen import symmetric_eigen
-from rigsight.records.record import Record
 from rigsight.simulate import (
     FittedRecord,
-    Structure,
     Substeps,
     carries_tangents,
     choose_substeps,
     normal_equations,
     simulate_sets,
     simulate_tangents,
-    state_limits,
     tangent_equations,
 )
-from rigsight.simulate.input_hold import HeldInput
-
-Result = TypeVar("Result")
 
 MOST_SUBSTEPS = 16
 """A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
 _WORTH_REFINING = 1e-3
 """Share of the cost that finer steps must promise to remove."""
-_LEAST_RANGE = 1e-9
-"""Least unit of a limited state, in units of its size: a play of zero has no range."""
 _WORSE = 1e3
-
-
-@dataclass(frozen=True)
-class RecordData:
-    """One record as a fit sees it.
-
-    Attributes
-    ----------
-    record, held
-        The record, and its input between samples.
-    measured
-        Shape (n_samples, n_outputs), NaN where an output was not measured.
-    weights
-        Reciprocal noise of each output, 0 where it was not measured.
-    """
-
-    record: Record
-    held: HeldInput
-    measured: NDArray[np.float64]
-    weights: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class FitData:
-    """What is fitted to what.
-
-    Attributes
-    ----------
-    structure
-        Rig and effects.
-    records
-        The records.
-    limited
-        Which states cannot leave a range, shape (n_states,).
-    unlimited_sizes
-        Characteristic size of each state, shape (n_states, 1).
-    accuracy
-        Relative accuracy of the simulations.
-    threads
-        Who helps with the records.
-    """
-
-    structure: Structure
-    records: tuple[RecordData, ...]
-    limited: NDArray[np.bool_]
-    unlimited_sizes: NDArray[np.float64]
-    accuracy: float
-    threads: IdleThreads = field(default_factory=IdleThreads)
-
-    def of_each_record(self, one: Callable[[int], Result]) -> list[Result]:
-        """Return what a function makes of the number of each record, in their order."""
-        return self.threads.results(one, [record.record.n_samples for record in self.records])
-
-    def state_sizes(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the unit in which a fit moves each initial state, shape (n_states, n_sets).
-
-        A state that cannot leave a range is moved in units of that range, whatever the parameters make of it: beyond an end
-        nothing depends on it, and a fit that wandered there would not come back.
-        """
-        sizes = np.repeat(self.unlimited_sizes, p.shape[1], axis=1)
-        if np.any(self.limited):
-            limits = state_limits(self.structure, p)
-            sizes[self.limited] = np.maximum(limits[self.limited], _LEAST_RANGE * sizes[self.limited])
-        return sizes
 
 
 @dataclass(frozen=True)
@@ -172,7 +99,7 @@ class Problem:
                 return choose_substeps(
                     self.data.structure,
                     record.held,
-                    p,
+                    record.parameters(p),
                     states[index],
                     record.record.n_samples,
                     self.data.accuracy,
@@ -280,7 +207,14 @@ class Problem:
                 own, n = data.records[index], data.records[index].record.n_samples
                 with np.errstate(all="ignore"):
                     out = simulate_tangents(
-                        data.structure, own.held, p, dp, x0[index], dx0, n, self.substeps[index]
+                        data.structure,
+                        own.held,
+                        own.parameters(p),
+                        dp,
+                        x0[index],
+                        dx0,
+                        n,
+                        self.substeps[index],
                     )
                     # To `weighted` they are outputs of sets that differ by one.
                     out[:, :, 1:] += out[:, :, :1]
@@ -343,20 +277,45 @@ class Problem:
         if carries_tangents(data.structure):
             p, dp, x0, dx0 = self._place(theta)
             return data.threads.results_of_shares(
-                lambda share: list(
-                    tangent_equations(data.structure, [fitted[i] for i in share], p, dp, x0[list(share)], dx0)
+                self._of_equal_rigs(
+                    p,
+                    lambda own, share: tangent_equations(
+                        data.structure, [fitted[i] for i in share], own, dp, x0[share], dx0
+                    ),
                 ),
                 lengths,
             )
         shifts, sets, states = self._sets(theta)
         products = data.threads.results_of_shares(
-            lambda share: list(
-                normal_equations(data.structure, [fitted[i] for i in share], sets, states[list(share)])
+            self._of_equal_rigs(
+                sets,
+                lambda own, share: normal_equations(
+                    data.structure, [fitted[i] for i in share], own, states[share]
+                ),
             ),
             lengths,
         )
         per_shift = [np.append(1.0, 1.0 / shifts[self.columns(index)]) for index in range(len(lengths))]
         return [own * np.outer(scale, scale) for own, scale in zip(products, per_shift, strict=True)]
+
+    def _of_equal_rigs(
+        self,
+        p: NDArray[np.float64],
+        several: Callable[[NDArray[np.float64], list[int]], NDArray[np.float64]],
+    ) -> Callable[[Sequence[int]], list[NDArray[np.float64]]]:
+        """Return a function of shares of the records that calls another one for those of equal constants together."""
+
+        def of_share(share: Sequence[int]) -> list[NDArray[np.float64]]:
+            groups: dict[tuple[tuple[int, float], ...], list[int]] = {}
+            for index in share:
+                groups.setdefault(self.data.records[index].own, []).append(index)
+            found: dict[int, NDArray[np.float64]] = {}
+            for group in groups.values():
+                own = self.data.records[group[0]].parameters(p)
+                found.update(zip(group, several(own, group), strict=True))
+            return [found[index] for index in share]
+
+        return of_share
 
     def _fitted_records(self) -> list[FittedRecord]:
         # Equal numbers of steps may stand for other needs: these are the same if they are the same object.
@@ -382,30 +341,11 @@ class Problem:
         record = self.data.records[index]
         with np.errstate(all="ignore"):
             out = simulate_sets(
-                self.data.structure, record.held, p, x0, record.record.n_samples, self.substeps[index]
+                self.data.structure,
+                record.held,
+                record.parameters(p),
+                x0,
+                record.record.n_samples,
+                self.substeps[index],
             )
             return weighted(record, out)
-
-
-def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return weighted residuals (n,) of the first set and its outputs minus those of each other one (n, n_sets - 1).
-
-    Parameters
-    ----------
-    record
-        What was measured.
-    out
-        Simulated outputs, shape (n_samples, n_outputs, n_sets).
-    """
-    used = np.flatnonzero(record.weights > 0.0)
-    n_samples, _, n_sets = out.shape
-    residuals = np.empty(used.size * n_samples)
-    differences = np.empty((used.size * n_samples, n_sets - 1))
-    for place, i in enumerate(used):
-        # In place: these are the largest arrays of a fit, and every copy goes through the memory.
-        rows = slice(place * n_samples, (place + 1) * n_samples)
-        np.subtract(record.measured[:, i], out[:, i, 0], out=residuals[rows])
-        residuals[rows] *= record.weights[i]
-        np.subtract(out[:, i, :1], out[:, i, 1:], out=differences[rows])
-        differences[rows] *= record.weights[i]
-    return residuals, differences

@@ -22,8 +22,9 @@ from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import Coordinates
 from rigsight.identify.covariance import colored_covariance, propagated_covariance
 from rigsight.identify.first_states import first_state, state_at_rest
+from rigsight.identify.fit_data import FitData, RecordData
 from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
-from rigsight.identify.fit_problem import MOST_SUBSTEPS, FitData, Problem, RecordData
+from rigsight.identify.fit_problem import MOST_SUBSTEPS, Problem
 from rigsight.identify.fit_result import FitResult
 from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.search import FINE_TOLERANCE, off_kinks, searched
@@ -33,6 +34,7 @@ from rigsight.simulate import (
     Structure,
     Substeps,
     record_input,
+    record_values,
     simulate_outputs,
     simulate_sets,
 )
@@ -131,7 +133,9 @@ class GreyBoxFit:
         missing = np.full(record.n_samples, np.nan)
         measured = np.column_stack([record.signals.get(n, missing) for n in names])
         weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
-        return RecordData(record, record_input(self.structure, record), measured, weights)
+        own = record_values(self.structure, {}, record)
+        places = tuple((self.structure.names.index(name), value) for name, value in own.items())
+        return RecordData(record, record_input(self.structure, record), measured, weights, places)
 
     def fit(
         self,
@@ -308,7 +312,7 @@ class GreyBoxFit:
             lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
             n_samples = data.record.n_samples
             with np.errstate(all="ignore"):
-                sets = np.repeat(p[:, None], lanes.shape[1], axis=1)
+                sets = np.repeat(data.parameters(p)[:, None], lanes.shape[1], axis=1)
                 out = simulate_sets(self.structure, data.held, sets, lanes, n_samples, _FIRST_SUBSTEPS)
                 errors = (data.measured[:, :, None] - out) * data.weights[:, None]
                 costs = np.nansum(errors**2, axis=(0, 1))
@@ -380,5 +384,5 @@ class GreyBoxFit:
         """Return measured minus accurately simulated outputs of a record."""
         d = self.data.records[index]
         return d.measured - simulate_outputs(
-            self.structure, d.held, p, state, d.record.n_samples, self.data.accuracy
+            self.structure, d.held, d.parameters(p), state, d.record.n_samples, self.data.accuracy
         )

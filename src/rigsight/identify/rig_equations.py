@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig
-from rigsight.simulate import compose, parameter_vector, record_input
+from rigsight.simulate import compose, parameter_vector, record_input, record_values
 from rigsight.simulate.equation_tree import Output
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.signal_path import bound_to
@@ -76,7 +76,7 @@ class RigEquations:
 
     def parameters(self, values: Mapping[str, float], record: Record) -> Floats:
         """Return the parameter vector of values by name with the record's own constants; a missing one has its default."""
-        return parameter_vector(self.structure, {**values, **record.constants})
+        return parameter_vector(self.structure, record_values(self.structure, values, record))
 
     def inputs_of(self, record: Record) -> tuple[HeldInput, Floats]:
         """Return a record's inputs between samples, and at them with their derivatives, shape (3 n_inputs, n_samples)."""

@@ -14,7 +14,8 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import STEP
-from rigsight.identify.fit_problem import Evaluation, Problem, weighted
+from rigsight.identify.fit_data import weighted
+from rigsight.identify.fit_problem import Evaluation, Problem
 from rigsight.simulate import simulate_outputs
 
 FINE_TOLERANCE = 1e-6
@@ -137,7 +138,8 @@ def _evaluated(problem: Problem, place: NDArray[np.float64]) -> Evaluation:
     def accurate(index: int) -> NDArray[np.float64]:
         record = data.records[index]
         n_samples = record.record.n_samples
-        out = simulate_outputs(data.structure, record.held, p, states[index], n_samples, _EXACT)
+        own = record.parameters(p)
+        out = simulate_outputs(data.structure, record.held, own, states[index], n_samples, _EXACT)
         return weighted(record, out[:, :, None])[0]
 
     residuals = data.of_each_record(accurate)

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.identify.coordinates import STEP, Coordinates
-from rigsight.identify.fit_problem import Evaluation, FitData, Problem, weighted
+from rigsight.identify.fit_data import FitData, weighted
+from rigsight.identify.fit_problem import Evaluation, Problem
 from rigsight.identify.symmetric_eigen import symmetric_eigen
 from rigsight.simulate import simulate_sets
 
@@ -157,7 +158,7 @@ class SeparateStates(Problem):
         self, index: int, p: NDArray[np.float64], places: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         record = self.data.records[index]
-        sets = np.repeat(p[:, None], places.shape[1], axis=1)
+        sets = np.repeat(record.parameters(p)[:, None], places.shape[1], axis=1)
         with np.errstate(all="ignore"):
             out = simulate_sets(
                 self.data.structure,

@@ -10,6 +10,7 @@ from rigsight.simulate.simulation import choose_substeps as choose_substeps
 from rigsight.simulate.simulation import normal_equations as normal_equations
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
 from rigsight.simulate.simulation import record_input as record_input
+from rigsight.simulate.simulation import record_values as record_values
 from rigsight.simulate.simulation import simulate as simulate
 from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
 from rigsight.simulate.simulation import simulate_sets as simulate_sets
@@ -32,6 +33,7 @@ __all__ = [
     "normal_equations",
     "parameter_vector",
     "record_input",
+    "record_values",
     "rest_state",
     "simulate",
     "simulate_outputs",

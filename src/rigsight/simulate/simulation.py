@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError, SimulationError
+from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
@@ -74,7 +74,7 @@ def simulate(
     values
         Value of each of the structure's parameters, by name.
     record
-        Input samples and hold; its outputs are not read.
+        Input samples, hold and constants of its own; its outputs are not read.
     initial_state
         Shape (n_states,), in the order of ``structure.states``; default is the static equilibrium at the first input sample.
     accuracy
@@ -96,7 +96,7 @@ def simulate(
         names = [signal.name for signal in structure.rig.outputs]
         return record.with_signals(**{name: whole[name][len(before) :] for name in names})
     complete = structure
-    structure, values = without_vanished_effects(complete, values)
+    structure, values = without_vanished_effects(complete, record_values(complete, values, record))
     held = record_input(structure, record)
     p = parameter_vector(structure, values)
     if initial_state is None:
@@ -108,6 +108,20 @@ def simulate(
     outputs = simulate_outputs(structure, held, p, initial_state, record.n_samples, accuracy)
     names = [signal.name for signal in structure.rig.outputs]
     return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
+
+
+def record_values(structure: Structure, values: Mapping[str, float], record: Record) -> dict[str, float]:
+    """Return values with the constants that are a record's own in the place of those of all records.
+
+    Raises
+    ------
+    InputError
+        If the rig has no such constant.
+    """
+    known = [constant.name for constant in structure.rig.constants]
+    for name in record.constants:
+        check_option(f"Record '{record.name}': constant", name, known)
+    return {**values, **record.constants}
 
 
 def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArray[np.float64]:

@@ -175,7 +175,9 @@ def _costs(look: GreyBoxFit, coordinates: Coordinates, thetas: NDArray[np.float6
     for data in look.data.records:
         first = first_state(look.structure, data.record, {})
         states = np.repeat(first[:, None], thetas.shape[0], axis=1)
-        outputs = simulate_sets(look.structure, data.held, p, states, data.record.n_samples, _SUBSTEPS)
+        outputs = simulate_sets(
+            look.structure, data.held, data.parameters(p), states, data.record.n_samples, _SUBSTEPS
+        )
         with np.errstate(invalid="ignore", over="ignore"):
             # An offset is the refinement's business, not the search's.
             residual = (outputs[:, 0] - data.measured[:, :1]) * data.weights[0]
