@@ -1,8 +1,7 @@
-"""Rigs for asking what an effect would do: one effect alone along a known motion or signal, and a rig that can be pushed anywhere."""
+"""Rigs that tell what an effect would do: an effect alone along a known motion or signal, and a rig with a push at each place."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -16,7 +15,8 @@ from rigsight.simulate import Structure, compose
 
 STIFFNESS = "k"
 _JOINT, _DRIVE, _SENT, _SHOWN = "joint", "drive", "sent", "shown"
-_PUSH, _MOTION, _RATE = "push at ", "motion of ", "rate of "
+_PUSH, _MOTION = "push at ", "motion of "
+PUSH_SIZE = "push_size"
 
 
 def _real(name: str) -> sp.Symbol:
@@ -25,7 +25,7 @@ def _real(name: str) -> sp.Symbol:
 
 @cache
 def _joint_alone() -> Rig:
-    """A spring whose motion is prescribed; effects of a joint act on it."""
+    """Return a spring whose motion is prescribed; effects of a joint act on it."""
     x = Coordinate(_real("x"), _real("d(x)"), "1", prescribed_by="moved")
     mechanism = Mechanism(
         inputs=("moved",),
@@ -43,7 +43,7 @@ def _joint_alone() -> Rig:
 
 @cache
 def _signal_alone() -> Rig:
-    """A drive and a sensor that pass on a signal; effects of either act on it."""
+    """Return a drive and a sensor that pass on a signal; effects of either act on it."""
     z, signal = Coordinate(_real("z"), _real("d(z)"), "1"), _real("signal")
     mechanism = Mechanism(
         inputs=("signal",),
@@ -93,39 +93,38 @@ def _alone(same: _Same) -> tuple[Structure, int]:
 
 
 def with_probes(rig: Rig) -> Rig:
-    """Return a rig with an input more at every joint, drive and sensor, and outputs that show every joint's motion and drive's signal.
+    """Return a rig with a push at every joint, drive and sensor.
 
-    The inputs are called by `push`; the motion of a joint, its rate and the signal of a drive are the outputs behind the rig's own,
-    in the order joint by joint, then drive by drive (see `motion_outputs`, `signal_outputs`).
+    Each push is an input (see `push`), and all of them are in units of the parameter `PUSH_SIZE`. Behind the rig's own outputs
+    stand the motion of each joint (see `motion_columns`) and the signal of each drive (see `signal_columns`).
     """
-    mechanism = rig.mechanism
+    mechanism, size = rig.mechanism, _real(PUSH_SIZE)
     pushed = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
     pushed += [sensor.name for sensor in mechanism.sensors]
     inputs = tuple(map(push, pushed))
     pushes = tuple(
-        Drive(f"{_PUSH}joint {joint.name}", _real(push(joint.name)), _real(f"{_PUSH}joint {joint.name}"), joint.motion)
+        Drive(
+            f"{_PUSH}joint {joint.name}",
+            _real(push(joint.name)),
+            size * _real(f"{_PUSH}joint {joint.name}"),
+            joint.motion,
+        )
         for joint in mechanism.joints
     )
     drives = tuple(
-        replace(drive, signal=drive.signal + _real(push(drive.name))) for drive in mechanism.drives
+        replace(drive, signal=drive.signal + size * _real(push(drive.name))) for drive in mechanism.drives
     )
     sensors = tuple(
-        replace(sensor, reads=sensor.reads + _real(push(sensor.name))) for sensor in mechanism.sensors
+        replace(sensor, reads=sensor.reads + size * _real(push(sensor.name))) for sensor in mechanism.sensors
     )
-    shown = [
-        sensor
-        for joint in mechanism.joints
-        for sensor in (
-            Sensor(f"{_MOTION}{joint.name}", joint.motion - joint.rest, ""),
-            Sensor(f"{_RATE}{joint.name}", mechanism.rate(joint.motion), ""),
-        )
-    ]
+    shown = [Sensor(f"{_MOTION}{joint.name}", joint.motion - joint.rest, "") for joint in mechanism.joints]
     shown += [Sensor(f"{_SENT}{drive.name}", _real(drive.name), "") for drive in mechanism.drives]
     order = (*(drive.name for drive in pushes), *mechanism.order, *(sensor.name for sensor in shown))
     return replace(
         rig,
         name=f"{rig.name} with probes",
         inputs=(*rig.inputs, *(Signal(name, "", "") for name in inputs)),
+        parameters=(*rig.parameters, Parameter(PUSH_SIZE, "size of the push")),
         mechanism=replace(
             mechanism,
             inputs=(*mechanism.inputs, *inputs),
@@ -141,14 +140,13 @@ def push(place: str) -> str:
     return f"{_PUSH}{place}"
 
 
-def motion_columns(rig: Rig, joints: Sequence[str]) -> dict[str, int]:
-    """Return the number of the output, of the rig with probes, that shows the motion of each joint; its rate is the next one."""
+def motion_columns(rig: Rig) -> dict[str, int]:
+    """Return the number of the output, of the rig with probes, that shows the motion of each joint."""
     first = len(rig.mechanism.sensors)
-    names = [joint.name for joint in rig.mechanism.joints]
-    return {name: first + 2 * names.index(name) for name in joints}
+    return {joint.name: first + i for i, joint in enumerate(rig.mechanism.joints)}
 
 
 def signal_columns(rig: Rig) -> dict[str, int]:
     """Return the number of the output, of the rig with probes, that shows the signal of each drive."""
-    first = len(rig.mechanism.sensors) + 2 * len(rig.mechanism.joints)
+    first = len(rig.mechanism.sensors) + len(rig.mechanism.joints)
     return {drive.name: first + i for i, drive in enumerate(rig.mechanism.drives)}

@@ -1,0 +1,70 @@
+"""How did the joints move in a record? As the equations say, corrected by what the sensors show beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.rigs import Rig
+
+_DETERMINED = 1e-6
+"""Smallest singular value, relative to the largest, from which the coordinates count as shown by the sensors."""
+
+
+class Corrections:
+    """What the motion of each joint differs from a simulation, given what the sensors' readings differ from it.
+
+    Only sensors that show a sum of coordinates are asked, and only where they show all degrees of freedom together.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        mechanism = rig.mechanism
+        coordinates = [coordinate.symbol for coordinate in mechanism.free]
+        numbers = {sp.Symbol(p.name, real=True) for p in (*rig.constants, *rig.parameters)}
+        self._joints = {joint.name: _slopes(joint.motion, coordinates, numbers) for joint in mechanism.joints}
+        self._sensors = {
+            sensor.name: _slopes(sensor.reads, coordinates, numbers) for sensor in mechanism.sensors
+        }
+        self._names = [sensor.name for sensor in mechanism.sensors]
+        self._n = len(coordinates)
+
+    def of_joint(
+        self, name: str, differences: NDArray[np.float64], measured: set[str]
+    ) -> NDArray[np.float64] | None:
+        """Return the correction of a joint's motion, shape (n_samples,); None where the sensors do not tell.
+
+        Parameters
+        ----------
+        name
+            The joint.
+        differences
+            Readings less simulated ones, shape (n_samples, n_sensors).
+        measured
+            Names of the sensors that the record holds.
+        """
+        slopes = self._joints[name]
+        asked = [i for i, n in enumerate(self._names) if n in measured and self._sensors[n] is not None]
+        if slopes is None or not asked:
+            return None
+        shown = np.array([self._sensors[self._names[i]] for i in asked])
+        singular = np.linalg.svd(shown, compute_uv=False)
+        if singular.size < self._n or singular[-1] <= _DETERMINED * singular[0]:
+            return None
+        return np.asarray(differences[:, asked] @ np.linalg.pinv(shown).T @ slopes)
+
+
+def _slopes(
+    expression: sp.Expr, coordinates: list[sp.Symbol], numbers: set[sp.Symbol]
+) -> NDArray[np.float64] | None:
+    """Return the derivatives by each coordinate of a sum of multiples of them and numbers; None for any other expression."""
+    slopes = [sp.diff(expression, coordinate) for coordinate in coordinates]
+    if any(not slope.is_number for slope in slopes) or not any(slopes):
+        return None
+    rest = sp.expand(expression - sum(s * c for s, c in zip(slopes, coordinates, strict=True)))
+    return np.array(slopes, dtype=np.float64) if rest.free_symbols <= numbers else None
