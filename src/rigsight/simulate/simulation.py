@@ -74,7 +74,7 @@ def simulate(
     values
         Value of each of the structure's parameters, by name.
     record
-        Input samples and hold; its outputs are not read.
+        Input samples, hold, and its own constants, which replace those of `values`; its outputs are not read.
     initial_state
         Shape (n_states,), in the order of ``structure.states``; default is the static equilibrium at the first input sample.
     accuracy
@@ -96,7 +96,7 @@ def simulate(
         names = [signal.name for signal in structure.rig.outputs]
         return record.with_signals(**{name: whole[name][len(before) :] for name in names})
     complete = structure
-    structure, values = without_vanished_effects(complete, values)
+    structure, values = without_vanished_effects(complete, {**values, **record.constants})
     held = record_input(structure, record)
     p = parameter_vector(structure, values)
     if initial_state is None:
