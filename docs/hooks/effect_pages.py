@@ -113,7 +113,8 @@ def _equations(effect: Effect) -> str:
 
 
 def _parameters(effect: Effect) -> str:
-    rigs = [rig for rig in RIGS.values() if rig.offers(effect)]
+    # At each joint of larger rigs the units are those of its own motion.
+    rigs = [rig for rig in RIGS.values() if rig.has_one_motion and rig.offers(effect)]
     names = [rig.name.replace("_", " ") for rig in rigs]
     head = [
         "symbol",

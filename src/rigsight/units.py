@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 DIMENSIONLESS = "1"
+INPUT_UNIT = "input"
+"""Unit of a signal that is measured in whatever the drive takes."""
 
 
 def parse_dimension(dimension: str) -> dict[str, int]:

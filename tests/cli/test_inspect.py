@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigsight.rigs import RIGS
+
 from ..records.formats import FORMATS, Write, write_matlab, write_tdms, write_text
 
 Run = Callable[..., tuple[int, str, str]]
@@ -105,4 +107,4 @@ def test_an_unknown_rig_is_told(tmp_path: Path, run: Run) -> None:
     write_matlab(tmp_path / "run.mat", ROWS, {})
     code, _, stderr = run("init", tmp_path, "--model", "bicycle")
     assert code == 2
-    assert "axis, element, running_gear" in stderr
+    assert all(f"'{rig}'" in stderr for rig in RIGS)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 
+from rigsight.rigs import RIGS
 from rigsight.rigs.rig_file import rig_of_text
 
 
 def test_rigs_are_listed(run) -> None:
     code, stdout, _ = run("rigs")
     assert code == 0
-    assert [line.split()[0] for line in stdout.splitlines()] == ["axis", "element", "running_gear"]
-    assert [rig["name"] for rig in json.loads(run("rigs", "--json")[1])["rigs"]] == [
-        "axis",
-        "element",
-        "running_gear",
-    ]
+    assert [line.split()[0] for line in stdout.splitlines()] == list(RIGS)
+    assert [rig["name"] for rig in json.loads(run("rigs", "--json")[1])["rigs"]] == list(RIGS)
+    assert {"drive_train", "servo", "cart_pendulum", "two_link_arm", "quarter_car"} < set(RIGS)
 
 
 def test_the_file_of_a_rig_is_printed_as_it_can_be_read(run) -> None:

@@ -91,10 +91,10 @@ def test_scale_and_unit_exclude_each_other() -> None:
 
 
 def test_a_drive_may_be_given_in_any_unit_of_drives() -> None:
-    mapping, notes = si_mapping("run.mat", "u", "1", ColumnMapping("F", unit="kN"), "F", None)
+    mapping, notes = si_mapping("run.mat", "u", "input", ColumnMapping("F", unit="kN"), "F", None)
     assert (mapping.scale, notes) == (1000.0, ())
     with pytest.raises(InputError, match=r"no unit of a drive \(A, V, N, N m\)"):
-        si_mapping("run.mat", "u", "1", ColumnMapping("F", unit="mm"), "F", None)
+        si_mapping("run.mat", "u", "input", ColumnMapping("F", unit="mm"), "F", None)
 
 
 def test_a_unit_in_a_name_that_is_not_read_is_asked_about() -> None:

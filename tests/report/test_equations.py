@@ -38,7 +38,7 @@ def spoken(equation: str) -> str:
     return " ".join(letters(document).split())
 
 
-@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("rig", [name for name, rig in RIGS.items() if rig.has_one_motion])
 def test_every_effect_has_equations_on_every_rig_that_offers_it(diagnosis: Diagnosis, rig: str) -> None:
     for effect in CATALOGUE:
         if RIGS[rig].offers(effect):

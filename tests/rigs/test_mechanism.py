@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 
-from rigsight.rigs import RIGS, Rig, read_rig_file
-
-FILES = Path(__file__).parent / "files"
+from rigsight.rigs import RIGS, Rig
 
 
 def accelerations_by_sympy(rig: Rig, numbers: dict[sp.Symbol, float]) -> list[sp.Expr]:
@@ -33,7 +29,7 @@ def accelerations_by_sympy(rig: Rig, numbers: dict[sp.Symbol, float]) -> list[sp
 
 @pytest.mark.parametrize("name", ["cart_pendulum", "two_link_arm", "servo"])
 def test_accelerations_are_those_of_sympy(name: str) -> None:
-    rig, rng = read_rig_file(FILES / f"{name}.toml"), np.random.default_rng(1)
+    rig, rng = RIGS[name], np.random.default_rng(1)
     numbers = {sp.Symbol(p.name, real=True): rng.uniform(0.5, 1.5) for p in (*rig.constants, *rig.parameters)}
     mechanism = rig.mechanism
     own = mechanism.mass_matrix.subs(numbers).LUsolve(sp.Matrix(mechanism.generalized_forces()).subs(numbers))
@@ -43,7 +39,7 @@ def test_accelerations_are_those_of_sympy(name: str) -> None:
 
 
 def test_an_arm_without_damping_keeps_its_energy() -> None:
-    rig = read_rig_file(FILES / "two_link_arm.toml")
+    rig = RIGS["two_link_arm"]
     mechanism = rig.mechanism
     values = {"l_1": 0.3, "g": 9.81, "I_1": 0.05, "I_2": 0.02, "m_2": 0.6, "s_1": 0.12, "s_2": 0.08}
     numbers = {sp.Symbol(name, real=True): value for name, value in values.items()}
@@ -63,7 +59,7 @@ def test_an_arm_without_damping_keeps_its_energy() -> None:
 
 
 def test_the_inertia_along_a_joint() -> None:
-    train = read_rig_file(FILES / "drive_train.toml").mechanism
+    train = RIGS["drive_train"].mechanism
     motor, load = sp.symbols("J_m J_l", real=True)
     assert sp.simplify(train.inertia_along(train.joints[0].motion) - motor * load / (motor + load)) == 0
     assert RIGS["element"].mechanism.inertia_along(RIGS["element"].mechanism.joints[0].motion) is None

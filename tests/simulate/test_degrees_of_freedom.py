@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,25 +13,20 @@ from scipy.interpolate import CubicHermiteSpline
 from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.records.record import Record
-from rigsight.rigs import RUNNING_GEAR, Rig, read_rig_file
+from rigsight.rigs import RIGS, RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 DT, N = 5e-3, 300
 T = DT * np.arange(N)
-FILES = Path(__file__).parents[1] / "rigs" / "files"
 Floats = NDArray[np.float64]
 Rates = Callable[[float, Floats, Callable[[float], Floats]], list[float]]
-
-
-def rig_of(name: str) -> Rig:
-    return read_rig_file(FILES / f"{name}.toml")
 
 
 def outputs(
     name: str, values: Mapping[str, float], inputs: Mapping[str, Floats], *effects: str
 ) -> Mapping[str, Floats]:
-    rig = rig_of(name)
+    rig = RIGS[name]
     chosen = [placed(effect_named(e.split("@")[0]), e.split("@")[1]) for e in effects]
     record = Record("run", DT, dict(inputs), {}, hold="foh")
     simulated = simulate(
@@ -138,7 +132,7 @@ def test_a_controller_reads_its_sensor() -> None:
 def test_a_rig_starts_where_it_hangs() -> None:
     record = Record("rest", DT, {"goal": np.zeros(50)}, {}, hold="zoh")
     values = {"m": 1.0, "l": 0.15, "k_p": 2.0, "J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.05}
-    angle = simulate(compose(rig_of("servo")), values, record)["angle"]
+    angle = simulate(compose(RIGS["servo"]), values, record)["angle"]
     assert np.ptp(angle) < 1e-9
     assert 3.0 * 2.0 * -angle[0] == pytest.approx(9.81 * 0.15 * np.sin(angle[0] + 0.05), rel=1e-6)
 
@@ -147,7 +141,7 @@ def test_a_rig_starts_where_it_hangs() -> None:
 def test_a_delay_within_a_loop_is_refused(effect: str) -> None:
     name, place = effect.split("@")
     with pytest.raises(InputError, match="delays are those"):
-        compose(rig_of("servo"), [placed(effect_named(name), place)])
+        compose(RIGS["servo"], [placed(effect_named(name), place)])
 
 
 @pytest.mark.parametrize(

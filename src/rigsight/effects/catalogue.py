@@ -20,6 +20,7 @@ from rigsight.effects.input_delay import INPUT_DELAY
 from rigsight.effects.input_saturation import INPUT_SATURATION
 from rigsight.effects.iwan_hysteresis import IWAN_HYSTERESIS
 from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
+from rigsight.effects.placed import AT, placed
 from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPING
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
 from rigsight.effects.sensor_delay import SENSOR_DELAY
@@ -54,7 +55,7 @@ CATALOGUE: tuple[Effect, ...] = (
 
 
 def effect_named(name: str) -> Effect:
-    """Return the effect of the catalogue with this name.
+    """Return the effect of the catalogue with this name, at its place where it names one: ``"coulomb_friction@shaft"``.
 
     Raises
     ------
@@ -62,4 +63,6 @@ def effect_named(name: str) -> Effect:
         Naming the nearest and all known effects.
     """
     effects = {effect.name: effect for effect in CATALOGUE}
-    return effects[check_option("Effect", name, effects)]
+    kind, at, place = name.partition(AT)
+    effect = effects[check_option("Effect", kind, effects)]
+    return placed(effect, place) if at else effect

@@ -40,17 +40,26 @@ def closeness(name: str, signal: str) -> float:
     """Return how well a channel's name, without group and unit, fits a signal, from 0 (not at all) to 3 (its own name)."""
     bare = split_unit(name)[0]
     whole, last = _plain(bare), _plain(bare.rpartition("/")[2])
-    known = NAMES_OF.get(signal, (signal,))
-    if signal.lower() in (whole, last):
+    known = NAMES_OF.get(signal)
+    if signal.lower() in (whole, last) or _words(signal) in (_words(bare), _words(bare.rpartition("/")[2])):
         return 3.0
-    if whole in known or last in known:
-        return 2.0
     words = set(last.split())
+    if known is None:
+        # A name that a rig's file gives: nobody knows others for it, but its words may stand in another order or among more.
+        known = tuple(_plain(signal).split())
+        if words and words >= set(known):
+            return 2.0
+    elif whole in known or last in known:
+        return 2.0
     return 1.0 if any(word in words for word in known if len(word) > 2) else 0.0
 
 
 def _plain(name: str) -> str:
     """Return a name in lower case, words apart, without numbers at its end."""
-    words = re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", name)
-    words = re.sub(r"[\W_]+", " ", words).lower().strip()
+    words = _words(name)
     return re.sub(r"\s*\d+$", "", words) or words
+
+
+def _words(name: str) -> str:
+    """Return a name in lower case, words apart."""
+    return re.sub(r"[\W_]+", " ", re.sub(r"([a-zäöü])([A-ZÄÖÜ])", r"\1 \2", name)).lower().strip()

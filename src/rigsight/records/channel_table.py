@@ -166,7 +166,8 @@ def _axes(
             )
         named = _find(path, file, time, mapping, optional=False)
         assert named is not None
-        chosen = dict.fromkeys(found, named)
+        # Of a record of nothing but time, the time itself.
+        chosen = dict.fromkeys(found or [time], named)
     else:
         return _own_axes(path, found), ("its own time axis", None)
     stamps = {

@@ -10,9 +10,8 @@ from typing import Any
 from rigsight.errors import InputError
 from rigsight.records.channel_names import split_unit
 from rigsight.records.column_mapping import ColumnMapping
+from rigsight.units import INPUT_UNIT
 
-_SI = ("A", "rad", "m", "N", "N m", "s", "V", "kg", "Hz")
-"""Units that need no library to be known."""
 DRIVES = ("A", "V", "N", "N m")
 """What amplifiers are told, and what motors give."""
 # Only products of units with small powers reach pint: its parser would work out 9**9**9 for as long as that takes.
@@ -74,7 +73,7 @@ def _ratio(unit: str, si: str) -> float:
     try:
         # Root units, not dimensions: pint counts angles, shares and plain numbers as one dimension.
         size, base = registry.get_root_units(registry.parse_units(text))
-        target_size, target = registry.get_root_units(registry.parse_units(si))
+        target_size, target = registry.get_root_units(registry.parse_units(_USUAL.get(si, si)))
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError):
         raise UnknownUnitError("is no known unit") from None
     if base != target:
@@ -93,8 +92,8 @@ def _registry() -> Any:
 
 
 def has_si(unit: str) -> bool:
-    """Return True if a rig's signal has a unit of its own; an axis takes its input in any."""
-    return unit in _SI
+    """Return True if a rig's signal has a unit of its own; some take their input in any."""
+    return unit != INPUT_UNIT
 
 
 def in_drive_unit(unit: str) -> tuple[float, str] | None:

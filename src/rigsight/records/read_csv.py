@@ -96,7 +96,7 @@ def read_csv(
     rows = kept[layout.n_above :]
     if not rows:
         raise InputError(f"{path.name} has a header but no rows of numbers below line {kept[-1]}.")
-    table = _numbers(path, lines, rows, layout, found)
+    table = _numbers(path, lines, rows, layout, found) if found else np.empty((len(rows), 0))
     values = {signal: np.ascontiguousarray(table[:, i]) for i, signal in enumerate(found)}
     for signal, column in values.items():
         finite = np.isfinite(column)

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, nearest
 from rigsight.records.channel_file import file_format
+from rigsight.records.channel_names import closeness
 from rigsight.records.channel_table import read_channels
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.conditioning import LARGEST_NUMBER, TimeBase, time_base
+from rigsight.records.csv_channels import open_measurement
 from rigsight.records.plausibility import clipping, is_constant
 from rigsight.records.read_csv import read_csv
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, in_seconds, refuse_different_axes, resampled
 
 TIME = "t"
+_LISTED = 30
+"""Columns that a message lists."""
 
 
 class NamedSignal(Protocol):
@@ -43,6 +47,10 @@ def read_record(
     *,
     columns: Mapping[str, ColumnMapping] | None = None,
     require_outputs: bool = True,
+    required_outputs: Collection[str] | None = None,
+    absent_inputs: Collection[str] = (),
+    constant_inputs: Mapping[str, float] | None = None,
+    still_inputs: bool = False,
     name: str | None = None,
     role: Role = "estimation",
     kind: Kind = "operation",
@@ -54,6 +62,7 @@ def read_record(
     decimal: str | None = None,
     header: bool | None = None,
     comment: str | None = None,
+    constants: Mapping[str, float] | None = None,
 ) -> Record:
     """Read, check and repair one record.
 
@@ -62,11 +71,19 @@ def read_record(
     path
         Delimited text, or a measurement file of a format in `channel_file`; its content decides, not its name.
     inputs, outputs
-        Signals of the rig. All inputs and the first output are required, further outputs are read where the file has them.
+        Signals of the rig. Further outputs than the required ones are read where the file has them.
     columns
         Where signals and time ``t`` stand; by default in columns of their own names.
     require_outputs
         False to simulate a record: its time and inputs suffice, and its inputs may be constant.
+    required_outputs
+        Names of the outputs that the file must have, by default the first; one output at all it must have in any case.
+    absent_inputs
+        Names of the inputs that are 0 where the file holds no input at all: a free motion.
+    constant_inputs
+        Input that the file does not hold -> its value throughout [SI].
+    still_inputs
+        Whether inputs that never change teach anything: on a rig that moves by itself.
     name
         How results call the record, by default the file's name without its ending.
     role, kind, amplitude, hold
@@ -77,6 +94,8 @@ def read_record(
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     separator, decimal, header, comment
         See `read_csv`; only delimited text has them.
+    constants
+        See `Record`.
 
     Raises
     ------
@@ -89,29 +108,26 @@ def read_record(
         raise InputError(f"{path.name}: the scale of time must be positive, got {time.scale:g}.")
     if dt is not None and TIME in columns:
         raise InputError(f"{path.name}: dt = {dt:g} stands beside a column for time; give one of the two.")
-    signals = [*inputs, *outputs]
+    constant_inputs = constant_inputs or {}
+    recorded = [signal for signal in inputs if signal.name not in constant_inputs]
+    signals = [*recorded, *outputs]
     wanted = {signal.name: columns.get(signal.name, ColumnMapping(signal.name)) for signal in signals}
+    needed = [signal.name for signal in outputs[:1]] if required_outputs is None else required_outputs
+    free = [output.name for output in outputs if not require_outputs or output.name not in needed]
     # A column that was mapped by hand is meant to be there.
-    spare = [output.name for output in outputs[1 if require_outputs else 0 :] if output.name not in columns]
-    if file_format(path) is None:
-        table = read_csv(
-            path,
-            wanted if dt is not None else {TIME: time, **wanted},
-            optional=spare,
-            separator=separator,
-            decimal=decimal,
-            header=header,
-            comment=comment,
+    spare = [signal for signal in (*absent_inputs, *free) if signal not in columns]
+    dialect = _Dialect(separator, decimal, header, comment)
+    table = _table(path, {TIME: time, **wanted}, spare, dialect, dt, time_is_mapped=TIME in columns)
+    absent = [signal.name for signal in recorded if signal.name not in table.values]
+    if absent:
+        is_free = len(absent) == len(inputs) and kind == "operation" and amplitude is None
+        _check_absent(path, absent, table, is_free=is_free)
+    if require_outputs and outputs and not any(signal.name in table.values for signal in outputs):
+        listed = ", ".join(signal.name for signal in outputs)
+        raise InputError(
+            f"{path.name} has none of the outputs {listed}. Its columns: {_listed(path)}. Map one at least under columns."
         )
-        if dt is not None:
-            stamps = dt * np.arange(table.lines.size, dtype=np.float64)
-            table = replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
-    else:
-        _refuse_dialect(path, separator=separator, decimal=decimal, header=header, comment=comment)
-        table = read_channels(
-            path, {TIME: time, **wanted}, TIME, time_is_mapped=TIME in columns, optional=spare, dt=dt
-        )
-    units = {TIME: "s"} | {signal.name: signal.unit for signal in signals}
+    units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     unit_notes: list[str] = []
     to_si: dict[str, ColumnMapping] = {}
     for signal, label in table.labels.items():
@@ -125,17 +141,28 @@ def read_record(
     _refuse_what_nobody_measures(path, raw, table)
     found: list[str] = []
     if require_outputs:
-        raw, found = _moving(path, raw, table, inputs, outputs, role)
+        must_move = [] if still_inputs or role != "estimation" else [signal.name for signal in recorded]
+        raw, found = _moving(path, raw, table, must_move, needed, outputs)
     found += _clipping_notes(path, raw, table)
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
+    # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
+    raw = raw or {TIME: table.values[TIME]}
     on_axis = _on_one_axis(
         path, table, raw, {signal: bases[signal] for signal in raw}, to_si[TIME], resample, holds
     )
+    samples = {signal: to_si[signal].to_si(own) for signal, own in on_axis.samples.items()}
+    n_samples = next(iter(samples.values())).size
+    held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
+    samples = {signal: np.full(n_samples, value) for signal, value in held.items()} | samples
+    if absent:
+        found.append(
+            f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, as nothing drives the rig."
+        )
     return Record(
         name=name or path.stem,
         dt=on_axis.dt,
-        signals={signal: to_si[signal].to_si(samples) for signal, samples in on_axis.samples.items()},
-        units={signal: unit for signal, unit in units.items() if signal == TIME or signal in raw},
+        signals=samples,
+        units={signal: unit for signal, unit in units.items() if signal == TIME or signal in samples},
         t0=on_axis.t0,
         role=role,
         kind=kind,
@@ -143,7 +170,64 @@ def read_record(
         hold=hold,
         source=path,
         notes=(*table.notes, *unit_notes, *on_axis.notes, *found),
+        constants=constants or {},
     )
+
+
+@dataclass(frozen=True)
+class _Dialect:
+    """How a text is written, as far as somebody said so."""
+
+    separator: str | None
+    decimal: str | None
+    header: bool | None
+    comment: str | None
+
+
+def _table(
+    path: Path,
+    columns: Mapping[str, ColumnMapping],
+    spare: Sequence[str],
+    dialect: _Dialect,
+    dt: float | None,
+    *,
+    time_is_mapped: bool,
+) -> Columns:
+    """Return the numbers of a file of any format, as they stand there."""
+    if file_format(path) is not None:
+        _refuse_dialect(path, dialect)
+        return read_channels(path, columns, TIME, time_is_mapped=time_is_mapped, optional=spare, dt=dt)
+    own = {signal: column for signal, column in columns.items() if dt is None or signal != TIME}
+    table = read_csv(path, own, optional=spare, **vars(dialect))
+    if dt is None:
+        return table
+    stamps = dt * np.arange(table.lines.size, dtype=np.float64)
+    return replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
+
+
+def _check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: bool) -> None:
+    """Refuse inputs that are missing where the rig was driven, or where a column may well be one of them."""
+    names = [name for name in _names(path) if name not in table.labels.values()]
+    is_free = is_free and not all(name.isdecimal() for name in (*names, *table.labels.values()))
+    for signal in absent:
+        close = [name for name in names if closeness(name, signal) > 0.0]
+        hint = f" Is it '{close[0]}'?" if close else nearest(signal, names)
+        if not hint and is_free:
+            continue
+        raise InputError(
+            f"{path.name} has no column '{signal}' for signal '{signal}'.{hint} Its columns: {_listed(path)}. Map it under "
+            f"columns; if it was constant and not recorded, give its value with the record: inputs = {{ {signal} = 0.0 }}."
+        )
+
+
+def _names(path: Path) -> list[str]:
+    """Return how a file calls its columns."""
+    with open_measurement(path) as file:
+        return [channel.name for channel in file.channels]
+
+
+def _listed(path: Path) -> str:
+    return ", ".join(f"'{name}'" for name in _names(path)[:_LISTED]) or "none"
 
 
 def _refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
@@ -156,8 +240,8 @@ def _refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float6
             )
 
 
-def _refuse_dialect(path: Path, **dialect: object) -> None:
-    for key, value in dialect.items():
+def _refuse_dialect(path: Path, dialect: _Dialect) -> None:
+    for key, value in vars(dialect).items():
         if value is not None:
             raise InputError(
                 f"{path.name} is no delimited text, so {key} means nothing for it; remove {key}."
@@ -203,26 +287,28 @@ def _moving(
     path: Path,
     raw: dict[str, NDArray[np.float64]],
     table: Columns,
-    inputs: Sequence[NamedSignal],
+    must_move: Sequence[str],
+    needed: Collection[str],
     outputs: Sequence[NamedSignal],
-    role: Role,
 ) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
     """Return the signals that can be used, with notes on those that cannot."""
     constant = {signal for signal, samples in raw.items() if is_constant(samples)}
-    for signal in inputs:
-        if role == "estimation" and signal.name in constant:
+    for signal in must_move:
+        if signal in constant or signal not in raw:
+            where = f"{path.name}, column '{table.labels[signal]}'" if signal in raw else path.name
+            value = raw[signal][0] if signal in raw else 0.0
             raise InputError(
-                f"{path.name}, column '{table.labels[signal.name]}': the input {signal.name} is constant "
-                f"({raw[signal.name][0]:g}), so nothing is excited and nothing can be identified. Check the column, "
-                'give the record role = "validation", or leave it out.'
+                f"{where}: the input {signal} is constant ({value:g}), so nothing is excited and nothing can be identified. "
+                'Check the column, give the record role = "validation", or leave it out.'
             )
-    if outputs and outputs[0].name in constant:
-        first = outputs[0].name
-        raise InputError(
-            f"{path.name}, column '{table.labels[first]}': the output {first} never changes ({raw[first][0]:g}). "
-            "Check sensor and column, or leave the record out."
-        )
-    still = sorted(constant.intersection(output.name for output in outputs[1:]))
+    measured = [output.name for output in outputs if output.name in raw]
+    for signal in measured:
+        if signal in constant and (signal in needed or constant.issuperset(measured)):
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': the output {signal} never changes ({raw[signal][0]:g}). "
+                "Check sensor and column, or leave the record out."
+            )
+    still = sorted(constant.intersection(measured))
     notes = [f"{path.name}: {signal} never changes and is taken as not measured." for signal in still]
     return {signal: samples for signal, samples in raw.items() if signal not in still}, notes
 

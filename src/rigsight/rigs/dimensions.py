@@ -14,12 +14,11 @@ from typing import Any
 from lark import Token, Tree
 
 from rigsight.rigs.expressions import FUNCTIONS, READS, Expression, ExpressionError, place_of
+from rigsight.units import INPUT_UNIT
 
 Dimension = Any
 """Powers of the base quantities, as pint holds them; None for anything."""
 
-INPUT_UNIT = "input"
-"""The unit of an input that is measured in whatever the drive takes."""
 _UNIT = re.compile(r"(?:1|[A-Za-zµΩ°%()]+(?:\^-?\d)?|\^-?\d|[ */])+")
 _LONGEST = 60
 _FORMULA_NUMBER = re.compile(r"\d|\d\.(?:0|5|25|75)|0\.125")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any
 
 import sympy as sp
 
@@ -103,7 +104,7 @@ class Rig:
     summary
         One plain sentence.
     inputs
-        Recorded signals that drive it; all are required in a record.
+        Recorded signals that drive it.
     constants
         Known numbers of the rig; one with a default may be left out of a campaign.
     parameters
@@ -112,6 +113,8 @@ class Rig:
         Its equations.
     alternatives
         Accepted in a campaign in the place of one of `parameters`.
+    declaration
+        The tables of its file; empty for a rig that is part of another.
     """
 
     name: str
@@ -121,11 +124,23 @@ class Rig:
     parameters: tuple[Parameter, ...]
     mechanism: Mechanism
     alternatives: tuple[Alternative, ...] = ()
+    declaration: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
     def outputs(self) -> tuple[Signal, ...]:
-        """What is recorded of it; the first is required in a record."""
+        """What is recorded of it; a record holds `required_outputs`, and one at least."""
         return tuple(Signal(sensor.name, sensor.unit, sensor.about) for sensor in self.mechanism.sensors)
+
+    @property
+    def required_outputs(self) -> tuple[str, ...]:
+        """Names of the outputs that every record holds: with one motion, the one that shows it."""
+        return (self.outputs[0].name,) if self.has_one_motion else ()
+
+    @property
+    def absent_inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that are 0 in a record that holds none of them: those that prescribe no motion."""
+        prescribing = {coordinate.prescribed_by for coordinate in self.mechanism.prescribed}
+        return tuple(signal.name for signal in self.inputs if signal.name not in prescribing)
 
     @property
     def alternative_parameters(self) -> tuple[Parameter, ...]:
@@ -242,7 +257,9 @@ class Rig:
         sensors = tuple(s for s in self.mechanism.sensors if not s.reads.free_symbols & followers)
         kept = {sensor.name for sensor in sensors} | {drive.name for drive in self.mechanism.drives}
         order = tuple(name for name in self.mechanism.order if name in kept)
-        return replace(self, mechanism=replace(self.mechanism, states=(), sensors=sensors, order=order))
+        own = {part.name: getattr(self, part.name) for part in fields(Rig)}
+        mechanism = replace(self.mechanism, states=(), sensors=sensors, order=order)
+        return Rig(**{**own, "mechanism": mechanism, "declaration": {}})
 
     def with_unit(self, parameter: Parameter, place: str | None = None) -> Parameter:
         """Return the parameter with its unit on this rig, at a place or at its first joint.

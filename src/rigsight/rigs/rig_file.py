@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
@@ -91,7 +92,48 @@ def rig_of_text(text: str, source: str = "rig file", *, check_units: bool = True
         content = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{source}: is no valid TOML: {error}") from None
-    return _Reader(content, value_places(text), source).rig(check_units)
+    return _rig_of(content, value_places(text), source, check_units)
+
+
+def rig_of_tables(tables: Mapping[str, Any], source: str) -> Rig:
+    """Return the rig that the tables of a file declare.
+
+    Parameters
+    ----------
+    tables
+        As `tomllib` returns them.
+    source
+        How messages call it.
+
+    Raises
+    ------
+    InputError
+        Naming the table and key of what was wrong, and what to write instead.
+    """
+    return _rig_of(tables, {}, source, check_units=True)
+
+
+_read: dict[str, Rig] = {}
+"""Rigs by their declaration: the same one is the same object, whichever file holds it, so that its equations are made once."""
+
+
+def _rig_of(
+    tables: Mapping[str, Any],
+    places: Mapping[tuple[str | int, ...], tuple[int, int]],
+    source: str,
+    check_units: bool,
+) -> Rig:
+    try:
+        key = json.dumps(tables)
+    except (TypeError, ValueError, RecursionError):
+        # Dates, or what is no table at all: the reader says so.
+        key = ""
+    if key not in _read:
+        rig = _Reader(dict(tables), places, source).rig(check_units)
+        if not key:
+            return rig
+        _read[key] = rig
+    return _read[key]
 
 
 class _Reader:
@@ -102,6 +144,7 @@ class _Reader:
     ) -> None:
         self._places = places
         self._source = source
+        self._content = content
         try:
             self._table = RigTable.model_validate(content)
         except ValidationError as error:
@@ -154,6 +197,7 @@ class _Reader:
                 )
                 for name, own in table.alternatives.items()
             ),
+            declaration=self._content,
         )
 
     def _refuse(self, path: Iterable[str | int], message: str, within: int | None = None) -> NoReturn:
@@ -175,6 +219,8 @@ class _Reader:
 
     def _check_names(self) -> None:
         table = self._table
+        # Results and exported files are called after it.
+        self._check_name(("name",), table.name)
         taken: dict[str, str] = {}
         for key in _NAMED:
             for name in getattr(table, key):

@@ -24,10 +24,10 @@ from pydantic import Field
 from rigsight.blind.subjects import Kind
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.errors import InputError, nearest
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.workflow.blind_files import EXTERNAL, RUN_FILE, SETTINGS_FILE, BenchFolder, described, read_json
-from rigsight.workflow.campaign import file_inside
+from rigsight.workflow.campaign import listed_rig
 from rigsight.workflow.campaign_file import (
     MOST_RECORDS,
     FileTable,
@@ -37,6 +37,7 @@ from rigsight.workflow.campaign_file import (
     read_campaign_table,
 )
 from rigsight.workflow.json_file import json_object
+from rigsight.workflow.listed_records import file_inside
 from rigsight.workflow.results import json_text, write_together
 
 _CAMPAIGN = "campaign.toml"
@@ -165,12 +166,8 @@ class ExternalBench(BenchFolder):
         }
 
     def _rig(self, trial: str) -> Rig:
-        model = read_campaign_table(self.campaign(trial) / _CAMPAIGN).rig.model
-        if model not in RIGS:
-            raise InputError(
-                f"{self.campaign(trial) / _CAMPAIGN}: rig.model: is '{model}'.{nearest(model, RIGS)} Allowed: {', '.join(RIGS)}."
-            )
-        return RIGS[model]
+        path = self.campaign(trial) / _CAMPAIGN
+        return listed_rig(path, read_campaign_table(path).rig)
 
     def settle_here(self) -> None:
         """Write down whose campaigns these are, or check that the folder holds no drawn bench.

@@ -24,8 +24,8 @@ from rigsight.blind import Design, Trial
 from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign import file_inside, read_listed_record
 from rigsight.workflow.campaign_file import RecordTable
+from rigsight.workflow.listed_records import file_inside, read_listed_record
 from rigsight.workflow.results import json_text, write_together
 
 STORE_FILE = "trials.sqlite"

@@ -13,6 +13,7 @@ from rigsight.records import Hold, Kind, Role
 from rigsight.records.ordinary_file import file_size
 
 MOST_RECORDS = 1000
+WHICH_RIG = 'model = "NAME" for a rig that rigsight rigs lists, or file = "my_rig.toml" for one of your own.'
 LARGEST_FILE = 10_000_000
 _LISTS = ("records", "withheld")
 """Keys that hold lists of records."""
@@ -42,14 +43,15 @@ class ColumnTable(FileTable):
 class RigTable(FileTable):
     """``[rig]``: which rig, the effects that the simulation in question has, its known constants and its parameters."""
 
-    model: str
+    model: str | None = None
+    file: Annotated[str, Field(min_length=1)] | None = None
     effects: list[str] = []
     constants: dict[str, Number] = {}
     parameters: dict[str, Number] = {}
 
 
 class RecordTable(FileTable):
-    """``[[records]]``: one measured file, what it is for, and how it is written."""
+    """``[[records]]``: one measured file, what it is for, how it is written, and what is known of the rig in it."""
 
     file: Annotated[str, Field(min_length=1)]
     name: Annotated[str, Field(min_length=1)] | None = None
@@ -64,6 +66,8 @@ class RecordTable(FileTable):
     decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None
     header: bool | None = None
     comment: Annotated[str, Field(min_length=1)] | None = None
+    constants: dict[str, Number] = {}
+    inputs: dict[str, Number] = {}
 
 
 class CampaignTable(FileTable):
@@ -232,8 +236,8 @@ def _allowed_keys(location: tuple[str | int, ...], table: type[FileTable]) -> li
 
 def _how_to_write(location: tuple[str | int, ...]) -> str:
     return {
-        "rig": ' Write [rig] and model = "running_gear", "axis" or "element".',
-        "model": ' Write model = "running_gear", "axis" or "element".',
+        "rig": f" Write [rig] and {WHICH_RIG}",
+        "model": f" Write {WHICH_RIG}",
         "records": ' Write [[records]] and file = "..." for every record.',
         "file": ' Write file = "name.csv".',
     }.get(str(location[-1]), "")

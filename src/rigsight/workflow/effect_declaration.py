@@ -16,7 +16,7 @@ from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.errors import nearest
 from rigsight.parameters import Parameter
-from rigsight.rigs import RIGS
+from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import compose
 from rigsight.units import parse_dimension
 from rigsight.workflow.effect_types import type_faults
@@ -136,7 +136,7 @@ def _range_faults(p: Parameter) -> Iterator[str]:
 
 
 def _dimension_faults(p: Parameter) -> Iterator[str]:
-    bases = {base for rig in RIGS.values() for base in rig.units} | {"drive"}
+    bases = {base for rig in _rigs() for base in rig.units} | {"drive"}
     try:
         unknown = [base for base in parse_dimension(p.dimension) if base not in bases]
     except ValueError:
@@ -194,10 +194,14 @@ def _expression_faults(
 
 
 def _composition_faults(effect: Effect) -> Iterator[str]:
-    rigs = [rig for rig in RIGS.values() if rig.offers(effect)]
-    for rig in rigs:
+    for rig in (rig for rig in _rigs() if rig.offers(effect)):
         try:
             compose(rig, [effect])
         except Exception as error:
             # An expression may be wrong in ways that only its use shows; whatever it raises is the declaration's fault.
             yield f"it cannot be put into {rig.name}: {type(error).__name__}: {error}"
+
+
+def _rigs() -> list[Rig]:
+    """Return the built-in rigs of one joint: what an effect does there, it does at each joint of larger ones."""
+    return [rig for rig in RIGS.values() if rig.has_one_motion]

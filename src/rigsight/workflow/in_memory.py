@@ -13,11 +13,13 @@ from rigsight.records.plausibility import is_constant
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign import NO_VALIDATION, Campaign, checked_simulation
+from rigsight.workflow.campaign import NO_VALIDATION, Campaign, of_first_record
+from rigsight.workflow.effect_names import effects_on
+from rigsight.workflow.given_simulation import checked_numbers, checked_simulation
 
 
 def make_campaign(
-    rig: str,
+    rig: str | Rig,
     records: Sequence[Record],
     *,
     constants: Mapping[str, float] | None = None,
@@ -30,9 +32,10 @@ def make_campaign(
     Parameters
     ----------
     rig
-        ``"running_gear"``, ``"axis"`` or ``"element"``.
+        Name of a built-in rig (``rigsight rigs`` lists them), or a rig of your own.
     records
-        With distinct names; each holds the inputs and the first output of the rig in SI units. Roles say which may be fitted.
+        With distinct names; each holds the inputs and outputs of the rig in SI units. Outputs may be missing, all but the
+        first of ``"running_gear"``, ``"axis"`` and ``"element"``, all but one of others. Roles say which may be fitted.
     constants
         Known numbers of the rig by name [SI].
     parameters
@@ -57,10 +60,17 @@ def make_campaign(
     >>> campaign.rig.name, campaign.parameters, len(campaign.estimation)
     ('axis', {'k': 100.0}, 1)
     """
-    called = title or rig
-    modelled = effects_of(effects)
-    names = [effect.name for effect in modelled]
-    given = checked_simulation(called, rig, names, constants or {}, parameters or {}, modelled)
+    found = rig_of(rig)
+    called = title or found.name
+    by_record = set.intersection(*(set(record.constants) for record in records)) if records else set()
+    given = checked_simulation(
+        called,
+        found,
+        effects_on(found, effects_of(effects), called),
+        constants or {},
+        parameters or {},
+        by_record,
+    )
     if all(record.role != "estimation" for record in records):
         raise InputError(
             f'{called}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
@@ -72,27 +82,31 @@ def make_campaign(
             f"{called}: records: several are called '{twice[0]}'. Give every record a name of its own."
         )
     judged = any(record.role == "validation" for record in records)
+    checked = tuple(_checked(called, record, found) for record in records)
+    constants, differing = of_first_record(given, checked)
     return Campaign(
         title=called,
         path=None,
         rig=given.rig,
         modelled=given.modelled,
-        constants=given.constants,
+        constants=constants,
         parameters=given.parameters,
-        records=tuple(_checked(record, given.rig) for record in records),
-        notes=() if judged else (NO_VALIDATION.format(file=called),),
+        records=checked,
+        notes=tuple(
+            note for note in (differing, "" if judged else NO_VALIDATION.format(file=called)) if note
+        ),
     )
 
 
 def make_model(
-    rig: str, values: Mapping[str, float], effects: Sequence[str | Effect] = (), hold: Hold = "foh"
+    rig: str | Rig, values: Mapping[str, float], effects: Sequence[str | Effect] = (), hold: Hold = "foh"
 ) -> Model:
     """Make a model of numbers in memory.
 
     Parameters
     ----------
     rig
-        ``"running_gear"``, ``"axis"`` or ``"element"``.
+        Name of a built-in rig (``rigsight rigs`` lists them), or a rig of your own.
     values
         Constants of the rig, its parameters and those of the effects, by name [SI]; one with a default may be missing.
     effects
@@ -112,10 +126,27 @@ def make_model(
     >>> model.to_json()["effect_parameters"]
     {'k_3': 5000000.0}
     """
-    structure = compose(RIGS[check_option("The rig", rig, RIGS)], effects_of(effects))
+    found = rig_of(rig)
+    structure = compose(found, effects_on(found, effects_of(effects), found.name))
     defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
     complete = ParameterSet.from_mapping(structure.parameters, {**defaults, **values})
     return Model(structure, complete.to_mapping(), hold)
+
+
+def rig_of(rig: str | Rig) -> Rig:
+    """Return a rig that was given by the name of a built-in one, or as it is.
+
+    Parameters
+    ----------
+    rig
+        Name or rig.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest and all built-in rigs where a name is unknown.
+    """
+    return rig if isinstance(rig, Rig) else RIGS[check_option("The rig", rig, RIGS)]
 
 
 def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
@@ -136,21 +167,29 @@ def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, 
     return tuple(effect if isinstance(effect, Effect) else effect_named(effect) for effect in given)
 
 
-def _checked(record: Record, rig: Rig) -> Record:
+def _checked(called: str, record: Record, rig: Rig) -> Record:
     """Return a record with the units of its rig where it has none.
 
     Raises
     ------
     InputError
-        If it lacks a signal that every record of the rig has, or one of them never changes.
+        If it lacks a signal that every record of the rig has, one of them never changes, or it has constants of another rig.
     """
-    for signal in (*rig.inputs, rig.outputs[0]):
-        is_input = signal in rig.inputs
-        if is_constant(record[signal.name]) and (record.role == "estimation" or not is_input):
-            what = "input" if is_input else "output"
+    outputs = rig.required_outputs or tuple(s.name for s in rig.outputs if s.name in record)
+    if not outputs:
+        listed = ", ".join(signal.name for signal in rig.outputs)
+        raise InputError(f"Record '{record.name}' has none of the outputs {listed}; give one at least.")
+    inputs = [signal.name for signal in rig.inputs]
+    # A rig of one motion is only known as far as its input moves it.
+    must_move = {name: "input" for name in inputs if rig.has_one_motion and record.role == "estimation"}
+    if rig.required_outputs or all(is_constant(record[name]) for name in outputs):
+        must_move |= dict.fromkeys(outputs, "output")
+    for name in (*inputs, *outputs):
+        if is_constant(record[name]) and name in must_move:
             raise InputError(
-                f"Record '{record.name}': the {what} {signal.name} never changes ({record[signal.name][0]:g}), so nothing can "
+                f"Record '{record.name}': the {must_move[name]} {name} never changes ({record[name][0]:g}), so nothing can "
                 "be learned from it. Check the signal, or leave the record out."
             )
+    checked_numbers(f"{called}: record '{record.name}'", "constants", rig, rig.constants, record.constants)
     units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
     return replace(record, units={**units, **record.units})

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigsight.errors import InputError
+from rigsight.errors import InputError, check_option
 from rigsight.records import Role
 from rigsight.records.channel_file import SUFFIXES
 from rigsight.records.csv_channels import open_measurement
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign_file import MOST_RECORDS
+from rigsight.workflow.own_rigs import known_rigs, own_rigs
 from rigsight.workflow.record_proposal import BLANK, Proposal, propose, quoted
 from rigsight.workflow.results import write_together
 
@@ -47,7 +48,7 @@ class Draft:
     n_blanks: int
 
 
-def run_init(folder: str | Path, *, model: str | None = None) -> Draft:
+def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterable[Path] = ()) -> Draft:
     """Write a `campaign.toml` for the measured files of a folder.
 
     Parameters
@@ -56,6 +57,8 @@ def run_init(folder: str | Path, *, model: str | None = None) -> Draft:
         Folder with the files; those in folders below it are not looked at.
     model
         The rig; None for the one that the channels fit best.
+    rig_files
+        Rigs of the user's own, beside the built-in ones.
 
     Raises
     ------
@@ -68,8 +71,9 @@ def run_init(folder: str | Path, *, model: str | None = None) -> Draft:
     path = folder / CAMPAIGN_FILE
     if path.exists() or path.is_symlink():
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
-    if model is not None and model not in RIGS:
-        raise InputError(f"--model is '{model}'. Allowed: {', '.join(RIGS)}.")
+    own = own_rigs(rig_files)
+    known = known_rigs(own.values())
+    rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
     files = sorted(
         file
         for file in folder.iterdir()
@@ -81,19 +85,21 @@ def run_init(folder: str | Path, *, model: str | None = None) -> Draft:
         raise InputError(
             f"{folder} holds {len(files)} measured files; a campaign has at most {MOST_RECORDS}."
         )
-    proposals, left_out = _proposals(files, model)
+    proposals, left_out = _proposals(files, rigs)
     if not proposals:
         reasons = "".join(f"\n{name}: {reason}" for name, reason in left_out[:5])
         raise InputError(
             f"{folder} holds no measured file that can be used ({', '.join((*TEXT_SUFFIXES, *SUFFIXES))}).{reasons}"
         )
     rig = proposals[0].guess.rig
-    text, n_blanks = _text(folder, rig, proposals, left_out, is_guessed=model is None)
+    others = () if model is not None else tuple(name for name in known if name != rig.name)
+    source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
+    text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, source, others), proposals, left_out)
     write_together(folder, {CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
     return Draft(path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks)
 
 
-def _proposals(files: Sequence[Path], model: str | None) -> tuple[list[Proposal], list[tuple[str, str]]]:
+def _proposals(files: Sequence[Path], rigs: Sequence[Rig]) -> tuple[list[Proposal], list[tuple[str, str]]]:
     """Return every file as a record of one rig, and the files that are none with the reason."""
     found: dict[Path, Proposal] = {}
     left_out = []
@@ -102,18 +108,19 @@ def _proposals(files: Sequence[Path], model: str | None) -> tuple[list[Proposal]
             with open_measurement(file) as opened:
                 if not opened.channels:
                     raise InputError(f"{file.name} holds no signal over time.")
-                found[file] = propose(file, opened, model)
+                found[file] = propose(file, opened, rigs)
         except InputError as error:
             left_out.append((file.name, str(error).removeprefix(file.name).lstrip(":, ")))
-    if model is None and found:
+    if len(rigs) > 1 and found:
         fitting = Counter(
             one.guess.rig.name for one in found.values() if one.guess.open_questions == 0
         ) or Counter(one.guess.rig.name for one in found.values())
         model = fitting.most_common(1)[0][0]
+        chosen = [rig for rig in rigs if rig.name == model]
         for file, one in found.items():
             if one.guess.rig.name != model:
                 with open_measurement(file) as opened:
-                    found[file] = propose(file, opened, model)
+                    found[file] = propose(file, opened, chosen)
     proposals = []
     for file, one in found.items():
         signals = one.guess.signals
@@ -145,9 +152,9 @@ def _roles(proposals: Sequence[Proposal]) -> list[tuple[Role, str]]:
 def _text(
     folder: Path,
     rig: Rig,
+    rig_lines: Sequence[str],
     proposals: Sequence[Proposal],
     left_out: Sequence[tuple[str, str]],
-    is_guessed: bool,
 ) -> tuple[str, int]:
     """Return the campaign as text, and the number of blanks in it."""
     open_constants = [constant for constant in rig.constants if constant.default is None]
@@ -157,13 +164,7 @@ def _text(
     ]
     if n_blanks:
         lines.append(f"# What could not be guessed reads {BLANK} ({_times(n_blanks)}): fill it in.")
-    others = " or ".join(f'"{name}"' for name in RIGS if name != rig.name)
-    remark = (
-        f"  # guessed from the channels: {rig.summary} Otherwise {others}"
-        if is_guessed
-        else f"  # {rig.summary}"
-    )
-    lines += ["", f"title = {quoted(folder.resolve().name)}", "", "[rig]", f'model = "{rig.name}"{remark}']
+    lines += ["", f"title = {quoted(folder.resolve().name)}", "", *rig_lines]
     if rig.constants:
         lines += ["", "[rig.constants]"]
         for constant in rig.constants:
@@ -182,6 +183,25 @@ def _text(
         lines += ["", "# Not used:"]
         lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]
     return "\n".join(_printable(line) for text in lines for line in text.split("\n")) + "\n", n_blanks
+
+
+def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str]) -> list[str]:
+    """Return the lines that say which rig it is; `others` are the ones it was chosen from, if it is a guess."""
+    remark = f"# {rig.summary}"
+    if others:
+        remark = (
+            f"# guessed from the channels: {rig.summary} Others: {', '.join(others)}, or a file of your own"
+        )
+    if file is None:
+        return ["[rig]", f'model = "{rig.name}"  {remark}']
+    if file.resolve().is_relative_to(folder.resolve()):
+        inside = file.resolve().relative_to(folder.resolve()).as_posix()
+        return ["[rig]", f"file = {quoted(inside)}  {remark}"]
+    return [
+        f"# The rig is declared in {file}: name it with --rigs, or copy it here and write file = {quoted(file.name)}.",
+        "[rig]",
+        f'model = "{rig.name}"  {remark}',
+    ]
 
 
 def _times(count: int) -> str:

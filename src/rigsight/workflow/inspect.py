@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from rigsight.records.channel_names import closeness
 from rigsight.records.channel_summary import ChannelSummary, summarize, time_summary
 from rigsight.records.csv_channels import open_measurement
 from rigsight.records.read_record import TIME
+from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.record_proposal import propose
 
 SCHEMA_VERSION = 1
@@ -62,8 +64,15 @@ class Inspection:
         }
 
 
-def run_inspect(path: str | Path) -> Inspection:
+def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
     """Look into a measured file of any format that is read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    own_rigs
+        Rigs whose signals it may hold beside those of the built-in ones.
 
     Raises
     ------
@@ -81,7 +90,7 @@ def run_inspect(path: str | Path) -> Inspection:
         if not channels:
             reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
             raise InputError(f"{path.name} ({file.format}) holds no signal over time: {reasons}.")
-        proposal = propose(path, file)
+        proposal = propose(path, file, (*RIGS.values(), *own_rigs))
     return Inspection(
         path.name,
         file.format,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,8 @@ from rigsight.records.channel_summary import step_and_gaps
 from rigsight.records.channel_units import has_si, in_drive_unit, is_a
 from rigsight.records.excitation_kind import guess_amplitude, guess_kind
 from rigsight.records.read_record import TIME
-from rigsight.workflow.signal_guesses import FileGuess, Guess, guess_file
+from rigsight.rigs import Rig
+from rigsight.workflow.signal_guesses import FileGuess, Guess, guess_file, telling
 
 BLANK = '"FILL IN"'
 """Stands where nothing could be guessed; a diagnosis refuses it by the key's name."""
@@ -62,7 +63,7 @@ class Proposal:
         return "\n".join([*head, *self.lines]) + "\n"
 
 
-def propose(path: Path, file: ChannelFile, model: str | None = None, name: str | None = None) -> Proposal:
+def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
     """Return how an open file is written into a campaign.
 
     Parameters
@@ -71,8 +72,8 @@ def propose(path: Path, file: ChannelFile, model: str | None = None, name: str |
         The file.
     file
         Its channels.
-    model
-        The rig, where it is known.
+    rigs
+        Those that come into question.
     name
         How the campaign calls the file, by default its name.
 
@@ -82,17 +83,19 @@ def propose(path: Path, file: ChannelFile, model: str | None = None, name: str |
         If a channel cannot be read.
     """
     is_text = file.format == "delimited text"
-    guess = guess_file(file.channels, is_text, model)
-    driven = guess.signals[0]
+    guess = guess_file(file.channels, is_text, rigs)
+    # Of several inputs none alone says what drove the rig.
+    driven = guess.signals[0] if len(guess.rig.inputs) == 1 else None
     kind: Kind = "operation"
     amplitude = None
-    if driven.channel is not None:
+    if driven is not None and driven.channel is not None:
         samples = as_floats(driven.channel.load())
         if samples.size > 1 and np.isfinite(samples).all():
             kind = guess_kind(samples)
             amplitude = guess_amplitude(_in_si(samples, driven), kind)
-    lines = [f'kind = "{kind}"  # guessed from {driven.signal}; check: sweep, step, multisine or operation']
-    if amplitude:
+    remark = "" if driven is None else f"guessed from {driven.signal}; check: "
+    lines = [f'kind = "{kind}"  # {remark}sweep, step, multisine or operation']
+    if driven is not None and amplitude:
         unit = f" [{driven.si}]" if has_si(driven.si) else ""
         lines.append(f"amplitude = {amplitude:g}  # of {driven.signal}{unit}, guessed; check")
     timing, timing_blanks = _timing(guess)
@@ -144,23 +147,39 @@ def _timing(guess: FileGuess) -> tuple[list[str], int]:
 def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], int]:
     """Return the lines of the columns table, and the number of blanks in them."""
     lines, blanks = [], 0
-    required = len(guess.rig.inputs) + 1
-    for place, one in enumerate((guess.time, *guess.signals)):
+    needed = _needed(guess)
+    for one in (guess.time, *guess.signals):
         if one.channel is not None:
             lines += _column(one)
         elif one.candidates:
             listed = ", ".join(quoted(name) for name in one.candidates[:_LISTED])
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {listed}")
             blanks += 1
-        elif 0 < place <= required:
-            taken = {
-                other.channel.name for other in (guess.time, *guess.signals) if other.channel is not None
-            }
-            free = [quoted(channel.name) for channel in channels if channel.name not in taken]
-            listed = f"one of: {', '.join(free[:_LISTED])}" if free else "no channel is left"
-            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{listed}")
+        elif one.signal in needed:
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{_left(guess, channels)}")
             blanks += 1
+        elif one.signal in telling(guess.rig):
+            lines.append(
+                f"# {one.signal} =    # {_unit_of(one)}{_left(guess, channels)}; or not recorded here"
+            )
     return lines, blanks
+
+
+def _needed(guess: FileGuess) -> set[str]:
+    """Return the signals without which a record cannot be used: inputs, the outputs of every record, and one output at all."""
+    rig = guess.rig
+    needed = {*(signal.name for signal in rig.inputs), *rig.required_outputs}
+    outputs = guess.signals[len(rig.inputs) :]
+    if not any(one.is_clear or one.candidates for one in outputs):
+        needed.add(outputs[0].signal)
+    return needed
+
+
+def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
+    """Return which channels are no signal yet."""
+    taken = {one.channel.name for one in (guess.time, *guess.signals) if one.channel is not None}
+    free = [quoted(channel.name) for channel in channels if channel.name not in taken]
+    return f"one of: {', '.join(free[:_LISTED])}" if free else "no channel is left"
 
 
 def _coarse_step(time: Channel) -> float | None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from rigsight.records.channel import Channel
 from rigsight.records.channel_names import closeness, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
 from rigsight.records.read_record import TIME
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import Rig
 
-MODELS = ("running_gear", "axis", "element")
-"""In the order in which they are tried: a yaw angle is telling, a displacement belongs to two."""
 _FITTING_UNIT = 0.5
 _CLEAR = 2.0
 
@@ -59,12 +57,17 @@ class FileGuess:
 
     @property
     def open_questions(self) -> int:
-        """Number of required signals without a channel."""
-        required = len(self.rig.inputs) + 1
-        return sum(not guess.is_clear for guess in self.signals[:required])
+        """Number of signals without a channel that the rig is told by."""
+        return sum(not guess.is_clear for guess in self.signals if guess.signal in telling(self.rig))
 
 
-def guess_file(channels: Sequence[Channel], is_text: bool, model: str | None = None) -> FileGuess:
+def telling(rig: Rig) -> tuple[str, ...]:
+    """Return the signals by which a rig is told from others: of one with one motion those of every record, else all."""
+    outputs = rig.required_outputs or tuple(signal.name for signal in rig.outputs)
+    return (*(signal.name for signal in rig.inputs), *outputs)
+
+
+def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) -> FileGuess:
     """Return the rig that the channels fit best, and which channels its signals are.
 
     Parameters
@@ -73,13 +76,17 @@ def guess_file(channels: Sequence[Channel], is_text: bool, model: str | None = N
         Of an open file; none is read.
     is_text
         True for delimited text, whose row of units a reading does not apply.
-    model
-        The rig, where it is known.
+    rigs
+        Those that come into question.
     """
-    guesses = [_guess_rig(RIGS[name], channels, is_text) for name in ([model] if model else MODELS)]
-    # Python keeps the first of equals.
-    found = min(guesses, key=lambda guess: (guess.open_questions, -guess.score))
+    guesses = [_guess_rig(rig, channels, is_text) for rig in rigs]
+    found = min(guesses, key=_unlikely)
     return replace(found, signals=_completed_by_unit(found, channels, is_text))
+
+
+def _unlikely(guess: FileGuess) -> tuple[int, bool, float, int]:
+    """Return what decides between rigs: one motion before several, then the better and the more telling names."""
+    return guess.open_questions, not guess.rig.has_one_motion, -guess.score, -len(guess.signals)
 
 
 def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: bool) -> tuple[Guess, ...]:

@@ -1,0 +1,84 @@
+"""Which effect does a name mean, and at which place of a rig: ``coulomb_friction@load_bearing``?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rigsight.effects import AT, CATALOGUE, Effect, kind_of, placed
+from rigsight.errors import InputError, nearest
+from rigsight.rigs import Rig
+
+
+def effects_on(rig: Rig, effects: Iterable[Effect], where: str) -> tuple[Effect, ...]:
+    """Return declared effects as they act on a rig.
+
+    Parameters
+    ----------
+    rig
+        Where they act.
+    effects
+        With places or without, see `effect_on`.
+    where
+        How messages begin.
+
+    Raises
+    ------
+    InputError
+        As `effect_on`.
+    """
+    catalogue = {effect.name: effect for effect in CATALOGUE}
+    found = []
+    for effect in effects:
+        kind = kind_of(effect.name)
+        if effect.at is not None and kind not in catalogue:
+            _check_place(rig, effect, effect.at, where)
+            found.append(effect)
+        else:
+            known = {kind: effect} if effect.at is None else catalogue
+            found.append(effect_on(rig, effect.name, known, where))
+    return tuple(found)
+
+
+def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> Effect:
+    """Return the effect that a name means on a rig.
+
+    Parameters
+    ----------
+    rig
+        Where it acts.
+    name
+        Of an effect, or ``effect@place``; the place may be left out where the rig has no other.
+    known
+        Effects by name, without places.
+    where
+        How messages begin.
+
+    Raises
+    ------
+    InputError
+        If the effect is unknown, makes no sense on the rig, or its place is unknown or left open.
+    """
+    kind, place = kind_of(name), name.partition(AT)[2]
+    if kind not in known:
+        raise InputError(f"{where}: '{kind}' is unknown.{nearest(kind, known)} Known: {', '.join(known)}.")
+    effect = known[kind]
+    if AT in name:
+        _check_place(rig, effect, place, where)
+        # On a rig of one motion results call an effect by its name alone.
+        is_usual = rig.has_one_motion and place == rig.acts_at(effect)
+        return effect if is_usual else placed(effect, place)
+    places = rig.places(effect.place)
+    if len(places) > 1 and not rig.has_one_motion:
+        listed = ", ".join(f"{kind}{AT}{one}" for one in places)
+        raise InputError(f"{where}: '{kind}' can act at several places of {rig.name}; name one: {listed}.")
+    return effect
+
+
+def _check_place(rig: Rig, effect: Effect, place: str, where: str) -> None:
+    places = rig.places(effect.place)
+    if place not in places:
+        listed = ", ".join(places) or "none"
+        raise InputError(
+            f"{where}: '{kind_of(effect.name)}{AT}{place}': {rig.name} has no such place for it.{nearest(place, places)} "
+            f"Its places: {listed}."
+        )

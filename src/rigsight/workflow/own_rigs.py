@@ -1,0 +1,46 @@
+"""Which rigs are there by name: the built-in ones, and those of a user's own files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from rigsight.errors import InputError
+from rigsight.rigs import RIGS, Rig, read_rig_file
+
+
+def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
+    """Return the rigs that files declare.
+
+    Parameters
+    ----------
+    files
+        Rig files; one that is named twice is read once.
+
+    Raises
+    ------
+    InputError
+        Naming file, line and column of what cannot be used, or the file whose rig has a name that is taken.
+    """
+    found: dict[Path, Rig] = {}
+    taken = dict.fromkeys(RIGS, "a built-in rig")
+    for path in {Path(file).resolve(): Path(file) for file in files}.values():
+        rig = read_rig_file(path)
+        if rig.name in taken:
+            raise InputError(
+                f"{path}: name: '{rig.name}' is the name of {taken[rig.name]}; give the rig a name of its own."
+            )
+        taken[rig.name] = f"the rig of {path}"
+        found[path] = rig
+    return found
+
+
+def known_rigs(own: Iterable[Rig] = ()) -> Mapping[str, Rig]:
+    """Return all rigs by name.
+
+    Parameters
+    ----------
+    own
+        Rigs beside the built-in ones.
+    """
+    return {**RIGS, **{rig.name: rig for rig in own}}
