@@ -15,6 +15,7 @@ from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.grow import Prepare, grown, pruned
 from rigsight.diagnose.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.one_law import told_apart
+from rigsight.diagnose.places import Search, SuspectedPlace, search_places
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor
 from rigsight.diagnose.task import Task
@@ -50,6 +51,8 @@ class Examination:
         What the data are good for.
     imitations
         Pairs that came near and do not compete, as many another law would come as near.
+    places
+        Where a push takes away how much of the gap; empty on a rig with one motion.
     """
 
     bench: Workbench
@@ -60,6 +63,7 @@ class Examination:
     judgement: Judgement
     quality: DataQuality
     imitations: tuple[Scored, ...] = ()
+    places: tuple[SuspectedPlace, ...] = ()
 
 
 def examine(
@@ -100,7 +104,7 @@ def examine(
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    models = _singly(task, noise, effects, windowing, n_jobs, say, memory)
+    models = _singly(task, noise, effects, windowing, n_jobs, say, prepare, memory)
     pairs: list[Scored] = []
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
     cut, in_windows = None, False
@@ -132,7 +136,15 @@ def examine(
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     quality = with_best_model(models.quality, bench, judgement.model)
     return Examination(
-        models.bench, models.windowing, before, linear, ranking, judgement, quality, tuple(imitations)
+        models.bench,
+        models.windowing,
+        before,
+        linear,
+        ranking,
+        judgement,
+        quality,
+        tuple(imitations),
+        models.search.places,
     )
 
 
@@ -146,6 +158,7 @@ class _Singly:
     linear: Scored
     quality: DataQuality
     singles: list[Scored]
+    search: Search
 
 
 def _singly(
@@ -155,6 +168,7 @@ def _singly(
     windowing: Windowing,
     n_jobs: int,
     say: Callable[[str], None],
+    prepare: Prepare | None,
     memory: FitMemory | None,
 ) -> _Singly:
     bench = _bench(task, noise, windowing, memory, IdleThreads(n_jobs))
@@ -172,8 +186,13 @@ def _singly(
     if task.given:
         say("given simulation")
     quality = data_quality(bench, task.records, linear)
-    singles = fit_candidates(bench, linear, effects, say)
-    return _Singly(windowing, bench, before, linear, quality, singles)
+    search = search_places(bench, linear, effects)
+    if search.places:
+        say("places")
+        if prepare is not None:
+            prepare([bench.composed((effect,), effect.special_cases) for effect in search.effects])
+    singles = fit_candidates(bench, linear, search.effects, say)
+    return _Singly(windowing, bench, before, linear, quality, singles, search)
 
 
 def _grown(
@@ -203,7 +222,7 @@ def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
     linear = fit_linear(bench, models.linear.fit.values)
     singles = fitted_in_windows(bench, linear, models.singles)
     before = _before(task, bench, linear) if linear.residuals else models.before
-    return _Singly(windowing, bench, before, linear, models.quality, singles)
+    return _Singly(windowing, bench, before, linear, models.quality, singles, models.search)
 
 
 def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:

@@ -19,6 +19,7 @@ import numpy as np
 
 from rigsight.diagnose.characterize import finished, followed, refine
 from rigsight.diagnose.first_look import Look, look_at, widened
+from rigsight.diagnose.places import search_places
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure, carried_over
@@ -168,7 +169,7 @@ def _grown_from(
 ) -> list[Scored]:
     partners = [
         effect
-        for effect in bench.offered(effects)
+        for effect in search_places(bench, parent, bench.offered(effects)).effects
         if effect not in parent.effects and not _known_pair(known, parent, effect)
     ]
     return _pairs(bench, parent, partners, singles, prepare)

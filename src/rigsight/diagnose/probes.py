@@ -64,27 +64,20 @@ def alone(effect: Effect) -> tuple[Structure, int]:
     Parameters
     ----------
     effect
-        At any place; without a delay of its own.
+        At any place; without a delay.
     """
-    return _alone(_Same(effect))
+    name = kind_of(effect.name)
+    law = (effect.torque, effect.spring, effect.deflection, effect.drive, effect.measured, effect.states)
+    if name not in _known or _known[name][0] != law:
+        _known[name] = (law, _composed(replace(effect, name=name, at=None)))
+    return _known[name][1]
 
 
-class _Same:
-    """Lets declarations, which hold dictionaries and so cannot be hashed, be keys of a cache by identity."""
-
-    def __init__(self, effect: Effect) -> None:
-        self.effect = effect
-
-    def __hash__(self) -> int:
-        return id(self.effect)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.effect is other.effect
+_known: dict[str, tuple[tuple[object, ...], tuple[Structure, int]]] = {}
+"""By name; a user's own effect may change while a notebook runs."""
 
 
-@cache
-def _alone(same: _Same) -> tuple[Structure, int]:
-    effect = replace(same.effect, name=kind_of(same.effect.name), at=None)
+def _composed(effect: Effect) -> tuple[Structure, int]:
     if effect.place is Place.ACTUATOR:
         return compose(_signal_alone(), (replace(effect, at=_DRIVE),)), 0
     if effect.place is Place.SENSOR:

@@ -13,7 +13,7 @@ residual.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,10 +31,10 @@ from rigsight.diagnose.probes import (
 )
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.effects import Effect, Place, placed_dimension
+from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.records.record import Record
-from rigsight.rigs import evaluated, joint_of
-from rigsight.simulate import Substeps, compose, record_input, simulate_sets
+from rigsight.rigs import Rig, evaluated, joint_of
+from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
 
@@ -135,7 +135,7 @@ class Lineup:
     def _signals(self, effect: Effect) -> list[list[Floats]]:
         """Return what an effect by itself adds along each record, from each of its starts."""
         place = self._bench.rig.acts_at(effect)
-        if effect.delay is not None or effect.measured_late is not None:
+        if _is_late(effect):
             return [self._late(place, effect, time) for time in self._times(effect)]
         structure, column = alone(effect)
         of_joint = STIFFNESS in structure.names
@@ -279,6 +279,32 @@ class Lineup:
     def _without_free(self, columns: Floats) -> Floats:
         """Return what is left of columns, shape (n,) or (n, m), when parameters and initial states follow."""
         return np.asarray(columns - self._free @ (self._free.T @ columns))
+
+
+def structures_of_lineup(
+    rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
+) -> list[Structure]:
+    """Return what is simulated to find the place of an effect, each once.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    effects
+        Candidates at their places.
+    modelled
+        Effects that the simulation has already.
+    """
+    by_themselves = {
+        kind_of(effect.name): alone(effect)[0]
+        for effect in effects
+        if effect.pulsation is None and not _is_late(effect)
+    }
+    return [compose(with_probes(rig), modelled), *by_themselves.values()]
+
+
+def _is_late(effect: Effect) -> bool:
+    return effect.delay is not None or effect.measured_late is not None
 
 
 def _basis(columns: Floats) -> Floats:

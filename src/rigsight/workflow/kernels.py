@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from joblib import Parallel, delayed
 
+from rigsight.diagnose import candidates_on, structures_of_lineup
 from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
@@ -36,8 +37,13 @@ def checked_jobs(n_jobs: int | None) -> int:
 def structures_to_try(
     rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
 ) -> list[Structure]:
-    """Return the structures that a diagnosis simulates first: as modelled, and with each effect more that makes sense."""
-    offered = [effect for effect in effects if rig.offers(effect) and effect not in modelled]
+    """Return the structures that a diagnosis simulates first: as modelled, and with each effect more that makes sense.
+
+    On a rig with several places, where a diagnosis looks for the place first, these are its pushes and each effect by itself.
+    """
+    offered = candidates_on(rig, effects, modelled)
+    if not rig.has_one_motion:
+        return [compose(rig, modelled), *structures_of_lineup(rig, offered, modelled)]
     return [
         compose(rig, modelled),
         *(compose(rig, (*modelled, effect), effect.special_cases) for effect in offered),
