@@ -37,7 +37,6 @@ from virtual_rig import (
 )
 
 from rigsight.identify import (
-    conicity_slope,
     creep_error_of_sine,
     estimate_conicity,
     fit_frequency_response,
@@ -46,6 +45,7 @@ from rigsight.identify import (
 from rigsight.identify.hysteresis import SpectralRatio, peak
 from rigsight.metrics import nrmse
 from rigsight.records import Record
+from rigsight.rigs.conicity import conicity_slope
 
 BOUC_WEN_ALONE = {
     "J_z": 0.44046, "k_c": 632.05, "k_d": 0.29559, "A": 1.0, "a": 0.098914, "beta": 7231.7, "gamma": -6107.1, "n": 1.0,

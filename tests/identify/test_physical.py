@@ -10,7 +10,6 @@ from rigsight.excitation import log_sweep
 from rigsight.identify import (
     TransferFit,
     TransferForm,
-    conicity_slope,
     creep_error_of_sine,
     estimate_conicity,
     lateral_parameters,
@@ -19,7 +18,7 @@ from rigsight.identify import (
 )
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
-from rigsight.rigs.conicity import creep_factor
+from rigsight.rigs.conicity import conicity_slope, creep_factor
 from rigsight.simulate import compose, simulate
 
 CONSTANTS = {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}

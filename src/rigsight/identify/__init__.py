@@ -1,7 +1,6 @@
 """Physical parameters from records: transfer functions, linear start values, grey-box fits, their uncertainty."""
 
 from rigsight.identify.conicity import ConicityEstimate as ConicityEstimate
-from rigsight.identify.conicity import conicity_slope as conicity_slope
 from rigsight.identify.conicity import creep_error_of_sine as creep_error_of_sine
 from rigsight.identify.conicity import estimate_conicity as estimate_conicity
 from rigsight.identify.driven_offsets import driven_offsets as driven_offsets
@@ -59,7 +58,6 @@ __all__ = [
     "calibrate_to_records",
     "calibrate_to_responses",
     "characteristic_scales",
-    "conicity_slope",
     "creep_error_of_sine",
     "derived_quantities",
     "driven_offsets",

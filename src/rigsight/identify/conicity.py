@@ -18,7 +18,7 @@ from scipy.stats import norm
 from rigsight.errors import InputError
 from rigsight.identify.physical import LEVEL
 from rigsight.rigs import ROLLING, evaluated
-from rigsight.rigs.conicity import creep_factor
+from rigsight.rigs.conicity import conicity_slope, creep_factor
 
 PLAUSIBLE = 0.3
 """Conicities of profiled wheels [rad]; an interval that covers them all tells nothing. A choice, far above the thesis's 0.05."""
@@ -53,11 +53,6 @@ class ConicityEstimate:
     level: float
     determined: bool
     statement: str
-
-
-def conicity_slope(delta_0: float, r_0: float, b: float) -> float:
-    """Return dc_y / d delta_0 [1/rad] of (2.12)."""
-    return -math.sin(2.0 * delta_0) - 2.0 * r_0 / b * math.cos(2.0 * delta_0)
 
 
 def estimate_conicity(
