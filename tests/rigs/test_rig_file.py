@@ -114,6 +114,25 @@ WRONG = {
         ),
         "drives.motor.signal: the force of a joint is read",
     ),
+    "joint that never moves": (
+        changed('motion = "phi_l"', 'motion = "phi_l - phi_l"'),
+        "line 61, column 10: joints.load_bearing.motion: it reads no coordinate",
+    ),
+    "drive that moves nothing": (
+        changed('along = "phi_m"', 'along = "0*phi_m"'),
+        "line 68, column 9: drives.motor.along: .* no degree of freedom.*: phi_m, phi_l",
+    ),
+    "drive along a prescribed motion": (
+        TRAIN.replace('along = "phi_m"', 'along = "turn"').replace(
+            "[inputs.u]",
+            '[coordinates.turn]\nunit = "rad"\nprescribed_by = "rolled"\n[inputs.rolled]\nunit = "rad"\n[inputs.u]',
+        ),
+        "drives.motor.along: .* no degree of freedom",
+    ),
+    "joint of a prescribed motion that no sensor reads": (
+        rig_file_text("element").replace('reads = "force(dynamics)"', 'reads = "k*stroke + d*d(stroke)"'),
+        r"joints.dynamics.motion: its motion is prescribed, and no sensor reads force\(dynamics\)",
+    ),
     "no inertia": (changed(" + J_l*d(phi_l)^2/2", " + J_l*d(phi_m)^2/2"), "mass matrix is singular.*phi_l"),
 }
 

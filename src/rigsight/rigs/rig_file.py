@@ -555,6 +555,7 @@ class _Reader:
                 f"the mass matrix is singular: no energy moves with {', '.join(lacking)}; give each coordinate an inertia, or "
                 "make it a state",
             )
+        self._check_that_forces_act(mechanism)
         moving = {c.symbol for c in mechanism.coordinates} | {c.rate for c in mechanism.coordinates}
         moving |= {state.symbol for state in mechanism.states}
         moving |= {self._symbols[force_name(joint.name)] for joint in mechanism.joints}
@@ -576,6 +577,32 @@ class _Reader:
             if _reached(expression, mechanism) & forces:
                 self._refuse(
                     path, "the force of a joint is read; it can be recorded by a sensor, not fed back"
+                )
+
+    def _check_that_forces_act(self, mechanism: Mechanism) -> None:
+        """Refuse joints and drives whose force would be ignored."""
+        free = {c.symbol for c in mechanism.free}
+        prescribed = {c.symbol for c in mechanism.prescribed}
+        recorded = {symbol for sensor in mechanism.sensors for symbol in _reached(sensor.reads, mechanism)}
+        degrees = ", ".join(c.name for c in mechanism.free) or "none"
+        for joint in mechanism.joints:
+            path, moving = ("joints", joint.name, "motion"), joint.motion.free_symbols
+            if not moving & (free | prescribed):
+                self._refuse(
+                    path,
+                    "it reads no coordinate, so the joint never moves; write one, as 'phi', or a difference of two",
+                )
+            if not moving & free and self._symbols[force_name(joint.name)] not in recorded:
+                self._refuse(
+                    path,
+                    f"its motion is prescribed, and no sensor reads force({joint.name}), so its force would be ignored; let "
+                    "a sensor read it, or let the motion read a degree of freedom",
+                )
+        for drive in mechanism.drives:
+            if not drive.along.free_symbols & free:
+                self._refuse(
+                    ("drives", drive.name, "along"),
+                    f"it reads no degree of freedom, so the force would move nothing; degrees of freedom: {degrees}",
                 )
 
     def _parameter(self, key: str, name: str, own: ConstantTable, dimension_text: str) -> Parameter:
