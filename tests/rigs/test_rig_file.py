@@ -62,6 +62,10 @@ WRONG = {
         "line 55, column 12.*'stifness'.*Did you mean 'stiffness'",
     ),
     "table": (TRAIN + "\n[joint.x]\n", "'joint' is not a key.*Did you mean 'joints'"),
+    "key of an alternative": (
+        rig_file_text("running_gear").replace('gives = "c_y"', 'give = "c_y"'),
+        "'give' is not a key of this table. Did you mean 'gives'.* Allowed: .*gives, value",
+    ),
     "name": (changed('"phi_m - phi_l"', '"phi_m - phi_1"'), "line 54, column 19.*'phi_1' is not declared"),
     "sum of units": (changed("J_l*d(phi_l)^2/2", "J_l*d(phi_l)/2"), "line 51.*are added"),
     "unit of a stiffness": (

@@ -148,7 +148,8 @@ class _Reader:
         try:
             self._table = RigTable.model_validate(content)
         except ValidationError as error:
-            first = error.errors()[0]
+            # A key that is missing may be the one that is misspelled.
+            first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
             path = first["loc"]
             # pydantic appends which of several types it tried.
             self._refuse(

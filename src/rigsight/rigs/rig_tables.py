@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -116,11 +116,8 @@ def told(error: Any) -> str:
 
 
 def _keys_at(path: tuple[str | int, ...]) -> list[str]:
-    table: type[_Table] = RigTable
-    tables: dict[str, type[_Table]] = {
-        "inputs": _InputTable, "constants": ConstantTable, "parameters": ParameterTable, "coordinates": _CoordinateTable,
-        "joints": _JointTable, "drives": _DriveTable, "sensors": _SensorTable, "states": _StateTable, "energy": _EnergyTable,
-    }  # fmt: skip
-    if path:
-        table = tables.get(str(path[0]), RigTable)
+    table: Any = RigTable
+    for key in path:
+        # A table of named entries holds one kind of table under every name.
+        table = get_args(table)[1] if get_origin(table) is dict else table.model_fields[str(key)].annotation
     return list(table.model_fields)
