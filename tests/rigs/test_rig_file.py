@@ -80,7 +80,10 @@ WRONG = {
         TRAIN + '\n[signals]\na = "b*2"\nb = "a/2"\n',
         "a loop without a state in it: a -> b -> a|b -> a -> b",
     ),
-    "name taken": (TRAIN + '\n[states.k_s]\nrate = "1"\nunit = "1"\n', "'k_s' is taken by parameters.k_s"),
+    "name taken": (
+        TRAIN + '\n[states.k_s]\nrate = "1"\nunit = "1"\n',
+        "'k_s' is taken by \\[parameters.k_s\\]",
+    ),
     "code": (
         changed('signal = "u"', "signal = \"__import__('os')\""),
         "line 66, column 22.*has no meaning here",
@@ -92,7 +95,7 @@ WRONG = {
     "function as a name": (changed("[inputs.u]", "[inputs.sin]"), "'sin' is a function"),
     "rate of a number": (
         changed("J_l*d(phi_l)^2/2", "J_l*d(J_l)^2/2"),
-        "d\\(J_l\\)' is not declared.*d\\(phi_l\\)",
+        "no coordinate 'J_l'.* Coordinates: phi_m, phi_l",
     ),
     "power": (changed("d(phi_m)^2", "d(phi_m)**2"), "powers are written with \\^"),
     "prescribed": (
