@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import sympy as sp
 
+from rigsight.effects import symbols
 from rigsight.parameters import Parameter
 
 
@@ -199,6 +200,15 @@ class Effect:
         """Effects that this one contains as a special or limiting case."""
         others = (start.parent for start in self.starts if start.parent != self.name)
         return tuple(dict.fromkeys(parent for parent in others if parent is not None))
+
+    @property
+    def reads_inertia(self) -> bool:
+        """True if its equations hold the inertia that moves with its joint; that of a large arm is a long expression."""
+        equations = (
+            self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.measured_late,
+            *(part for state in self.states for part in (state.rate, state.limit)),
+        )  # fmt: skip
+        return any(part is not None and symbols.m in part.free_symbols for part in equations)
 
     def null_values(self) -> dict[str, float]:
         """Return the parameter values at which the effect vanishes."""

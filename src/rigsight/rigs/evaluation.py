@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
 import sympy as sp
+
+from rigsight.errors import InputError
+
+_KINKS = {"positive_part": lambda value: max(value, 0.0)}
 
 
 def evaluated(expression: sp.Expr | None, values: Mapping[str, float]) -> float:
@@ -23,10 +28,34 @@ def evaluated(expression: sp.Expr | None, values: Mapping[str, float]) -> float:
     ------
     KeyError
         If a name has no number.
+    InputError
+        If the expression has no real value there: a root of a negative number, a division by zero.
     """
     assert expression is not None
     function, names = _function(expression)
-    return float(function(*(values[name] for name in names)))
+    numbers = {name: values[name] for name in names}
+    try:
+        return float(function(*numbers.values()))
+    except (ArithmeticError, ValueError, TypeError):
+        at = ", ".join(f"{name} = {value:g}" for name, value in numbers.items())
+        raise InputError(f"'{expression}' has no real value at {at}.") from None
+
+
+def array_function(
+    symbols: Sequence[sp.Symbol], expression: sp.Expr | sp.ImmutableMatrix
+) -> Callable[..., Any]:
+    """Return a function of numbers or arrays for the value of an expression of a rig's declaration.
+
+    Parameters
+    ----------
+    symbols
+        Its arguments.
+    expression
+        Of these alone.
+    """
+    modules = [{"positive_part": lambda value: np.maximum(value, 0.0)}, "numpy"]
+    function: Callable[..., Any] = sp.lambdify(symbols, expression, modules, cse=True)
+    return function
 
 
 def relative_slopes(expression: sp.Expr, values: Mapping[str, float]) -> dict[str, float]:
@@ -46,4 +75,4 @@ def relative_slopes(expression: sp.Expr, values: Mapping[str, float]) -> dict[st
 @lru_cache(maxsize=1024)
 def _function(expression: sp.Expr) -> tuple[Callable[..., Any], tuple[str, ...]]:
     symbols = sorted(expression.free_symbols, key=str)
-    return sp.lambdify(symbols, expression, "math"), tuple(symbol.name for symbol in symbols)
+    return sp.lambdify(symbols, expression, [_KINKS, "math"]), tuple(symbol.name for symbol in symbols)

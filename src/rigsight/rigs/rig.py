@@ -321,7 +321,7 @@ class Rig:
         return (
             not effect.needs_inertia
             or joint.inertia is not None
-            or mechanism.inertia_along(joint.motion) is not None
+            or mechanism.moves_inertia(joint.motion)
         )
 
 

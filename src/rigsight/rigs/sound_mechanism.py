@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from rigsight.rigs.declaration import Declaration
-from rigsight.rigs.mass import dependent_coordinates
+from rigsight.rigs.mass import dependent_coordinates, is_quadratic, negative_coordinates
 from rigsight.rigs.mechanism import Mechanism, force_symbol, reading_symbol
 
 
@@ -24,18 +24,19 @@ def check_mechanism(declaration: Declaration, mechanism: Mechanism) -> None:
 
 
 def _check_mass(declaration: Declaration, mechanism: Mechanism) -> None:
-    rates = [c.rate for c in mechanism.coordinates]
-    squares = sum(
-        (sp.diff(mechanism.kinetic, a, b) * a * b / 2 for a in rates for b in rates), start=sp.Integer(0)
-    )
-    if any(sp.simplify(sp.diff(mechanism.kinetic - squares, rate)) != 0 for rate in rates):
+    path = ("energy", "kinetic")
+    if not is_quadratic(mechanism):
         declaration.refuse(
-            ("energy", "kinetic"), "a kinetic energy is a sum of squares and products of rates"
+            path,
+            "a kinetic energy is a sum of squares and products of rates, as 'm*d(x)^2/2', and this is none",
         )
+    negative = negative_coordinates(mechanism)
+    if negative:
+        declaration.refuse(path, f"it is negative when {', '.join(negative)} moves; turn its sign round")
     lacking = dependent_coordinates(mechanism)
     if lacking:
         declaration.refuse(
-            ("energy", "kinetic"),
+            path,
             f"the mass matrix is singular: no energy moves with {', '.join(lacking)}; give each coordinate an inertia, or "
             "make it a state",
         )

@@ -185,7 +185,7 @@ class _Path:
             self._add(terms, drive.along, [self._bound(drive.force)])
         for joint in mechanism.joints:
             self._add(terms, joint.motion, [-term for term in resisting[joint.name]])
-        for own, force in zip(terms, mechanism.generalized_forces(), strict=True):
+        for own, force in zip(terms, mechanism.generalized_forces, strict=True):
             if force != 0:
                 own.append(self._bound(force))
         return EquationsOfMotion(
@@ -247,6 +247,8 @@ class _Path:
         mechanism = self._rig.mechanism
         x = self._bound(joint.motion) - self._bound(joint.rest)
         signals = {"x": x, "v": self._bound(mechanism.rate(joint.motion)), "k": self._bound(joint.stiffness)}
+        if not any(effect.reads_inertia for effect in self._effects):
+            return signals
         inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)
         if inertia is not None:
             signals["m"] = self._bound(inertia)
