@@ -56,7 +56,7 @@ def changed(old: str, new: str) -> str:
 
 WRONG = {
     "no toml": ("name = ", "is no valid TOML"),
-    "nothing": ("", "'name' is missing"),
+    "nothing": ("", "the line 'name = ...' is missing"),
     "key": (
         changed('stiffness = "k_s"', 'stifness = "k_s"'),
         "line 55, column 12.*'stifness'.*Did you mean 'stiffness'",
@@ -110,7 +110,7 @@ WRONG = {
     "start": (TRAIN + '\n[initial]\nphi_x = "1"\n', "'phi_x' is no coordinate"),
     "unit of a rate": (
         TRAIN + '\n[states.z]\nrate = "phi_l - z"\nunit = "rad"\n',
-        "the state's unit makes it 1/s",
+        "should be in 1/s, as the unit of the state demands",
     ),
     "twice": (TRAIN + "\n[joints.shaft]\n", "is no valid TOML"),
     "linear energy": (changed("J_l*d(phi_l)^2/2", "J_l*d(phi_l)^2/2 + J_m*d(phi_m)*9.81"), "sum of squares"),

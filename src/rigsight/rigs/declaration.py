@@ -9,13 +9,13 @@ import sympy as sp
 from pydantic import ValidationError
 
 from rigsight.errors import InputError
+from rigsight.rigs.expression_values import to_sympy
 from rigsight.rigs.expressions import (
     Expression,
     ExpressionError,
     force_name,
     parsed,
     rate_name,
-    to_sympy,
 )
 from rigsight.rigs.mechanism import reading_symbol
 from rigsight.rigs.rig_tables import RigTable, told
@@ -71,9 +71,7 @@ class Declaration:
         except ValidationError as error:
             # A key that is missing may be the one that is misspelled.
             first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-            path = first["loc"]
-            # pydantic appends which of several types it tried.
-            self.refuse(path[:-1] if path and path[-1] in ("constrained-str", "float") else path, told(first))
+            self.refuse(*told(first))
         self.expressions: dict[Path, Expression] = {}
         self._parse()
         self.symbols = self._declared_symbols()
@@ -92,7 +90,11 @@ class Declaration:
         """
         place, length = None, 0
         for length in range(len(path), 0, -1):
-            place = self._places.get(path[:length])
+            own = path[:length]
+            # A table may have no header of its own, but one within it.
+            place = self._places.get(own) or next(
+                (inner for key, inner in self._places.items() if key[:length] == own), None
+            )
             if place is not None:
                 break
         where = ""

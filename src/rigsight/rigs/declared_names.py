@@ -6,9 +6,16 @@ from collections.abc import Iterable
 
 from rigsight.errors import nearest, shown
 from rigsight.rigs.declaration import NAMED, Declaration, Path
-from rigsight.rigs.expressions import FUNCTIONS, RATE, force_name, is_identifier, rate_name
+from rigsight.rigs.expressions import RATE, force_name, is_identifier, rate_name
+from rigsight.rigs.functions import FUNCTIONS
 
 _LONGEST_NAME = 60
+_NEEDED = {
+    "coordinates": "something that moves",
+    "joints": "a place where friction and other effects can act; one that resists nothing has a motion alone",
+    "sensors": "something that is recorded",
+}
+"""Tables without which there is nothing to diagnose."""
 _PLACES = ("joints", "drives", "sensors")
 """Tables whose entries are places where effects act."""
 
@@ -22,9 +29,9 @@ def check_declared_names(declaration: Declaration) -> None:
         With the place of the name.
     """
     table = declaration.table
-    for key in ("coordinates", "sensors"):
+    for key, what in _NEEDED.items():
         if not getattr(table, key):
-            declaration.refuse((), f"a rig needs at least one [{key}.NAME]")
+            declaration.refuse((), f"a rig needs at least one [{key}.NAME], {what}")
     # Results and exported files are called after it.
     _check_name(declaration, ("name",), table.name)
     taken: dict[str, str] = {}
@@ -191,8 +198,12 @@ def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str])
             f"'{name}' is a rate, and there is no coordinate '{inner}'.{nearest(inner, table.coordinates)} "
             f"Coordinates: {_listed(table.coordinates)}"
         )
-    declare = f" Declare it: [parameters.{name}] to identify it, [constants.{name}] if it is known"
-    return f"'{name}' is not declared.{nearest(name, allowed)}{declare}"
+    rate = next(
+        (r for r in map(rate_name, table.coordinates) if name == r.replace("(", "").replace(")", "")), None
+    )
+    meant = nearest(name, allowed) if rate is None else f" Did you mean '{rate}'?"
+    declare = f"[parameters.{name}] to identify it, [constants.{name}] if it is known"
+    return f"'{name}' is not declared.{meant} {'Or declare' if meant else 'Declare'} it: {declare}"
 
 
 def check_all_used(declaration: Declaration) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rigsight.rigs.declaration import Declaration, Path, quoted
-from rigsight.rigs.dimensions import Dimension, UnitError, dimension, dimension_of, unit_of
+from rigsight.rigs.dimensions import Dimension, UnitError, dimension, dimension_of, measured_in
 from rigsight.rigs.expressions import ExpressionError, force_name, rate_name
 
 _TIME = "s"
@@ -42,22 +42,22 @@ class _Units:
         for path in order:
             self._check_signal(path)
         for part in ("kinetic", "potential"):
-            self._is(("energy", part), self._energy, "an energy is in J, that is")
+            self._is(("energy", part), self._energy, "as energies are")
         for name in self._table.joints:
             self._check_joint(name)
         for name in self._table.drives:
             along = self._of(("drives", name, "along"))
             wanted = None if along is None else self._energy / along
-            self._is(("drives", name, "force"), wanted, "force times what it acts along is J: it is in")
+            self._is(("drives", name, "force"), wanted, "as force times what it acts along is J")
         for name, state in self._table.states.items():
             measured = dimension(state.unit)
-            self._is(("states", name, "rate"), measured / self._second, "the state's unit makes it")
-            self._is(("states", name, "start"), measured, "the state is in")
+            self._is(("states", name, "rate"), measured / self._second, "as the unit of the state demands")
+            self._is(("states", name, "start"), measured, "as the state is")
         for name, alternative in self._table.alternatives.items():
             gives = alternative.gives
-            self._is(("alternatives", name, "value"), self._dimensions[gives], f"{gives} is in")
+            self._is(("alternatives", name, "value"), self._dimensions[gives], f"as {gives} is")
         for name in self._table.initial:
-            self._is(("initial", name), self._dimensions[name], "it starts in")
+            self._is(("initial", name), self._dimensions[name], "as what starts is")
 
     def _declared(self) -> dict[str, Dimension]:
         found: dict[str, Dimension] = {}
@@ -89,12 +89,14 @@ class _Units:
         got = self._of(path)
         if got is not None and wanted is not None and got != wanted:
             text = quoted(self._declaration.expressions[path].text)
-            self._declaration.refuse(path, f"'{text}' is in {unit_of(got)}; {why} {unit_of(wanted)}")
+            self._declaration.refuse(
+                path, f"'{text}' is {measured_in(got)}, and should be {measured_in(wanted)}, {why}"
+            )
 
     def _check_signal(self, path: Path) -> None:
         key, name = path[0], str(path[1])
         if key == "sensors":
-            self._is(path, dimension(self._table.sensors[name].unit), "its unit is")
+            self._is(path, dimension(self._table.sensors[name].unit), "as its unit says")
         else:
             self._dimensions[name] = self._of(path)
 
@@ -102,9 +104,9 @@ class _Units:
         motion, force = self._of(("joints", name, "motion")), self._dimensions[force_name(name)]
         if motion is None or force is None:
             return
-        self._is(("joints", name, "stiffness"), force / motion, "the motion makes it")
-        self._is(("joints", name, "damping"), force * self._second / motion, "the motion makes it")
-        self._is(("joints", name, "rest"), motion, "the motion is in")
-        self._is(("joints", name, "force"), force, "the motion makes it")
+        self._is(("joints", name, "stiffness"), force / motion, "as the motion demands")
+        self._is(("joints", name, "damping"), force * self._second / motion, "as the motion demands")
+        self._is(("joints", name, "rest"), motion, "as the motion is")
+        self._is(("joints", name, "force"), force, "as the motion demands")
         if self._table.joints[name].inertia is not None:
-            self._is(("joints", name, "inertia"), force * self._second**2 / motion, "the motion makes it")
+            self._is(("joints", name, "inertia"), force * self._second**2 / motion, "as the motion demands")

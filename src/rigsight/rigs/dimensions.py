@@ -6,6 +6,7 @@ what it multiplies may have any unit. Angles count as plain numbers, as in SI.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -13,14 +14,17 @@ from typing import Any
 
 from lark import Token, Tree
 
-from rigsight.rigs.expressions import FUNCTIONS, READS, Expression, ExpressionError, place_of
+from rigsight.rigs.expressions import READS, Expression, ExpressionError, constant, place_of
+from rigsight.rigs.functions import FUNCTIONS
 from rigsight.units import INPUT_UNIT
 
 Dimension = Any
 """Powers of the base quantities, as pint holds them; None for anything."""
 
-_UNIT = re.compile(r"(?:1|[A-Za-zµΩ°%()]+(?:\^-?\d)?|\^-?\d|[ */])+")
+_UNIT = re.compile(r"(?:1|[A-Za-zµΩ°%()]++(?:\^-?\d)?|[ */])+")
 _LONGEST = 60
+_LARGEST_POWER = 100
+"""Largest power of a base unit in a message; equations whose units add up have small ones."""
 _FORMULA_NUMBER = re.compile(r"\d|\d\.(?:0|5|25|75)|0\.125")
 _USUAL = {"Nm": "N m", "Nms": "N m s", "Ohm": "ohm", "Ω": "ohm"}
 
@@ -87,6 +91,12 @@ def unit_of(of: Dimension) -> str:
     )
 
 
+def measured_in(of: Dimension) -> str:
+    """Return ``"in kg m/s^2"``, or that there is no unit, for messages."""
+    unit = unit_of(of)
+    return "without a unit (angles have none)" if unit == "1" else f"in {unit}"
+
+
 _BASES = {
     "[length]": "meter",
     "[mass]": "kilogram",
@@ -142,14 +152,13 @@ class _Walk:
         if node.data == "power":
             return self._power(node)
         parts = [self.of(child) for child in node.children]
-        if node.data == "negative":
-            return parts[0]
-        if node.data in ("add", "subtract"):
-            return self._same(node.children, parts, "are added" if node.data == "add" else "are subtracted")
-        first, second = parts
-        if first is None or second is None:
-            return None
-        return first * second if node.data == "multiply" else first / second
+        if node.data == "sum":
+            return self._same(node.children, parts, "are added or subtracted")
+        if node.data == "product":
+            return None if None in parts else math.prod(parts[1:], start=parts[0])
+        if node.data == "over":
+            return None if parts[0] is None else 1 / parts[0]
+        return parts[0]
 
     def _call(self, node: Tree[Token]) -> Dimension:
         name, *arguments = node.children
@@ -157,7 +166,7 @@ class _Walk:
         if kind == "pure":
             if parts[0] is not None and parts[0] != self._plain:
                 raise ExpressionError(
-                    f"{name}(...) takes a plain number, but {self._quoted(arguments[0])} is in {unit_of(parts[0])}",
+                    f"{name}(...) takes a plain number, but {self._quoted(arguments[0])} is {measured_in(parts[0])}",
                     place_of(arguments[0]),
                 )
             return self._plain
@@ -170,14 +179,16 @@ class _Walk:
         base, exponent = (self.of(child) for child in node.children)
         if exponent is not None and exponent != self._plain:
             raise ExpressionError(
-                f"an exponent is a plain number, but {self._quoted(node.children[1])} is in {unit_of(exponent)}",
+                f"an exponent is a plain number, but {self._quoted(node.children[1])} is {measured_in(exponent)}",
                 place_of(node.children[1]),
             )
         if base is None or base == self._plain:
             return base
-        power = _constant(node.children[1])
-        # An exponent that is a parameter gives a unit that nobody can write down.
-        return None if power is None else base**power
+        power = constant(node.children[1])
+        # An exponent that is a parameter gives a unit that nobody can write down, and so do powers of powers.
+        if power is None or max(abs(p * power) for p in base.values()) > _LARGEST_POWER:
+            return None
+        return base**power
 
     def _same(self, nodes: list[Any], parts: list[Dimension], what: str) -> Dimension:
         common, first = None, nodes[0]
@@ -186,7 +197,7 @@ class _Walk:
                 common, first = part, node
             elif part is not None and part != common:
                 raise ExpressionError(
-                    f"{self._quoted(first)} in {unit_of(common)} and {self._quoted(node)} in {unit_of(part)} {what}",
+                    f"{self._quoted(first)} {measured_in(common)} and {self._quoted(node)} {measured_in(part)} {what}",
                     place_of(node),
                 )
         return common
@@ -202,15 +213,3 @@ def _end_of(node: Tree[Token] | Token) -> int:
     return max((_end_of(child) for child in node.children), default=0) + (
         node.data in ("rate", "force", "call")
     )
-
-
-def _constant(node: Any) -> float | None:
-    if node.data == "number":
-        return float(node.children[0])
-    if node.data == "negative":
-        inner = _constant(node.children[0])
-        return None if inner is None else -inner
-    if node.data == "divide":
-        above, below = (_constant(child) for child in node.children)
-        return None if above is None or not below else above / below
-    return None

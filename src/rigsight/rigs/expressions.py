@@ -1,27 +1,30 @@
 """What may stand in an expression of a rig file, and what does it mean? Text is parsed, never executed.
 
 Numbers, names, ``+ - * / ^``, parentheses, ``d(coordinate)`` for a rate, and a few functions. Kinks are written through the
-functions that the simulation knows how to cross (`rigsight.effects.symbols`).
+functions that the simulation knows how to cross (`rigsight.rigs.functions`).
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
-import sympy as sp
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken
 
-from rigsight.effects.symbols import positive_part
 from rigsight.errors import nearest
+from rigsight.rigs.functions import FUNCTIONS
 
 _GRAMMAR = r"""
-?sum: product | sum "+" product -> add | sum "-" product -> subtract
-?product: signed | product "*" signed -> multiply | product "/" signed -> divide
+?sum: product | product (plus | minus)+
+plus: "+" product
+minus: "-" product
+?product: signed | signed (times | over)+
+times: "*" signed
+over: "/" signed
 ?signed: "-" signed -> negative | "+" signed | power
 ?power: atom | atom "^" signed -> power
 ?atom: NUMBER -> number | NAME -> name | NAME "(" [sum ("," sum)*] ")" -> call | "(" sum ")"
@@ -31,8 +34,10 @@ NAME: /[A-Za-z_][A-Za-z_0-9]*/
 """
 _LONGEST = 5000
 _DEEPEST = 60
-_MOST_POWER = 20
-"""Largest constant exponent: no law of mechanics has a larger one, and an expansion of one would not end."""
+MOST_POWER = 20
+"""Largest exponent: no law of mechanics has a larger one, and what is made of one would leave the range of numbers."""
+_DEEPEST_TREE = 120
+"""Powers of powers and signs of signs: deeper ones are no formula, and what walks through them would not return."""
 RATE = "d"
 """``d(NAME)`` is the time derivative of a coordinate; a name without parentheses may be a parameter called d."""
 FORCE = "force"
@@ -46,49 +51,6 @@ class ExpressionError(ValueError):
     def __init__(self, message: str, place: int = 0) -> None:
         super().__init__(message)
         self.place = place
-
-
-@dataclass(frozen=True)
-class Function:
-    """A function that expressions may call.
-
-    Attributes
-    ----------
-    arguments
-        How many it takes, for messages: their names.
-    build
-        The expression it stands for.
-    kind
-        ``"pure"`` takes and gives plain numbers, ``"same"`` takes one unit and gives it, ``"sign"`` takes any unit and gives a
-        plain number, ``"root"`` gives the root of its unit.
-    """
-
-    arguments: tuple[str, ...]
-    build: Callable[..., sp.Expr]
-    kind: str
-
-
-def _larger(a: sp.Expr, b: sp.Expr) -> sp.Expr:
-    return b + positive_part(a - b)
-
-
-def _smaller(a: sp.Expr, b: sp.Expr) -> sp.Expr:
-    return a - positive_part(a - b)
-
-
-FUNCTIONS: Mapping[str, Function] = {
-    **{
-        name: Function(("x",), getattr(sp, name), "pure")
-        for name in ("sin", "cos", "tan", "atan", "exp", "log", "tanh")
-    },
-    "atan2": Function(("y", "x"), sp.atan2, "ratio"),
-    "sqrt": Function(("x",), sp.sqrt, "root"),
-    "abs": Function(("x",), sp.Abs, "same"),
-    "sign": Function(("x",), sp.sign, "sign"),
-    "max": Function(("x", "y"), _larger, "same"),
-    "min": Function(("x", "y"), _smaller, "same"),
-    "clip": Function(("x", "low", "high"), lambda x, low, high: _smaller(_larger(x, low), high), "same"),
-}
 
 
 @dataclass(frozen=True)
@@ -140,25 +102,18 @@ def parsed(text: str) -> Expression:
         raise _told(error, text) from None
     if not isinstance(tree, Tree):
         raise ExpressionError("this is no expression")
+    if _depth(tree) > _DEEPEST_TREE:
+        raise ExpressionError(f"powers and signs may be nested {_DEEPEST_TREE} deep")
     return Expression(text, _checked(tree))
 
 
-def to_sympy(expression: Expression, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    """Return an expression as sympy sees it.
-
-    Parameters
-    ----------
-    expression
-        Parsed.
-    symbols
-        What each name, and each rate as ``"d(name)"``, stands for.
-
-    Raises
-    ------
-    ExpressionError
-        If a name stands for nothing, or a number leaves the range of numbers.
-    """
-    return _built(expression.tree, symbols)
+def _depth(tree: Tree[Token]) -> int:
+    deepest, waiting = 0, [(tree, 1)]
+    while waiting:
+        node, depth = waiting.pop()
+        deepest = max(deepest, depth)
+        waiting += [(child, depth + 1) for child in node.children if isinstance(child, Tree)]
+    return deepest
 
 
 def rate_name(name: str) -> str:
@@ -194,8 +149,10 @@ def _told(error: UnexpectedInput, text: str) -> ExpressionError:
     place = error.pos_in_stream or 0
     found = text[place : place + 1]
     if isinstance(error, UnexpectedCharacters):
+        prime = "; a rate is written d(phi)" if found == "'" else ""
         return ExpressionError(
-            f"'{found}' has no meaning here; allowed are numbers, names, + - * / ^ and parentheses", place
+            f"{found} has no meaning here{prime}; allowed are numbers, names, + - * / ^ and parentheses",
+            place,
         )
     if text[max(place - 1, 0) : place + 1] == "**":
         return ExpressionError("powers are written with ^", place - 1)
@@ -213,6 +170,8 @@ def _told(error: UnexpectedInput, text: str) -> ExpressionError:
 def _checked(tree: Tree[Token]) -> Tree[Token]:
     """Return the tree with rates told from calls; calls of what is not known are refused."""
     for node in list(tree.iter_subtrees()):
+        if node.data == "power":
+            _check_exponent(node.children[1])
         if node.data != "call":
             continue
         name, *arguments = node.children
@@ -236,9 +195,32 @@ def _checked(tree: Tree[Token]) -> Tree[Token]:
             )
         if len(arguments) != len(function.arguments):
             raise ExpressionError(
-                f"it is {name}({', '.join(function.arguments)}), with {len(arguments)} given", place
+                f"{name} takes {len(function.arguments)} arguments, {name}({', '.join(function.arguments)}), and "
+                f"{len(arguments)} are given",
+                place,
             )
     return tree
+
+
+def _check_exponent(node: Tree[Token] | Token) -> None:
+    power = constant(node)
+    if power is not None and abs(power) > MOST_POWER:
+        raise ExpressionError(
+            f"an exponent lies within +-{MOST_POWER}, this one is {power:g}", place_of(node)
+        )
+
+
+def constant(node: Any) -> float | None:
+    """Return the value of a number as it is written, with its sign, or of a fraction of two; None for anything else."""
+    if node.data == "number":
+        return float(node.children[0])
+    if node.data == "negative":
+        inner = constant(node.children[0])
+        return None if inner is None else -inner
+    if node.data == "product" and [part.data for part in node.children[1:]] == ["over"]:
+        above, below = constant(node.children[0]), constant(node.children[1].children[0])
+        return None if above is None or not below else above / below
+    return None
 
 
 def place_of(node: Tree[Token] | Token) -> int:
@@ -247,56 +229,3 @@ def place_of(node: Tree[Token] | Token) -> int:
         return node.start_pos or 0
     places = [place_of(child) for child in node.children]
     return min(places, default=0)
-
-
-def _built(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Expr:
-    assert isinstance(node, Tree)
-    if node.data == "number":
-        return number(str(node.children[0]), place_of(node))
-    if node.data in READS:
-        token = node.children[0]
-        written = READS[str(node.data)](str(token))
-        if written not in symbols:
-            raise ExpressionError(
-                f"'{written}' is not known here.{nearest(written, symbols)}", place_of(node)
-            )
-        return symbols[written]
-    if node.data == "call":
-        name, *arguments = node.children
-        return FUNCTIONS[str(name)].build(*(_built(argument, symbols) for argument in arguments))
-    parts = [_built(child, symbols) for child in node.children]
-    if node.data == "negative":
-        return -parts[0]
-    first, second = parts
-    if node.data == "add":
-        return first + second
-    if node.data == "subtract":
-        return first - second
-    if node.data == "multiply":
-        return first * second
-    if node.data == "divide":
-        if second.is_zero:
-            raise ExpressionError("a division by zero", place_of(node.children[1]))
-        return first / second
-    if second.is_number and abs(float(second)) > _MOST_POWER:
-        raise ExpressionError(
-            f"an exponent lies within +-{_MOST_POWER}, this one is {float(second):g}",
-            place_of(node.children[1]),
-        )
-    return first**second
-
-
-def number(text: str, place: int = 0) -> sp.Expr:
-    """Return a number: whole ones stay whole, as powers of symbols need them.
-
-    Raises
-    ------
-    ExpressionError
-        If it is too large.
-    """
-    value = float(text)
-    if math.isinf(value):
-        raise ExpressionError(f"{text} is too large", place)
-    if text.isdigit() and len(text) <= 15:
-        return sp.Integer(int(text))
-    return sp.Integer(int(value)) if value.is_integer() and abs(value) < 1e15 else sp.Float(value)

@@ -318,11 +318,7 @@ class Rig:
         joint = joint_of(self, effect)
         if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
             return False
-        return (
-            not effect.needs_inertia
-            or joint.inertia is not None
-            or mechanism.moves_inertia(joint.motion)
-        )
+        return not effect.needs_inertia or joint.inertia is not None or mechanism.moves_inertia(joint.motion)
 
 
 def joint_of(rig: Rig, effect: Effect) -> Joint:

@@ -18,7 +18,7 @@ from rigsight.rigs.rig import Rig
 from rigsight.rigs.signal_order import signal_order
 from rigsight.rigs.sound_mechanism import check_mechanism
 from rigsight.rigs.toml_places import Path as KeyPath
-from rigsight.rigs.toml_places import Place, value_places
+from rigsight.rigs.toml_places import Place, toml_error, value_places
 
 LARGEST_FILE = 1_000_000
 
@@ -59,8 +59,10 @@ def rig_of_text(text: str, source: str = "rig file", *, check_units: bool = True
     """
     try:
         content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{source}: is no valid TOML: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}{toml_error(error)}") from None
+    except RecursionError:
+        raise InputError(f"{source}: is no valid TOML: its arrays are nested too deep.") from None
     return _rig_of(content, value_places(text), source, check_units)
 
 
@@ -86,7 +88,9 @@ _read: dict[str, Rig] = {}
 """Rigs by their declaration: the same one is the same object, whichever file holds it, so that its equations are made once."""
 
 
-def _rig_of(tables: Mapping[str, Any], places: Mapping[KeyPath, Place], source: str, check_units: bool) -> Rig:
+def _rig_of(
+    tables: Mapping[str, Any], places: Mapping[KeyPath, Place], source: str, check_units: bool
+) -> Rig:
     try:
         key = json.dumps(tables)
     except (TypeError, ValueError, RecursionError):

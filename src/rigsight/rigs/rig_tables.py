@@ -88,7 +88,7 @@ class _StateTable(_Table):
 class RigTable(_Table):
     """The whole file."""
 
-    name: Text
+    name: Annotated[str, Field(min_length=1, max_length=100)]
     summary: Text = ""
     inputs: dict[str, _InputTable] = {}
     constants: dict[str, ConstantTable] = {}
@@ -104,15 +104,42 @@ class RigTable(_Table):
     initial: dict[str, Formula] = {}
 
 
-def told(error: Any) -> str:
-    """Return one sentence for what pydantic found."""
-    key = str(error["loc"][-1]) if error["loc"] else ""
+_WANTED = {
+    "string_type": "text in quotes",
+    "string_too_long": "text of fewer characters",
+    "string_too_short": "at least one character",
+    "float_type": "a number without quotes, as 0.05",
+    "finite_number": "a finite number",
+    "bool_type": "true or false without quotes",
+}
+_FORMULA = "constrained-str"
+"""What pydantic appends to the path of a formula that is no text."""
+
+
+def told(error: Any) -> tuple[tuple[str | int, ...], str]:
+    """Return the path of what pydantic found, and one sentence for it.
+
+    Parameters
+    ----------
+    error
+        One of the ``errors()`` of a ValidationError of `RigTable`.
+    """
+    path = tuple(error["loc"])
+    key = str(path[-1]) if path else ""
     if error["type"] == "extra_forbidden":
-        allowed = _keys_at(error["loc"][:-1])
-        return f"'{key}' is not a key of this table.{nearest(key, allowed)} Allowed: {', '.join(allowed)}"
+        allowed = _keys_at(path[:-1])
+        return (
+            path,
+            f"'{key}' is not a key of this table.{nearest(key, allowed)} Allowed: {', '.join(allowed)}",
+        )
     if error["type"] == "missing":
-        return f"'{key}' is missing"
-    return f"{error['msg']}, got {shown(error.get('input'))}"
+        return path[:-1], f"the line '{key} = ...' is missing"
+    got = shown(error.get("input"))
+    if error["type"] in ("model_type", "dict_type", "model_attributes_type"):
+        return path, f"this is a table: write [{'.'.join(map(str, path))}] and its keys below, got {got}"
+    if key in (_FORMULA, "float"):
+        return path[:-1], f"wanted is an expression in quotes or a number, got {got}"
+    return path, f"wanted is {_WANTED.get(error['type'], error['msg'])}, got {got}"
 
 
 def _keys_at(path: tuple[str | int, ...]) -> list[str]:

@@ -28,17 +28,18 @@ def _check_mass(declaration: Declaration, mechanism: Mechanism) -> None:
     if not is_quadratic(mechanism):
         declaration.refuse(
             path,
-            "a kinetic energy is a sum of squares and products of rates, as 'm*d(x)^2/2', and this is none",
+            "a kinetic energy is a sum of squares and products of rates, as 'm*d(x)^2/2'; what holds no rate is potential",
         )
     negative = negative_coordinates(mechanism)
     if negative:
         declaration.refuse(path, f"it is negative when {', '.join(negative)} moves; turn its sign round")
     lacking = dependent_coordinates(mechanism)
     if lacking:
+        together = " together" if len(lacking) > 1 else ""
         declaration.refuse(
             path,
-            f"the mass matrix is singular: no energy moves with {', '.join(lacking)}; give each coordinate an inertia, or "
-            "make it a state",
+            f"the mass matrix is singular: {', '.join(lacking)} can move{together} without energy; give each coordinate an "
+            "inertia, or make it a state",
         )
 
 

@@ -54,6 +54,26 @@ def value_places(text: str) -> dict[Path, Place]:
     return places
 
 
+_MENDS = {
+    "Invalid value": "text and expressions stand in quotes",
+    "Illegal character '\\n'": "a quotation mark is missing at the end of the line",
+    "Cannot overwrite a value": "the key stands twice in its table",
+    "Cannot declare": "the table stands twice",
+    "Expected '=' after a key": "a line is KEY = VALUE",
+    "Unescaped": "a backslash in quotes is written twice",
+}
+_POSITION = re.compile(r"(?P<what>.*) \(at (?P<place>line \d+, column \d+|end of document)\)", re.DOTALL)
+
+
+def toml_error(error: tomllib.TOMLDecodeError) -> str:
+    """Return ``", line 3, column 8: is no valid TOML: ..."`` with what to write, for behind the name of a file."""
+    found = _POSITION.fullmatch(str(error))
+    if found is None:
+        return f": is no valid TOML: {error}."
+    mend = next((mend for start, mend in _MENDS.items() if found["what"].startswith(start)), "")
+    return f", {found['place']}: is no valid TOML: {found['what']}{f'; {mend}' if mend else ''}."
+
+
 def _keys(written: str) -> Path:
     try:
         content = tomllib.loads(f"{written} = 0")
