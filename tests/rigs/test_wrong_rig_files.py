@@ -40,6 +40,7 @@ MISTAKES = [
     ('unit = "A"', 'unit = "mA"', "line 5, column 8: .* 'mA' is not SI: equations hold in A"),
     ('"k_s"', '"k_s*log(-1)"', "line 55, column 18: .*no real value"),
     ('"k_s"', '"k_s^1e9"', "line 55, column 18: .*an exponent lies within"),
+    ('"k_s"', '"' + "k_s+" * 1300 + 'k_s"', "line 55, column 13: joints.shaft.stiffness: it may have 5000 characters, and has 5203"),
     ('name = "drive_train"', 'name = ""', "line 1, column 8: name: wanted is at least one character"),
 ]  # fmt: skip
 
@@ -91,6 +92,7 @@ def test_long_expressions_are_read(formula: str) -> None:
 @pytest.mark.parametrize(
     "formula",
     [
+        "k_s*((((k_s^20)^20)^20)^20)^20",
         "-" * 4000 + "k_s",
         "k_s" + "^k_s" * 900,
         "((((k_s^20)^20)^20)^20)^20",
@@ -108,6 +110,10 @@ def test_long_expressions_are_read(formula: str) -> None:
 def test_what_leaves_the_range_of_numbers_is_one_message(formula: str) -> None:
     with pytest.raises(InputError, match="line 55, column"):
         rig_of_text(TRAIN.replace('stiffness = "k_s"', f'stiffness = "{formula}"', 1), "rig.toml")
+
+
+def test_newton_meters_may_be_written_as_one_word() -> None:
+    assert rig_of_text(TRAIN.replace('"N m s/rad"', '"Nm s/rad"')).name == "drive_train"
 
 
 @pytest.mark.parametrize("unit", ["a" * 60 + "!", "m" * 59 + "^", "(" * 30 + ")" * 30, "m^9^9", "1/0"])

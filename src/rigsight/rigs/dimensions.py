@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Mapping
 from functools import cache
+from tokenize import TokenError
 from typing import Any
 
 from lark import Token, Tree
@@ -26,6 +27,7 @@ _LONGEST = 60
 _LARGEST_POWER = 100
 """Largest power of a base unit in a message; equations whose units add up have small ones."""
 _FORMULA_NUMBER = re.compile(r"\d|\d\.(?:0|5|25|75)|0\.125")
+_WORD = re.compile(r"[A-Za-zΩ]+")
 _USUAL = {"Nm": "N m", "Nms": "N m s", "Ohm": "ohm", "Ω": "ohm"}
 
 
@@ -44,10 +46,17 @@ def dimension(unit: str) -> Dimension:
     """
     from pint.errors import PintError
 
-    text = _USUAL.get(unit.strip(), unit.strip()).replace("²", "^2").replace("³", "^3").replace("·", " ")
+    text = (
+        _WORD.sub(lambda word: _USUAL.get(word[0], word[0]), unit.strip())
+        .replace("²", "^2")
+        .replace("³", "^3")
+        .replace("·", " ")
+    )
     if text in ("", "1"):
         return _registry().dimensionless.dimensionality
-    if len(text) > _LONGEST or not _UNIT.fullmatch(text) or re.search(r"\)\s*\^|\(\s*\)", text):
+    if len(text) > _LONGEST:
+        raise UnitError(f"a unit may have {_LONGEST} characters, this one has {len(text)}")
+    if not _UNIT.fullmatch(text) or re.search(r"\)\s*\^|\(\s*\)", text):
         raise UnitError(f"'{unit}' is no unit; write one like N m/rad, kg m^2 or 1/s")
     registry = _registry()
     try:
@@ -63,6 +72,7 @@ def dimension(unit: str) -> Dimension:
         OverflowError,
         ZeroDivisionError,
         SyntaxError,
+        TokenError,
     ):
         raise UnitError(f"the unit '{unit}' is not known; write one like N m/rad, kg m^2 or 1/s") from None
     if abs(float(si.magnitude) - 1.0) > 1e-12:

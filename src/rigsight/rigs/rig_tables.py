@@ -106,7 +106,6 @@ class RigTable(_Table):
 
 _WANTED = {
     "string_type": "text in quotes",
-    "string_too_long": "text of fewer characters",
     "string_too_short": "at least one character",
     "float_type": "a number without quotes, as 0.05",
     "finite_number": "a finite number",
@@ -134,6 +133,9 @@ def told(error: Any) -> tuple[tuple[str | int, ...], str]:
         )
     if error["type"] == "missing":
         return path[:-1], f"the line '{key} = ...' is missing"
+    if error["type"] == "string_too_long":
+        own = path[:-1] if key == _FORMULA else path
+        return own, f"it may have {error['ctx']['max_length']} characters, and has {len(error['input'])}"
     got = shown(error.get("input"))
     if error["type"] in ("model_type", "dict_type", "model_attributes_type"):
         return path, f"this is a table: write [{'.'.join(map(str, path))}] and its keys below, got {got}"

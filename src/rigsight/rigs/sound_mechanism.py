@@ -25,7 +25,8 @@ def check_mechanism(declaration: Declaration, mechanism: Mechanism) -> None:
 
 def _check_mass(declaration: Declaration, mechanism: Mechanism) -> None:
     path = ("energy", "kinetic")
-    if not is_quadratic(mechanism):
+    rates = {c.rate for c in mechanism.coordinates}
+    if not is_quadratic(mechanism) or mechanism.mass_matrix.free_symbols & rates:
         declaration.refuse(
             path,
             "a kinetic energy is a sum of squares and products of rates, as 'm*d(x)^2/2'; what holds no rate is potential",
