@@ -33,6 +33,8 @@ from rigsight.plot.model_comparison import model_errors as model_errors
 from rigsight.plot.model_comparison import model_responses as model_responses
 from rigsight.plot.model_comparison import model_steps as model_steps
 from rigsight.plot.model_comparison import model_styles as model_styles
+from rigsight.plot.rig_picture import PlaceMark as PlaceMark
+from rigsight.plot.rig_picture import rig_picture as rig_picture
 
 if TYPE_CHECKING:
     # For rooms that hand figures on and must not know matplotlib.
@@ -46,6 +48,7 @@ __all__ = [
     "FittedCurve",
     "ForceLoop",
     "Panel",
+    "PlaceMark",
     "ResponsesPanel",
     "StepPanel",
     "amplitude_dependence",
@@ -67,6 +70,7 @@ __all__ = [
     "model_styles",
     "overlaid_responses",
     "ranking",
+    "rig_picture",
     "step_window",
     "style",
     "svg_text",
