@@ -103,7 +103,12 @@ def with_probes(rig: Rig) -> Rig:
     pushed += [sensor.name for sensor in mechanism.sensors]
     inputs = tuple(map(push, pushed))
     pushes = tuple(
-        Drive(f"{_PUSH}joint {joint.name}", _real(push(joint.name)), _real(f"{_PUSH}joint {joint.name}"), joint.motion)
+        Drive(
+            f"{_PUSH}joint {joint.name}",
+            _real(push(joint.name)),
+            _real(f"{_PUSH}joint {joint.name}"),
+            joint.motion,
+        )
         for joint in mechanism.joints
     )
     drives = tuple(

@@ -23,8 +23,8 @@ from rigsight.diagnose.probes import STIFFNESS, alone, motion_columns, push, sig
 from rigsight.diagnose.starts import start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect, Place, placed_dimension
-from rigsight.rigs import evaluated, joint_of
 from rigsight.records.record import Record
+from rigsight.rigs import evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
@@ -84,7 +84,11 @@ class Lineup:
 
     def _suspect(self, effect: Effect) -> Suspect:
         place = self._bench.rig.acts_at(effect)
-        answers = [answer for signals in self._signals(effect) if (answer := self._answer(place, signals)) is not None]
+        answers = [
+            answer
+            for signals in self._signals(effect)
+            if (answer := self._answer(place, signals)) is not None
+        ]
         if not answers:
             return Suspect(effect, 0.0)
         columns = self._without_free(np.column_stack(answers))
@@ -130,15 +134,20 @@ class Lineup:
         bench = self._bench
         composed = bench.composed((effect,), effect.special_cases)
         declared = [
-            composed.values_of(effect, start) for start in start_values(bench, composed, effect, self._linear.fit, {})
+            composed.values_of(effect, start)
+            for start in start_values(bench, composed, effect, self._linear.fit, {})
         ]
         inner = [p.name for p in effect.parameters if p.fitted and p.null is None]
         starts = []
         for own in declared:
             for factor in _WIDER if inner else (1.0,):
-                starts.append({**own, **effect.special_cases, **{n: factor * own[n] for n in inner if n in own}})
+                starts.append(
+                    {**own, **effect.special_cases, **{n: factor * own[n] for n in inner if n in own}}
+                )
         stiffness = evaluated(joint_of(bench.rig, effect).stiffness, self._values)
-        return [{**start, STIFFNESS: stiffness} if STIFFNESS in structure.names else start for start in starts]
+        return [
+            {**start, STIFFNESS: stiffness} if STIFFNESS in structure.names else start for start in starts
+        ]
 
     def _times(self, effect: Effect) -> list[float]:
         (delay,) = effect.parameters
@@ -169,7 +178,11 @@ class Lineup:
         return record.with_signals(**{signal.name: rest for signal in probes})
 
     def _outputs(
-        self, index: int, record: Record, p: NDArray[np.float64] | None = None, x0: NDArray[np.float64] | None = None
+        self,
+        index: int,
+        record: Record,
+        p: NDArray[np.float64] | None = None,
+        x0: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
         """Return the outputs along a record, shape (n_samples, n_outputs) or with sets behind."""
         sets = (self._p if p is None else p).reshape(self._p.size, -1)

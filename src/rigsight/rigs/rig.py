@@ -289,7 +289,9 @@ class Rig:
             return False
         if self.is_driven:
             return True
-        return effect.place is Place.DYNAMICS and (not effect.needs_inertia or joint_of(self, effect).inertia is not None)
+        return effect.place is Place.DYNAMICS and (
+            not effect.needs_inertia or joint_of(self, effect).inertia is not None
+        )
 
     def _suits(self, effect: Effect) -> bool:
         """Return False for an effect of a spring or of a mass at a joint that has none."""
