@@ -14,7 +14,6 @@ import numpy as np
 from rigsight.diagnose.first_look import (
     LOOK_ACCURACY,
     Look,
-    cut_in_pieces,
     look_at,
     looked_again,
     mean_square,
@@ -231,7 +230,7 @@ def _fitted(
 
     results = [whole(start.values) for start in (starts if promising else starts[:1])]
     if promising and min(map(mean_square, results)) > _STUCK * nearest:
-        in_pieces = bench.problem(structure, cut_in_pieces(bench, bench.estimation, _LONG_PIECE))
+        in_pieces = bench.problem(structure, bench.cut_in_pieces(bench.estimation, _LONG_PIECE))
         near = in_pieces.fit(
             starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
         )

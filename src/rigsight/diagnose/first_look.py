@@ -20,11 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.starts import start_values, with_own_values
-from rigsight.diagnose.windows import cut
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect
 from rigsight.identify import EffectRegression, FitResult
-from rigsight.records.record import Record
 from rigsight.simulate import Structure
 
 _LOOK_EVALUATIONS = 25
@@ -36,16 +34,9 @@ _LENGTHY = 2
 begins after the glimpse. Of hysteresis by sliders with five draws of noise mostly two to five of nine glimpses led on to the
 right place, of four fits at length in pieces one; these are for a model that is too far off for a fit in one piece.
 """
-_PIECE = 4.0
-"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
-
-An assumption, like the lengths and factors below: half to two periods did worse on play of a few widths, nothing else was tried.
-"""
 _WIDE_EVALUATIONS = 12
 _LOOK_TOLERANCE = 1e-3
 LOOK_ACCURACY = 1e-3
-_MOST_PIECES = 40
-"""In all: every piece has initial states of its own, and the fit's equations grow with them."""
 _NEAR = 25.0
 """A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
 _ALIKE = 1.05
@@ -155,7 +146,7 @@ def _looked(
 ) -> tuple[FitResult, ...]:
     """Fit to the liveliest stretches: in pieces from every start, from the best places in one."""
     fit = bench.problem(structure, bench.look, LOOK_ACCURACY)
-    stretches = [cut_in_pieces(bench, [record], _PIECE) for record in bench.look]
+    stretches = bench.look_in_pieces
     in_pieces = bench.problem(structure, [piece for parts in stretches for piece in parts], LOOK_ACCURACY)
     of_pieces = None
     if substeps is not None:
@@ -245,12 +236,6 @@ def _on_whole_records(
             for near in fits
         ]
     )
-
-
-def cut_in_pieces(bench: Workbench, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
-    """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
-    duration = sum(record.n_samples * record.dt for record in records)
-    return cut(records, max(periods * bench.period, duration * len(bench.look) / len(records) / _MOST_PIECES))
 
 
 def mean_square(fit: FitResult) -> float:

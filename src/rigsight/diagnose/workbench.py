@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.candidates import candidates_on
+from rigsight.diagnose.windows import cut
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
@@ -16,6 +18,13 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 
+_PIECE = 4.0
+"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
+
+An assumption: half to two periods did worse on play of a few widths, nothing else was tried.
+"""
+_MOST_PIECES = 40
+"""In all, for each degree of freedom: every piece has initial states of its own, and the fit's equations grow with them."""
 _ROUGH_ACCURACY = 1e-3
 _ROUGH_EVALUATIONS = 8
 
@@ -99,6 +108,17 @@ class Workbench:
     def period(self) -> float:
         """Natural period of the rig, or the typical one of its motion [s]."""
         return float(2.0 * np.pi * self.scales["time"])
+
+    @cached_property
+    def look_in_pieces(self) -> tuple[tuple[Record, ...], ...]:
+        """Pieces of each of the liveliest stretches: a model that is far off stays in step with the motion in them."""
+        return tuple(self.cut_in_pieces([record], _PIECE) for record in self.look)
+
+    def cut_in_pieces(self, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
+        """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
+        duration = sum(record.n_samples * record.dt for record in records)
+        most = _MOST_PIECES / max(1, len(self.rig.mechanism.free))
+        return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
 
     def problem(
         self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -41,6 +41,10 @@ class RecordData:
     measured: NDArray[np.float64]
     weights: NDArray[np.float64]
     own: tuple[tuple[int, float], ...] = ()
+
+    def first(self, n_samples: int) -> RecordData:
+        """Return the first samples of measurement and input."""
+        return replace(self, held=self.held.first(n_samples), measured=self.measured[:n_samples])
 
     def parameters(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return parameters, shape (n_parameters,) or (n_parameters, n_sets), with the record's own constants."""

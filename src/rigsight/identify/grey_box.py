@@ -29,10 +29,12 @@ from rigsight.identify.fit_result import FitResult
 from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.search import FINE_TOLERANCE, off_kinks, searched
 from rigsight.identify.separate_states import SeparateStates
+from rigsight.identify.settled_states import settled_state
 from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
     Substeps,
+    parameter_vector,
     record_input,
     record_values,
     simulate_outputs,
@@ -300,11 +302,17 @@ class GreyBoxFit:
         return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
 
     def _first_states(self, start: Mapping[str, float]) -> list[NDArray[np.float64]]:
-        """Return each record's guess; of several for states with a range, and of moving and resting, the best."""
+        """Return each record's guess; of several for states with a range, and of moving and resting, the best.
+
+        On a rig of more than one motion it is fitted to the beginning of the record.
+        """
         guesses = [first_state(self.structure, d.record, start) for d in self.data.records]
+        p = parameter_vector(self.structure, start)
+        if not (self.structure.rig.has_one_motion or np.any(self.data.limited)):
+            pairs = list(zip(self.data.records, guesses, strict=True))
+            return self.data.of_each_record(lambda i: settled_state(self.data, pairs[i][0], p, pairs[i][1]))
         if not np.any(self.data.limited):
             return guesses
-        p = np.array([start[name] for name in self.structure.names])
         ranges = np.where(self.data.limited, self.data.state_sizes(p[:, None])[:, 0], 0.0)
         found = []
         for data, guess in zip(self.data.records, guesses, strict=True):

@@ -1,7 +1,8 @@
 """Linear parameters straight from the spectra of the records, as start values of a grey-box fit.
 
-Iterated linear least squares on the equation of motion in the frequency domain, weighted by the inverse of the current
-denominator so that the equation error approaches the output error; a polynomial per record takes up the transients.
+Of a rig of one motion; others start as `any_rig_start` says. Iterated linear least squares on the equation of motion in the
+frequency domain, weighted by the inverse of the current denominator so that the equation error approaches the output error; a
+polynomial per record takes up the transients. It has no local minimum, and needs no simulation.
 
 References
 ----------
@@ -19,6 +20,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
+from rigsight.identify.any_rig_start import any_rig_start
 from rigsight.identify.equation_error import solve_in_frequency, spectra_of
 from rigsight.records.record import Record
 from rigsight.rigs import Follower, Rig, evaluated
@@ -51,6 +53,8 @@ def linear_start(
     InputError
         If the records do not move the rig.
     """
+    if not rig.has_one_motion:
+        return any_rig_start(rig, records, constants, known)
     found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)
     if rig.follower is not None:
         found |= _followed(rig, rig.follower, records, constants, found)

@@ -24,7 +24,8 @@ Floats = NDArray[np.float64]
 
 _KEPT = 32
 """Rigs whose functions are kept: to write them down takes a tenth of a second, and every fit asks for them."""
-_FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
+FUNCTIONS = {"positive_part": lambda x: np.maximum(x, 0.0)}
+"""What numpy calls otherwise than effects and rigs do."""
 _known: OrderedDict[int, tuple[Rig, RigEquations]] = OrderedDict()
 
 
@@ -156,25 +157,43 @@ class RigEquations:
         """
         parts, slopes, ends = self._of_parameters
         arguments = [*z, *u, 0.0, *p, *accelerations]
-        rows = _rows(parts(*arguments), z.shape[1])
+        rows = rows_of(parts(*arguments), z.shape[1])
         largest = [
             np.max(np.abs(rows[first:last]), axis=0)
             for first, last in zip([0, *ends[:-1]], ends, strict=True)
         ]
-        by_parameter = _rows(slopes(*arguments), z.shape[1])
+        by_parameter = rows_of(slopes(*arguments), z.shape[1])
         return np.array(largest), by_parameter.reshape(len(ends), p.size, z.shape[1])
 
     def _evaluated(self, function: Any, z: Floats, u: Floats, p: Floats) -> Floats:
         with np.errstate(all="ignore"):
-            return _rows(function(*z, *u, 0.0, *p), z.shape[1])
+            return rows_of(function(*z, *u, 0.0, *p), z.shape[1])
 
     @cached_property
-    def _arguments(self) -> list[sp.Symbol]:
+    def arguments(self) -> list[sp.Symbol]:
+        """Symbols of states, inputs with their derivatives, time and parameters, in the order in which functions take them."""
         inputs = [s for i in range(len(self.rig.inputs)) for s in input_symbols(i)]
         return [*self.structure.states, *inputs, TIME, *self.structure.parameter_symbols]
 
+    @cached_property
+    def momenta_and_forces(self) -> tuple[list[sp.Expr], list[sp.Expr]]:
+        """``d/dt momentum = force`` of each coordinate, and of each own state the state itself and its rate."""
+        mechanism = self.rig.mechanism
+        momenta = [sp.diff(mechanism.kinetic, c.rate) for c in mechanism.free]
+        forces = []
+        for c in mechanism.free:
+            force = sp.diff(mechanism.kinetic - mechanism.potential, c.symbol)
+            for drive in mechanism.drives:
+                force += sp.diff(drive.along, c.symbol) * drive.force
+            for joint in mechanism.joints:
+                force -= sp.diff(joint.motion, c.symbol) * sum(_resisting(joint, self.rig), start=sp.S.Zero)
+            forces.append(force)
+        states = [state.symbol for state in mechanism.states]
+        rates = [state.rate for state in mechanism.states]
+        return self._bound([*momenta, *states]), self._bound([*forces, *rates])
+
     def _function(self, expressions: list[sp.Expr], *further: sp.Symbol) -> Any:
-        return sp.lambdify([*self._arguments, *further], expressions, modules=[_FUNCTIONS, "numpy"], cse=True)
+        return sp.lambdify([*self.arguments, *further], expressions, modules=[FUNCTIONS, "numpy"], cse=True)
 
     @cached_property
     def _mass(self) -> Any:
@@ -251,17 +270,23 @@ class RigEquations:
 
 
 def _of_joint(joint: Joint, rig: Rig) -> dict[str, sp.Expr]:
-    motion, rate = joint.motion - joint.rest, rig.mechanism.rate(joint.motion)
+    spring, damper, own = _resisting(joint, rig)
     return {
-        f"motion@{joint.name}": motion,
-        f"rate@{joint.name}": rate,
-        f"spring@{joint.name}": joint.stiffness * motion,
-        f"damper@{joint.name}": joint.damping * rate,
-        f"own@{joint.name}": joint.force,
+        f"motion@{joint.name}": joint.motion - joint.rest,
+        f"rate@{joint.name}": rig.mechanism.rate(joint.motion),
+        f"spring@{joint.name}": spring,
+        f"damper@{joint.name}": damper,
+        f"own@{joint.name}": own,
     }
 
 
-def _rows(values: Any, n_samples: int) -> Floats:
+def _resisting(joint: Joint, rig: Rig) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return what resists the motion of a joint: spring, damper, and its own force."""
+    spring = joint.stiffness * (joint.motion - joint.rest)
+    return spring, joint.damping * rig.mechanism.rate(joint.motion), joint.force
+
+
+def rows_of(values: Any, n_samples: int) -> Floats:
     """Return what a function of arrays gives, shape (n_rows, n_samples); a part of it may be constant."""
     found = np.empty((len(values), n_samples))
     for row, value in zip(found, values, strict=True):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -52,6 +52,10 @@ class HeldInput:
     def n_pieces(self) -> int:
         """Pieces of the record."""
         return int(self.coefficients.shape[0]) - 1
+
+    def first(self, n_samples: int) -> HeldInput:
+        """Return the input of the first samples."""
+        return replace(self, coefficients=self.coefficients[: (n_samples - 1) * self.per_sample + 1])
 
     def at_samples(self, n_samples: int) -> NDArray[np.float64]:
         """Return each input with its first and second derivative by time at the samples, shape (3 n_inputs, n_samples).

@@ -1,0 +1,169 @@
+"""Which states of a rig do the sensors of a record show? Coordinates, rates and own states as signals, and their noise.
+
+A coordinate is shown by what reads it, or, up to a constant, by what reads its rate. Sensors whose reading is no sum of these
+with known factors tell nothing here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.linalg import null_space
+
+from rigsight.identify.rig_equations import RigEquations
+from rigsight.records.record import Record
+from rigsight.simulate.prescribed_motion import smooth_motion
+
+Floats = NDArray[np.float64]
+
+_RANK = 1e-9
+"""Share of the largest singular value below which a combination of states is not shown."""
+
+_HIDDEN, _WAVES = 0.7, 20
+"""Size of a motion that no sensor shows, in terms of one that is shown, and how often it swings where there is none."""
+
+
+@dataclass(frozen=True)
+class MeasuredStates:
+    """States of a rig as sensors show them.
+
+    Attributes
+    ----------
+    z
+        Shape (n_states, n_samples), in the order of `RigEquations`; what sensors add to their readings is still in it.
+    by_reading, by_integral
+        What each sensor contributes to each coordinate and own state as it is, and through its integral: shape
+        (n_coordinates + n_own, n_sensors), columns in the order of the rig's sensors.
+    """
+
+    z: Floats
+    by_reading: Floats
+    by_integral: Floats
+
+    @property
+    def is_integrated(self) -> bool:
+        """Whether a coordinate is known up to a constant only."""
+        return bool(np.any(self.by_integral))
+
+
+def sensor_factors(equations: RigEquations, free: frozenset[str]) -> dict[str, tuple[sp.Expr, ...]]:
+    """Return the factors of the states in each reading that is a sum of them, by sensor.
+
+    Parameters
+    ----------
+    equations
+        The rig's.
+    free
+        Names of the parameters that are not known.
+    """
+    structure = equations.structure
+    unknown = {
+        symbol
+        for name, symbol in zip(structure.names, structure.parameter_symbols, strict=True)
+        if name in free
+    }
+    given = set(structure.parameter_symbols) - unknown
+    found = {}
+    for name, reading in zip(equations.sensor_names, structure.outputs, strict=False):
+        factors = tuple(sp.diff(reading, state) for state in structure.states)
+        if all(factor.free_symbols <= given for factor in factors):
+            found[name] = factors
+    return found
+
+
+def measured_states(
+    equations: RigEquations,
+    record: Record,
+    p: Floats,
+    factors: Mapping[str, Sequence[sp.Expr]],
+) -> MeasuredStates | None:
+    """Return the states of a record, or None if its sensors do not show them all.
+
+    Parameters
+    ----------
+    equations
+        The rig's.
+    record
+        What was measured.
+    p
+        Parameters in the order of the structure; unknown ones may be anything.
+    factors
+        From `sensor_factors`.
+    """
+    n, n_states = equations.n_coordinates, equations.n_states
+    n_own, n_sensors = n_states - 2 * n, len(equations.sensor_names)
+    numbers = dict(zip(equations.structure.parameter_symbols, map(float, p), strict=True))
+    names = [name for name in equations.sensor_names if name in factors and name in record]
+    if not names:
+        return None
+    rows = np.array([[float(f.xreplace(numbers)) for f in factors[name]] for name in names])
+    position, rate, own = rows[:, :n], rows[:, n : 2 * n], rows[:, 2 * n :]
+    y = np.array([record[name] for name in names])
+    columns = [equations.sensor_names.index(name) for name in names]
+    of_rate = np.any(rate != 0.0, axis=1)
+    of_own = np.any(own != 0.0, axis=1)
+    direct = ~of_rate & ~of_own
+    by_reading, by_integral = np.zeros((n + n_own, n_sensors)), np.zeros((n + n_own, n_sensors))
+    shown = np.linalg.pinv(position[direct], rcond=_RANK) if np.any(direct) else np.zeros((n, 0))
+    smooth = np.array([smooth_motion(signal, record.dt)[1] for signal in y[direct]]).reshape(-1, y.shape[1])
+    q, v = shown @ y[direct], shown @ smooth
+    by_reading[:n, np.array(columns)[direct]] = shown
+    hidden = null_space(position[direct], rcond=_RANK) if np.any(direct) else np.eye(n)
+    if hidden.shape[1] > 0:
+        through = of_rate & ~of_own & np.all(position == 0.0, axis=1)
+        speeds = rate[through] @ hidden
+        if np.linalg.matrix_rank(speeds) < hidden.shape[1]:
+            return None
+        back = hidden @ np.linalg.pinv(speeds)
+        slope = back @ (y[through] - rate[through] @ v)
+        moved = cumulative_trapezoid(slope, dx=record.dt, axis=1, initial=0)
+        q, v = q + moved - np.mean(moved, axis=1, keepdims=True), v + slope
+        by_integral[:n, np.array(columns)[through]] = back
+    x = np.zeros((n_own, y.shape[1]))
+    if n_own:
+        if np.linalg.matrix_rank(own[of_own]) < n_own:
+            return None
+        back = np.linalg.pinv(own[of_own])
+        x = back @ (y[of_own] - position[of_own] @ q - rate[of_own] @ v)
+        by_reading[n:, np.array(columns)[of_own]] = back
+    return MeasuredStates(np.concatenate([q, v, x]), by_reading, by_integral)
+
+
+def supposed_states(
+    equations: RigEquations, record: Record, p: Floats, factors: Mapping[str, Sequence[sp.Expr]]
+) -> MeasuredStates:
+    """Return states of about the size that they may have, for want of sensors that show them: what others of their unit do.
+
+    Parameters
+    ----------
+    equations, record, p, factors
+        As of `measured_states`.
+    """
+    mechanism, n = equations.rig.mechanism, equations.n_coordinates
+    numbers = dict(zip(equations.structure.parameter_symbols, map(float, p), strict=True))
+    units = [*(c.unit for c in mechanism.free), *(s.unit for s in mechanism.states)]
+    places = [*range(n), *range(2 * n, equations.n_states)]
+    own: dict[int, Floats] = {}
+    for name in equations.sensor_names:
+        if name not in factors or name not in record:
+            continue
+        row = np.array([float(f.xreplace(numbers)) for f in factors[name]])
+        signal = record[name] - np.mean(record[name])
+        for index, place in enumerate(places):
+            if row[place] != 0.0:
+                own.setdefault(index, signal / row[place])
+            elif index < n and row[n + index] != 0.0:
+                moved = cumulative_trapezoid(signal / row[n + index], dx=record.dt, initial=0)
+                own.setdefault(index, moved - np.mean(moved))
+    # Not quite the same as another: a joint between the two moves as well.
+    others = {units[index]: _HIDDEN * signal for index, signal in reversed(own.items())}
+    wave = np.sin(2.0 * np.pi * _WAVES * np.arange(record.n_samples) / record.n_samples)
+    signals = np.array([own.get(i, others.get(unit, wave)) for i, unit in enumerate(units)])
+    rates = np.gradient(signals[:n], record.dt, axis=1) if n else signals[:n]
+    nothing = np.zeros((len(units), len(equations.sensor_names)))
+    return MeasuredStates(np.concatenate([signals[:n], rates, signals[n:]]), nothing, nothing)
