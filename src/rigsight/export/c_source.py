@@ -9,7 +9,8 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
-from rigsight.simulate.kernel_source import ACCURATE, KernelEquations, template
+from rigsight.simulate.kernel_equations import KernelEquations, template
+from rigsight.simulate.kernel_source import ACCURATE
 from rigsight.simulate.printing.c import C
 from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL
@@ -226,9 +227,11 @@ def _parameter_names(exported: Exported) -> dict[sp.Symbol, str]:
 
 def _memory(exported: Exported, equations: KernelEquations) -> int:
     """Return how many numbers the integrator keeps between samples."""
-    states, modes = max(1, len(exported.states)), len(exported.frozen.modes)
-    inputs = len(exported.inputs)
-    return 5 * states + 3 * (modes + 2) + max(1, len(equations.constants)) + inputs + _SPARE
+    states, modes = max(1, len(exported.states)), max(1, len(exported.frozen.modes))
+    inputs, frictions = max(1, len(exported.inputs)), max(1, len(exported.frozen.frictions))
+    watched = len(exported.frozen.modes) + 2 * len(exported.frozen.frictions) + 1
+    constants = max(1, len(equations.constants))
+    return 5 * states + modes + 2 * watched + constants + inputs + 2 * frictions + _SPARE
 
 
 def _rest(exported: Exported, names: Mapping[sp.Symbol, str]) -> str:

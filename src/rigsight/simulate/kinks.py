@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
+from rigsight.errors import InputError
 from rigsight.simulate.structure import Structure
 
 _KINKS = (sp.Abs, sp.sign, positive_part)
+MOST_FRICTIONS = 8
+"""Joints with dry friction of which each sticks or slides either way: 3^8 ways are tried at an event, a millisecond's work."""
+_DIGITS = 40
+"""Of the numbers at which an expression is tried."""
+_ROUNDED = 1e-25
+"""What is smaller comes of rounding."""
 
 
 class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -24,6 +32,25 @@ class absolute(sp.Function):  # type: ignore[misc]  # noqa: N801
 
 
 @dataclass(frozen=True)
+class Friction:
+    """Dry friction at a joint.
+
+    Attributes
+    ----------
+    mode
+        Index of its sign among the modes.
+    velocity
+        Index of the state that it holds at zero while it sticks; None where the joint's velocity is made of several states.
+    alone
+        Whether no other velocity feels it, so that what holds it need not be known.
+    """
+
+    mode: int
+    velocity: int | None
+    alone: bool
+
+
+@dataclass(frozen=True)
 class FrozenStructure:
     """A structure with each kink's sign as a symbol.
 
@@ -35,15 +62,58 @@ class FrozenStructure:
         Symbols that take the values -1 and +1.
     switches
         Expression whose sign each mode is; it may hold modes of earlier switches.
-    friction_mode
-        Index of the mode whose flip makes the acceleration jump (dry friction: the velocity can stay at zero), or None.
+    frictions
+        The modes of dry friction: signs of a velocity whose flip makes its own acceleration jump, so that it can stay at zero.
+    replacements
+        What was written in the place of kinks, in the order in which it was.
     """
 
     rates: tuple[sp.Expr, ...]
     outputs: tuple[sp.Expr, ...]
     modes: tuple[sp.Symbol, ...]
     switches: tuple[sp.Expr, ...]
-    friction_mode: int | None
+    frictions: tuple[Friction, ...]
+    replacements: tuple[Mapping[sp.Expr, sp.Expr], ...] = ()
+
+    def in_modes(self, expression: sp.Expr) -> sp.Expr:
+        """Return a part of the structure's equations with the same kinks as modes."""
+        for replacement in self.replacements:
+            expression = expression.xreplace(replacement)
+        return expression
+
+    @staticmethod
+    def friction_sign(index: int) -> sp.Symbol:
+        """Return the symbol that stands for the sign of one of the frictions, or for its multiplier while it sticks."""
+        return sp.Symbol(f"friction_sign_{index}", real=True)
+
+    def friction_signs(self, structure: Structure) -> dict[sp.Expr, sp.Expr]:
+        """Return the signs of velocities that dry friction can hold as the equations hold them, and the symbols for them."""
+        found: dict[sp.Expr, sp.Expr] = {}
+        expressions = [*(e.rate for e in structure.equations), *structure.computed_outputs]
+        for atom in set().union(*(expression.atoms(sp.sign) for expression in expressions)):
+            argument = self.in_modes(atom.args[0])
+            for index, own in enumerate(self.frictions):
+                switch = self.switches[own.mode]
+                if argument in (switch, -switch):
+                    found[atom] = self.friction_sign(index) * (1 if argument == switch else -1)
+        return found
+
+    def speeds(self, structure: Structure) -> list[sp.Expr]:
+        """Return the velocities that dry friction can hold, with the kinks that they hold as they are."""
+        of_signs = {sign: atom.args[0] for atom, sign in self.friction_signs(structure).items()}
+        signs = [self.friction_sign(index) for index in range(len(self.frictions))]
+        return [of_signs[sign] if sign in of_signs else -of_signs[-sign] for sign in signs]
+
+    @property
+    def single_friction(self) -> Friction | None:
+        """The only dry friction, if there is one and it holds one velocity and moves no other."""
+        found = self.frictions[0] if len(self.frictions) == 1 else None
+        return found if found is not None and found.velocity is not None and found.alone else None
+
+    @property
+    def friction_mode(self) -> int | None:
+        """Index of the mode of the `single_friction`, or None."""
+        return None if self.single_friction is None else self.single_friction.mode
 
     @property
     def dependent_modes(self) -> tuple[int, ...]:
@@ -56,6 +126,7 @@ def freeze(structure: Structure) -> FrozenStructure:
     constant = set(structure.parameter_symbols)
     expressions = [*(state.limited_rate for state in structure.equations), *structure.computed_outputs]
     modes: dict[sp.Expr, sp.Symbol] = {}
+    replacements = []
     while True:
         kink = _innermost_kink(expressions, constant)
         if kink is None:
@@ -77,6 +148,7 @@ def freeze(structure: Structure) -> FrozenStructure:
             sp.sign(argument): signed,
             positive_part(argument): sp.Mul(argument, 1 + signed, sp.Rational(1, 2)),
         }
+        replacements.append(replacement)
         expressions = [expression.xreplace(replacement) for expression in expressions]
     n_states = len(structure.states)
     return FrozenStructure(
@@ -84,7 +156,8 @@ def freeze(structure: Structure) -> FrozenStructure:
         outputs=tuple(expressions[n_states:]),
         modes=tuple(modes.values()),
         switches=tuple(modes),
-        friction_mode=_friction_mode(structure, modes, expressions),
+        frictions=_frictions(structure, modes, expressions),
+        replacements=tuple(replacements),
     )
 
 
@@ -98,15 +171,37 @@ def _innermost_kink(expressions: list[sp.Expr], constant: set[sp.Symbol]) -> sp.
     return min(candidates, key=sp.default_sort_key) if candidates else None
 
 
-def _friction_mode(
+def _frictions(
     structure: Structure, modes: dict[sp.Expr, sp.Symbol], expressions: list[sp.Expr]
-) -> int | None:
-    if structure.velocity_index is None:
-        return None
-    velocity = structure.states[structure.velocity_index]
+) -> tuple[Friction, ...]:
+    """Return the modes that are signs of velocities at which the same velocities' accelerations jump."""
+    velocities = structure.tree.motion.velocities
+    rates = dict(zip(structure.states, expressions, strict=False))
+    found = []
     for index, (switch, mode) in enumerate(modes.items()):
-        if switch == velocity:
-            at_rest = expressions[structure.velocity_index].subs(velocity, 0)
-            if sp.simplify(sp.diff(at_rest, mode)) != 0:
-                return index
-    return None
+        moved = [v for v in velocities if v in switch.free_symbols]
+        if not moved or any(sp.diff(switch, a, b) != 0 for a in moved for b in moved):
+            continue
+        # At rest: one velocity is what the others make it.
+        standstill = {moved[0]: moved[0] - switch / sp.diff(switch, moved[0])}
+        jump = sum((sp.diff(switch, v) * sp.diff(rates[v], mode) for v in moved), start=sp.Integer(0))
+        if is_zero(jump.subs(standstill)):
+            continue
+        alone = not any(mode in rates[v].free_symbols for v in velocities if v != moved[0])
+        held = structure.states.index(moved[0]) if switch == moved[0] else None
+        found.append(Friction(index, held, alone))
+    if len(found) > MOST_FRICTIONS:
+        raise InputError(
+            f"{structure.rig.name} has dry friction at {len(found)} motions; at most {MOST_FRICTIONS} can stick and slip "
+            "together. Leave some out, or make them viscous."
+        )
+    return tuple(found)
+
+
+def is_zero(expression: sp.Expr) -> bool:
+    """Return True for an expression that vanishes at some place of no meaning; sympy would simplify for seconds."""
+    expression = expression.replace(absolute, sp.Abs)
+    symbols = sorted(expression.free_symbols, key=str)
+    place = {symbol: sp.sqrt(sp.prime(5 + i)) / (3 + i % 7) for i, symbol in enumerate(symbols)}
+    value = expression.evalf(_DIGITS, subs=place)
+    return bool(abs(value) < _ROUNDED) if value.is_number else False

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from rigsight.effects import Place
+from rigsight.simulate.equilibrium import equilibrium
 from rigsight.simulate.input_hold import HeldInput, hold_input
 from rigsight.simulate.kernel_cache import kernel_of
-from rigsight.simulate.structure import TIME, Structure, input_symbols
+from rigsight.simulate.structure import Structure
 
 RAMP_PERIODS = 20.0
 """Length of the slow rise of the input in periods of the linear rig."""
@@ -47,7 +47,13 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
     """
     state = np.zeros(max(1, len(structure.states)))
     if not structure.rig.has_one_motion:
-        return _equilibrium(structure, p, held)
+        inputs = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, :, 0]
+        given = {
+            structure.states.index(symbol): _value(structure, p, value)
+            for symbol, value in structure.rig.mechanism.initial.items()
+            if symbol in structure.states
+        }
+        return equilibrium(structure, p, inputs, given)
     motion = structure.rig.motion
     if motion.inertia is None:
         return state
@@ -64,37 +70,6 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
         if reached is None:
             return state
         state = reached
-    return state
-
-
-def _equilibrium(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
-    """Return the static equilibrium nearest to zero under the first input; what no equation holds stays at zero."""
-    tree, states = structure.tree, structure.states
-    velocities = set(tree.motion.velocities)
-    free = [i for i, symbol in enumerate(states) if symbol not in velocities]
-    balanced = [
-        equation.rate for equation in structure.equations if equation.symbol not in tree.motion.coordinates
-    ]
-    first = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, :, 0]
-    known = dict.fromkeys((*velocities, TIME), 0.0)
-    known |= dict(zip(structure.parameter_symbols, map(float, p), strict=True))
-    for index, value in enumerate(first):
-        symbols = input_symbols(index)
-        known |= dict(zip(symbols, (float(value), 0.0, 0.0), strict=True))
-    unknown = [states[i] for i in free]
-    functions = {"positive_part": lambda x: max(x, 0.0)}
-    residual = sp.lambdify([unknown], [rate.xreplace(known) for rate in balanced], [functions, "numpy"])
-    state = np.zeros(len(states))
-    for symbol, value in structure.rig.mechanism.initial.items():
-        if symbol in states:
-            state[states.index(symbol)] = _value(structure, p, value)
-
-    def unbalanced(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(residual(x), dtype=np.float64)
-
-    found = least_squares(unbalanced, state[free], x_scale="jac")
-    if found.success:
-        state[free] = found.x
     return state
 
 

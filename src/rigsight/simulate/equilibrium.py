@@ -1,0 +1,205 @@
+"""Where does a mechanism of any shape stand still? Where its forces balance, with those that friction and hysteresis hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rigsight.simulate.kinks import FrozenStructure, freeze, is_zero
+from rigsight.simulate.printing.c import limited
+from rigsight.simulate.structure import TIME, Structure, input_symbols
+
+Floats = NDArray[np.float64]
+
+BALANCED = 1e-8
+"""Share of the forces that are out of balance where the search begins that may be left where it ends."""
+PATH_STEPS = 32
+"""Steps in which the inputs rise where hysteresis remembers the way: its error is some 3 % of what it holds."""
+_PRECISE = 1e-15
+"""Change of cost, place and slope at which the search ends: as near as numbers go."""
+
+
+def equilibrium(
+    structure: Structure, p: Floats, inputs: Floats, given: Mapping[int, float] | None = None
+) -> Floats:
+    """Return the static equilibrium that slowly rising inputs reach from rest, where dry friction and hysteresis hold their part.
+
+    Without inputs the rig rests where its springs and weights are in balance, no friction beside; from there friction holds a
+    joint until it is overcome. What no force holds stays at zero, and so does all where there is no balance.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    p
+        Parameter values, shape (n_parameters,).
+    inputs
+        Inputs at the start, shape (n_inputs,).
+    given
+        States that are known, by index; the others are in balance with them. Velocities do not enter: all stands still.
+
+    Returns
+    -------
+    Shape (n_states,).
+
+    References
+    ----------
+    M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for the step with multipliers in the place of friction's signs.
+    """
+    balance = _balance_of(_Key(structure))
+    given = dict(given or {})
+    state = np.zeros(len(structure.states))
+    state[list(given)] = list(given.values())
+    n_steps = PATH_STEPS if balance.remembers else 1
+    state = _reached(balance, p, 0.0 * inputs, state, given, with_friction=False)
+    if np.any(inputs != 0.0):
+        for step in range(1, n_steps + 1):
+            state = _reached(balance, p, inputs * (step / n_steps), state, given, with_friction=True)
+    return state
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """What has to vanish at standstill, as functions of (parameters, inputs, states, states before, friction signs).
+
+    Attributes
+    ----------
+    rates
+        For each state that can be unknown: its balance, shape (n_unknown,).
+    turned
+        By how much the joints with dry friction turned since the states before, shape (n_frictions,).
+    unknown
+        Indices of these states: all but the velocities.
+    n_frictions
+        Number of joints with dry friction.
+    remembers
+        Whether there are states of hysteresis, which follow the way and not the forces.
+    """
+
+    rates: Callable[..., Any]
+    turned: Callable[..., Any]
+    unknown: tuple[int, ...]
+    n_frictions: int
+    remembers: bool
+
+
+def _reached(
+    balance: _Balance,
+    p: Floats,
+    inputs: Floats,
+    before: Floats,
+    given: Mapping[int, float],
+    *,
+    with_friction: bool,
+) -> Floats:
+    """Return the states in balance under the inputs that are nearest to those before, these where there are none."""
+    free = [i for i, index in enumerate(balance.unknown) if index not in given]
+    places = [balance.unknown[i] for i in free]
+    n = len(places)
+    signs = np.zeros(balance.n_frictions)
+    slides = np.zeros(balance.n_frictions)
+
+    def states_of(y: Floats) -> Floats:
+        state = before.copy()
+        state[places] = y[:n]
+        return state
+
+    def missing(y: Floats) -> Floats:
+        state = states_of(y)
+        rates = np.asarray(balance.rates(p, inputs, state, before, y[n:]), dtype=np.float64)[free]
+        turned = np.asarray(balance.turned(p, inputs, state, before, y[n:]), dtype=np.float64)
+        held = np.where(slides == 0.0, turned, y[n:] - slides) if with_friction else y[n:]
+        return np.concatenate([rates, held])
+
+    start = np.r_[before[places], signs]
+    if start.size == 0:
+        return before
+    # What sticks and what slides: a joint whose multiplier is beyond 1 slides, one that slid backwards sticks.
+    for _ in range(3 * balance.n_frictions + 1):
+        found = least_squares(missing, start, x_scale="jac", ftol=_PRECISE, xtol=_PRECISE, gtol=_PRECISE)
+        turned = np.asarray(
+            balance.turned(p, inputs, states_of(found.x), before, found.x[n:]), dtype=np.float64
+        )
+        loose = np.where(np.abs(found.x[n:]) > 1.0 + BALANCED, np.sign(found.x[n:]), 0.0)
+        wanted = np.where(slides == 0.0, loose, np.where(turned * slides >= 0.0, slides, 0.0))
+        if not with_friction or np.array_equal(wanted, slides):
+            break
+        slides = wanted
+    left, first = np.linalg.norm(missing(found.x)), np.linalg.norm(missing(start))
+    return states_of(found.x) if left <= BALANCED * first else before
+
+
+class _Key:
+    """Let structures, which cannot be hashed, be keys of a cache by identity."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+
+    def __hash__(self) -> int:
+        return id(self.structure)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and other.structure is self.structure
+
+
+@lru_cache(maxsize=256)
+def _balance_of(key: _Key) -> _Balance:
+    structure = key.structure
+    tree, states = structure.tree, structure.states
+    frozen = freeze(structure)
+    signs = frozen.friction_signs(structure)
+    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
+    at_rest: dict[sp.Expr, sp.Expr] = dict.fromkeys((*rising, TIME), sp.Integer(0))
+    still = {**at_rest, **dict.fromkeys(tree.motion.velocities, sp.Integer(0))}
+    before = [sp.Symbol(f"before_{i}", real=True) for i in range(len(states))]
+    moved = {**at_rest, **_moved(structure, before)}
+    of_first_order = structure.equations[2 * len(tree.motion.coordinates) :]
+    rates, remembers = [], False
+    for equation in structure.equations[len(tree.motion.coordinates) : 2 * len(tree.motion.coordinates)]:
+        rates.append(equation.rate.xreplace(signs).xreplace(still))
+    for index, equation in enumerate(of_first_order, 2 * len(tree.motion.coordinates)):
+        rate = equation.rate.xreplace(still)
+        if not is_zero(rate):
+            rates.append(rate)
+            continue
+        remembers = True
+        reached = before[index] + equation.rate.xreplace(moved)
+        rates.append(
+            equation.symbol - (reached if equation.limit is None else limited(reached, equation.limit))
+        )
+    turned = [speed.xreplace(moved) for speed in frozen.speeds(structure)]
+    arguments = _arguments(structure, before, len(frozen.frictions))
+    functions = [
+        {"positive_part": lambda x: max(x, 0.0), "limited": lambda x, end: min(max(x, -end), end)},
+        "numpy",
+    ]
+    n = len(tree.motion.coordinates)
+    return _Balance(
+        rates=sp.lambdify(arguments, rates, functions),
+        turned=sp.lambdify(arguments, turned, functions),
+        unknown=(*range(n), *range(2 * n, len(states))),
+        n_frictions=len(frozen.frictions),
+        remembers=remembers,
+    )
+
+
+def _moved(structure: Structure, before: Sequence[sp.Symbol]) -> dict[sp.Expr, sp.Expr]:
+    """Return what velocities are over a step of unit time."""
+    motion = structure.tree.motion
+    return {
+        velocity: coordinate - before[i]
+        for i, (coordinate, velocity) in enumerate(zip(motion.coordinates, motion.velocities, strict=True))
+    }
+
+
+def _arguments(structure: Structure, before: Sequence[sp.Symbol], n_frictions: int) -> list[list[sp.Symbol]]:
+    inputs = [input_symbols(i)[0] for i in range(len(structure.rig.inputs))]
+    signs = [FrozenStructure.friction_sign(i) for i in range(n_frictions)]
+    return [list(structure.parameter_symbols), inputs, list(structure.states), list(before), signs]

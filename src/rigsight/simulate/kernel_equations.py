@@ -1,0 +1,331 @@
+"""The equations of a structure as C functions of numbered states, modes and constants: for one set, and for sets side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from importlib.resources import files
+
+import sympy as sp
+
+from rigsight.simulate.expressions import gathered, hoist_constants
+from rigsight.simulate.kinks import FrozenStructure, freeze
+from rigsight.simulate.printing.c import C_LANES, C, limited
+from rigsight.simulate.structure import TIME, Structure, input_symbols
+
+# Each is written where it is called: some compilers warn of those that are not.
+_FUNCTIONS = {
+    "sign_of": "static inline double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }",
+    "positive": "static inline double positive(double value) { return value > 0.0 ? value : 0.0; }",
+    "within": (
+        "static inline double within(double value, double limit) "
+        "{ return value > limit ? limit : (value < -limit ? -limit : value); }"
+    ),
+}
+
+
+def template(name: str) -> str:
+    """Return the text of one of the fixed parts of a kernel."""
+    return files("rigsight.simulate").joinpath("templates", name).read_text("utf-8")
+
+
+def filled(text: str, fragments: Mapping[str, str]) -> str:
+    """Return a template with every ``<<KEY>>`` replaced."""
+    for key, fragment in fragments.items():
+        text = text.replace(f"<<{key}>>", fragment)
+    return text
+
+
+class KernelEquations:
+    """The equations of a structure as C functions of numbered states, modes and constants."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+        self.frozen: FrozenStructure = freeze(structure)
+        self._friction_signs = self.frozen.friction_signs(structure)
+        fixed, speeds = set(structure.parameter_symbols), self.frozen.speeds(structure)
+        groups: dict[str, Sequence[sp.Expr]] = {
+            "rates": [gathered(rate, fixed, set(self.frozen.modes)) for rate in self.frozen.rates],
+            "switches": self.frozen.switches,
+            "switch_slopes": [self._slope(switch) for switch in self.frozen.switches],
+            "outputs": [
+                output.xreplace(self._friction_signs if self.friction_is_shown else {})
+                for output in structure.computed_outputs
+            ],
+            "live_rates": [gathered(rate, fixed) for rate in self._live_rates()],
+            "speeds": speeds,
+            "speed_slopes": [self._slope(speed) for speed in speeds],
+            "limits": [e.limit for e in structure.equations if e.limit is not None],
+            "delay": [structure.delay if structure.delay is not None else sp.Integer(0)],
+        }
+        flat, hoisted = hoist_constants(
+            [expression for group in groups.values() for expression in group],
+            set(structure.parameter_symbols),
+        )
+        self.constants: dict[sp.Symbol, sp.Expr] = hoisted
+        remaining = iter(flat)
+        self._groups = {name: [next(remaining) for _ in group] for name, group in groups.items()}
+        limited_states = (i for i, equation in enumerate(structure.equations) if equation.limit is not None)
+        self.limits = dict(zip(limited_states, self._groups["limits"], strict=True))
+
+    def text(self, parameters: str, parameter_names: Sequence[str]) -> str:
+        """Return the part of a C file that holds the equations.
+
+        Parameters
+        ----------
+        parameters
+            How a function declares the parameters, ``const double *p``.
+        parameter_names
+            How each is written there, ``p[0]``.
+        """
+        structure, frictions = self.structure, self.frozen.frictions
+        single, dependent = self.frozen.single_friction, self.frozen.dependent_modes
+        n_states, n_modes = len(structure.states), len(self.frozen.modes)
+        names = self._names
+        prepare = dict(zip(structure.parameter_symbols, parameter_names, strict=True))
+        switches = [*elements("g", n_modes), *elements("d", n_modes)]
+        fragments = {
+            "N_STATES": n_states,
+            "SIZE_STATES": max(1, n_states),
+            "N_MODES": n_modes,
+            "SIZE_MODES": max(1, n_modes),
+            "N_INPUTS": len(structure.rig.inputs),
+            "SIZE_INPUTS": max(1, len(structure.rig.inputs)),
+            "SIZE_CONSTANTS": max(1, len(self.constants)),
+            "N_COMPUTED": len(structure.computed_outputs),
+            "N_DEGREES": len(structure.tree.motion.coordinates),
+            "N_FRICTIONS": len(frictions),
+            "SIZE_FRICTIONS": max(1, len(frictions)),
+            "FRICTION_MODES": ", ".join(str(own.mode) for own in frictions) or "0",
+            "FRICTION_VELOCITIES": ", ".join(
+                "-1" if own.velocity is None else str(own.velocity) for own in frictions
+            )
+            or "-1",
+            "FRICTION_IS_SHOWN": int(self.friction_is_shown),
+            "VELOCITY": (structure.velocity_index or 0) if single is None else single.velocity,
+            "HAS_DELAY": int(structure.delay is not None),
+            "HAS_LIMITS": int(bool(self.limits) and n_modes > 0),
+            "N_DEPENDENT": len(dependent),
+            "DEPENDENT_MODES": ", ".join(map(str, dependent)) or "0",
+            "PARAMETERS": parameters,
+            "PREPARE": function_body(
+                ("p", "q"), elements("q", len(self.constants)), list(self.constants.values()), prepare
+            ),
+            "DELAY": function_body(
+                ("q",), ["const double delay"], self._groups["delay"], names, "return delay;"
+            ),
+            "RATES": function_body(
+                ("now", "x", "s", "q", "r"), elements("r", n_states), self._groups["rates"], names
+            ),
+            "SWITCHES": function_body(
+                ("now", "x", "k", "s", "q", "g", "d"),
+                switches,
+                [*self._groups["switches"], *self._groups["switch_slopes"]],
+                names,
+            ),
+            "PUT_BACK": function_body(("x", "q"), *self._put_back("x", self.limits), names)
+            if self.limits and n_modes > 0
+            else "",
+            "OUTPUTS": function_body(
+                ("now", "x", "s", "q", "y"),
+                elements("y", len(structure.computed_outputs)),
+                self._groups["outputs"],
+                names,
+            ),
+        }
+        texts = {key: str(value) for key, value in fragments.items()}
+        bodies = "\n".join(texts.values())
+        called = [text for name, text in _FUNCTIONS.items() if f"{name}(" in bodies]
+        return filled(template("equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
+
+    def lane_fragments(self) -> dict[str, str]:
+        """Return the equations for parameter sets side by side, by their key in the template."""
+        structure, names, rates = self.structure, self.lane_names, self.lane_rates
+        followers = {i: self.limits[i] for i in self._followed}
+        gained = {
+            i: sp.Symbol(f"x[{i}]", real=True) + real(f"{after}") - real(f"{before}")
+            for i, (before, after) in self._followed.items()
+        }
+        kept = [limited(gained[i], limit) for i, limit in followers.items()]
+        others = {i: limit for i, limit in self.limits.items() if i not in followers}
+        frictions, several = self.frozen.frictions, self.has_several_frictions
+        speeds, slopes = self._groups["speeds"], self._groups["speed_slopes"]
+        curvatures = {input_symbols(i)[2] for i in range(len(structure.rig.inputs))}
+        read = set().union(*(e.free_symbols for e in (*rates, *self.outputs, *slopes)))
+        integrated = [i for i in range(len(structure.states)) if i not in self._followed]
+        return {
+            "SINGLE_FRICTION": str(0 if frictions and not several else -1),
+            "SEVERAL_FRICTIONS": str(len(frictions) if several else 0),
+            "HAS_CURVATURE": str(int(bool(curvatures & read))),
+            "LANE_SPEEDS": function_body(
+                ("now", "x", "q"), elements("g", len(speeds)), speeds, names, lanes=True
+            ),
+            "LANE_SPEED_SLOPES": function_body(
+                ("now", "x", "k", "q"), elements("d", len(slopes)), slopes, names, lanes=True
+            ),
+            "N_INTEGRATED": str(len(integrated)),
+            "INTEGRATED": ", ".join(map(str, integrated)) or "0",
+            "LANE_RATES": function_body(
+                ("now", "x", "q", "r"), elements("r", len(rates)), rates, names, lanes=True
+            ),
+            "LANE_OUTPUTS": function_body(
+                ("now", "x", "q", "y"),
+                elements("y", len(structure.computed_outputs)),
+                self.outputs,
+                names,
+                lanes=True,
+            ),
+            "LANE_FOLLOWERS": function_body(
+                (), [f"y[{i}]" for i in followers], kept, self._plus_own(names, kept), lanes=True
+            ),
+            "LANE_PUT_BACK": function_body((), *self._put_back("x", others), names, lanes=True),
+        }
+
+    @cached_property
+    def lane_names(self) -> dict[sp.Symbol, str]:
+        """How C calls each symbol where sets are side by side."""
+        signs = {
+            FrozenStructure.friction_sign(i): f"friction_sign[{i}]"
+            if self.has_several_frictions
+            else "friction_sign"
+            for i in range(len(self.frozen.frictions))
+        }
+        return {**self._names, **signs}
+
+    @property
+    def outputs(self) -> list[sp.Expr]:
+        """The outputs, of states, inputs and constants."""
+        return self._groups["outputs"]
+
+    @property
+    def delay(self) -> list[sp.Expr]:
+        """The delay of the input, a constant."""
+        return self._groups["delay"]
+
+    @cached_property
+    def lane_rates(self) -> list[sp.Expr]:
+        """The rates where sets are side by side."""
+        rates = self._groups["live_rates"]
+        return [sp.Integer(0) if i in self._followed else rate for i, rate in enumerate(rates)]
+
+    def _put_back(self, array: str, limits: Mapping[int, sp.Expr]) -> tuple[list[str], list[sp.Expr]]:
+        states = self.structure.states
+        return [f"{array}[{i}]" for i in limits], [limited(states[i], limit) for i, limit in limits.items()]
+
+    @cached_property
+    def _names(self) -> dict[sp.Symbol, str]:
+        numbered = {
+            "x": self.structure.states,
+            "k": self._rate_symbols,
+            "s": self.frozen.modes,
+            "q": tuple(self.constants),
+        }
+        inputs = {
+            symbol: f"now->{array}[{i}]"
+            for i in range(len(self.structure.rig.inputs))
+            for symbol, array in zip(input_symbols(i), ("u", "du", "ddu"), strict=True)
+        }
+        return {
+            **inputs,
+            TIME: "now->time",
+            **{
+                FrozenStructure.friction_sign(i): f"s[{own.mode}]"
+                for i, own in enumerate(self.frozen.frictions)
+            },
+            **{s: f"{array}[{i}]" for array, symbols in numbered.items() for i, s in enumerate(symbols)},
+        }
+
+    @staticmethod
+    def _plus_own(names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Expr]) -> dict[sp.Symbol, str]:
+        """Let symbols that are C already stand for themselves."""
+        own = {s for e in expressions for s in e.free_symbols if s not in names}
+        return {**names, **{s: s.name for s in own}}
+
+    @cached_property
+    def _rate_symbols(self) -> tuple[sp.Symbol, ...]:
+        return tuple(sp.Symbol(f"rate_{i}", real=True) for i in range(len(self.structure.states)))
+
+    def _slope(self, expression: sp.Expr) -> sp.Expr:
+        """Return the total derivative of an expression by time, between events."""
+        along = {
+            **dict(zip(self.structure.states, self._rate_symbols, strict=True)),
+            TIME: sp.Integer(1),
+        }
+        for i in range(len(self.structure.rig.inputs)):
+            value, rate, curvature = input_symbols(i)
+            along |= {value: rate, rate: curvature}
+        present = expression.free_symbols
+        return sum(
+            (sp.diff(expression, s) * rate for s, rate in along.items() if s in present), start=sp.Integer(0)
+        )
+
+    @property
+    def friction_is_shown(self) -> bool:
+        """Whether an output holds the sign of a velocity that dry friction can hold: then it shows what it holds with."""
+        signs = {self.frozen.modes[own.mode] for own in self.frozen.frictions}
+        return any(output.free_symbols & signs for output in self.frozen.outputs)
+
+    @property
+    def has_several_frictions(self) -> bool:
+        """Whether dry friction is more than one that holds one velocity, of which nothing else needs to know."""
+        frozen = self.frozen
+        return bool(frozen.frictions) and (frozen.single_friction is None or self.friction_is_shown)
+
+    def _live_rates(self) -> list[sp.Expr]:
+        """Return the rates with signs as they come, for steps that are not cut at events.
+
+        What cannot leave a range is seen at its end there: the state itself runs on within a substep and is put back at its end,
+        exact as long as its rate keeps its sign. The sign of a velocity that dry friction can hold is an argument.
+        """
+        structure = self.structure
+        held = {e.symbol: limited(e.symbol, e.limit) for e in structure.equations if e.limit is not None}
+        return [equation.rate.xreplace({**self._friction_signs, **held}) for equation in structure.equations]
+
+    @cached_property
+    def _followed(self) -> dict[int, tuple[str, str]]:
+        """States with a range whose rate is that of a motion: how C writes the motion before and after."""
+        motions: dict[sp.Expr, tuple[str, str]] = {
+            input_symbols(i)[1]: (f"from->u[{i}]", f"now->u[{i}]")
+            for i in range(len(self.structure.rig.inputs))
+        }
+        for i, equation in enumerate(self.structure.equations):
+            if equation.limit is None:
+                motions.setdefault(equation.rate, (f"x[{i}]", f"y[{i}]"))
+        return {
+            i: motions[equation.rate]
+            for i, equation in enumerate(self.structure.equations)
+            if equation.limit is not None and equation.rate in motions
+        }
+
+
+def real(name: str) -> sp.Symbol:
+    """Return a symbol that is C already."""
+    return sp.Symbol(name, real=True)
+
+
+def symbols(array: str, count: int) -> list[sp.Symbol]:
+    """Return the elements of an array of C as symbols."""
+    return [real(element) for element in elements(array, count)]
+
+
+def elements(array: str, count: int) -> list[str]:
+    """Return the elements of an array of C."""
+    return [f"{array}[{i}]" for i in range(count)]
+
+
+def function_body(
+    arguments: Sequence[str],
+    targets: Sequence[str],
+    expressions: Sequence[sp.Expr],
+    names: Mapping[sp.Symbol, str],
+    *further: str,
+    lanes: bool = False,
+) -> str:
+    """Return the body of a function; arguments that its equations happen not to read are marked for the compiler."""
+    for symbol in sorted(set().union(*(e.free_symbols for e in expressions)) - set(names), key=str):
+        raise KeyError(f"The symbol {symbol} has no number: no name of a rig or an effect may reach C.")
+    lines = (C_LANES if lanes else C).statements(targets, expressions, names) if targets else []
+    text = "\n".join([*lines, *further])
+    unread = [a for a in arguments if f"{a}[" not in text and f"{a}->" not in text]
+    marks = [" ".join(f"(void){argument};" for argument in unread)] if unread else []
+    return "\n".join(f"    {line}" for line in [*marks, *lines, *further])
