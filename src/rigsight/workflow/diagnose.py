@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign import Campaign, read_campaign
 from rigsight.workflow.effect_names import effects_on
 from rigsight.workflow.fit_journal import FitJournal
@@ -37,6 +38,7 @@ def run_diagnose(
     *,
     effects: Sequence[Effect] = CATALOGUE,
     own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
@@ -56,6 +58,8 @@ def run_diagnose(
         Candidates.
     own_effects
         Effects beside those of the catalogue that the simulation in question may have already.
+    own_rigs
+        Rigs that the campaign may name beside the built-in ones.
     seed
         Seed of the resampling behind probabilities.
     n_jobs
@@ -81,7 +85,9 @@ def run_diagnose(
             called = command or f"rigsight diagnose {shlex.quote(str(campaign))}"
             write_diagnosis(diagnosis, Path(out), called, seed, (*effects, *own_effects))
 
-    return diagnose_campaign(read_campaign(campaign, own_effects), effects, seed, jobs, listener, keep)
+    return diagnose_campaign(
+        read_campaign(campaign, own_effects, own_rigs), effects, seed, jobs, listener, keep
+    )
 
 
 def diagnose_campaign(

@@ -39,6 +39,8 @@ class Draft:
         Other measured files, and why they were not taken.
     n_blanks
         Values that are left to be filled in.
+    others
+        Rigs that it was chosen from, where it is a guess.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class Draft:
     records: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     n_blanks: int
+    others: tuple[str, ...] = ()
 
 
 def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterable[Path] = ()) -> Draft:
@@ -96,7 +99,9 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
     text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, source, others), proposals, left_out)
     write_together(folder, {CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
-    return Draft(path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks)
+    return Draft(
+        path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks, others
+    )
 
 
 def _proposals(files: Sequence[Path], rigs: Sequence[Rig]) -> tuple[list[Proposal], list[tuple[str, str]]]:

@@ -187,9 +187,10 @@ def _rig(path: Path, table: ModelTable, own_rigs: Iterable[Rig]) -> Rig:
 def _structure(path: Path, table: ModelTable, rig: Rig, own_effects: Iterable[Effect]) -> Structure:
     known = {**known_terms(), **{effect.name: effect for effect in own_effects}}
     for name in table.effects:
-        if kind_of(name) not in known:
+        kind = kind_of(name)
+        if kind not in known:
             raise InputError(
-                f"{path.name}: effects: '{kind_of(name)}' is unknown.{nearest(kind_of(name), known)} If it is an effect of your own, name the file "
+                f"{path.name}: effects: '{kind}' is unknown.{nearest(kind, known)} If it is an effect of your own, name the file "
                 f"that declares it: rigsight simulate MODEL RECORD --effects FILE. Known: {', '.join(known)}."
             )
     effects = [effect_on(rig, name, known, f"{path.name}: effects") for name in table.effects]
