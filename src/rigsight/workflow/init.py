@@ -12,9 +12,9 @@ from rigsight.errors import InputError, check_option
 from rigsight.records import Role
 from rigsight.records.channel_file import SUFFIXES
 from rigsight.records.csv_channels import open_measurement
-from rigsight.rigs import Rig
+from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.campaign_file import MOST_RECORDS
-from rigsight.workflow.own_rigs import known_rigs, own_rigs
+from rigsight.workflow.own_rigs import own_rigs
 from rigsight.workflow.record_proposal import BLANK, Proposal, propose, quoted
 from rigsight.workflow.results import write_together
 
@@ -75,7 +75,8 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     if path.exists() or path.is_symlink():
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
     own = own_rigs(rig_files)
-    known = known_rigs(own.values())
+    # A user's own come first: they win where a built-in one fits as well.
+    known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
     rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
     files = sorted(
         file
