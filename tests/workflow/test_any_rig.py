@@ -105,7 +105,9 @@ def test_two_parameters_of_one_name_are_told_apart_by_their_places() -> None:
 
 def test_the_only_place_need_not_be_named() -> None:
     values = {"J": 0.02, "k_v": 3.0, "d": 0.2, "c_2": 0.1}
-    assert make_model("servo", values, ["quadratic_damping"]).structure.effect_names == ("quadratic_damping",)
+    assert make_model("servo", values, ["quadratic_damping"]).structure.effect_names == (
+        "quadratic_damping@gearbox",
+    )
     axis = make_model("axis", {"m": 2.0, "d": 5.0, "k": 8.0, "k_3": 1.0}, ["cubic_stiffness@dynamics"])
     assert axis.structure.effect_names == ("cubic_stiffness",)
 
