@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rigsight.api.identification_result import IdentificationResult as IdentificationResult
     from rigsight.api.linear_identifier import LinearIdentifier as LinearIdentifier
     from rigsight.api.reading import read_record as read_record
+    from rigsight.api.rig import Rig as Rig
     from rigsight.effects import CATALOGUE as CATALOGUE
     from rigsight.effects import Effect as Effect
     from rigsight.errors import InputError as InputError
@@ -49,6 +50,7 @@ _HOMES = {
     "LinearIdentifier": "rigsight.api.linear_identifier",
     "Model": "rigsight.simulate.model",
     "Record": "rigsight.records",
+    "Rig": "rigsight.api.rig",
     "RigsightError": "rigsight.errors",
     "SimulationError": "rigsight.errors",
     "compare_models": "rigsight.api.comparing",
@@ -78,6 +80,7 @@ __all__ = [
     "LinearIdentifier",
     "Model",
     "Record",
+    "Rig",
     "RigsightError",
     "SimulationError",
     "compare_models",

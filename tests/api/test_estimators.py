@@ -24,7 +24,7 @@ from rigsight.workflow.identify import run_identify
 ESTIMATORS = (rs.Diagnoser, rs.EquationDiscoverer, rs.LinearIdentifier)
 OTHER: dict[str, Any] = {
     "effects": ["end_stop"], "seed": 7, "n_jobs": 3, "verbose": True, "method": "full", "pointwise": True,
-    "one_by_one": True, "resolution": 0.5,
+    "one_by_one": True, "resolution": 0.5, "rig": "axis",
 }  # fmt: skip
 
 
@@ -72,6 +72,7 @@ def test_fit_returns_the_estimator_and_leaves_the_settings(campaign: rs.Campaign
         "method": "local_rational",
         "n_jobs": 1,
         "resolution": None,
+        "rig": None,
         "verbose": False,
     }
 

@@ -1,11 +1,19 @@
-"""``rigsight rigs`` lists what comes with rigsight, and prints files that can be copied and changed."""
+"""``rigsight rigs`` lists what comes with rigsight, prints files to copy and change, and checks a user's own."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
-from rigsight.rigs import RIGS
+import pytest
+
+from rigsight.rigs import RIGS, rig_file_text
 from rigsight.rigs.rig_file import rig_of_text
+from rigsight.workflow.in_memory import make_model
+from rigsight.workflow.not_yet import ONE_MOTION_ONLY
+from rigsight.workflow.results import json_text
+
+from ..workflow.any_rig import TRAIN, write_train_campaign
 
 
 def test_rigs_are_listed(run) -> None:
@@ -27,3 +35,42 @@ def test_a_rig_that_there_is_not_is_one_message(run) -> None:
     code, stdout, stderr = run("rigs", "axes")
     assert (code, stdout) == (2, "")
     assert "Did you mean 'axis'?" in stderr
+
+
+def test_a_rig_of_ones_own_is_checked_and_listed(run, tmp_path: Path) -> None:
+    file = tmp_path / "hoist.toml"
+    file.write_text(
+        rig_file_text("cart_pendulum").replace('name = "cart_pendulum"', 'name = "hoist"'), "utf-8"
+    )
+    code, stdout, _ = run("rigs", "--rigs", file)
+    assert code == 0
+    assert "Your own, checked: hoist" in stdout
+    assert run("rigs", "hoist", "--rigs", file)[1] == file.read_text("utf-8")
+    listed = json.loads(run("rigs", "--rigs", file, "--json")[1])["rigs"]
+    assert {
+        "name": "hoist",
+        "summary": listed[1]["summary"],
+        "inputs": ["u"],
+        "outputs": ["cart", "angle"],
+    } in listed
+
+
+@pytest.mark.parametrize("command", sorted(ONE_MOTION_ONLY))
+def test_a_command_that_cannot_take_every_rig_yet_says_so(
+    command: str, run, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_train_campaign(tmp_path)
+    model = tmp_path / "model.json"
+    model.write_text(json_text(make_model("drive_train", TRAIN).to_json()), encoding="utf-8")
+    before = set(tmp_path.iterdir())
+    asked = {
+        "compare": [tmp_path, model],
+        "export": [model, "--to", "c"],
+        "vary": [model, "--parameter", "k_s"],
+    }.get(command, [tmp_path])
+    code, stdout, stderr = run(command, *asked)
+    assert (code, stdout) == (2, "")
+    assert f"'rigsight {command}' cannot take the rig" in stderr
+    assert stderr.count("\n") == 1
+    assert set(tmp_path.iterdir()) == before

@@ -31,6 +31,7 @@ def test_units_in_names(name: str, bare: str, unit: str | None) -> None:
     [
         ("u", "u"), ("Motor current [A]", "u"), ("MotorCurrent", "u"), ("Strom", "u"), ("log/u", "u"), ("Time_s", "t"),
         ("Zeit [ms]", "t"), ("Weg mm", "x"), ("Signal/Weg mm", "x"), ("Kraft [kN]", "force"), ("yaw angle", "psi"),
+        ("Motor Angle [deg]", "motor_angle"), ("angle of the motor", "motor_angle"), ("log/pos_m", "pos_m"), ("Angle 1", "angle_1"),
     ],
 )  # fmt: skip
 def test_names_of_signals(name: str, signal: str) -> None:
@@ -42,3 +43,8 @@ def test_names_of_signals(name: str, signal: str) -> None:
 )
 def test_names_that_only_look_alike(name: str, signal: str) -> None:
     assert closeness(name, signal) == 0.0
+
+
+@pytest.mark.parametrize(("name", "signal"), [("motor", "motor_angle"), ("angle_2", "angle_1"), ("x", "_")])
+def test_a_word_that_is_shared_is_a_hint_and_no_more(name: str, signal: str) -> None:
+    assert closeness(name, signal) < 1.0

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
+from rigsight.rigs import rig_file_text
 from rigsight.workflow.campaign import read_campaign
 from rigsight.workflow.init import run_init
+from rigsight.workflow.own_rigs import own_rigs
 
 from ..records.formats import write_mdf, write_parquet, write_text
 
@@ -62,9 +64,18 @@ def test_the_kind_of_rig_is_guessed_from_the_channels(tmp_path: Path) -> None:
         "element": ("t", "Hub [mm]", "Kraft [kN]"),
         "running_gear": ("time", "motor current", "psi"),
         "axis": ("t", "u", "position"),
+        "servo": ("time", "goal", "angle"),
+        "drive_train": ("t", "u", "motor_angle", "load_angle"),
+        "cart_pendulum": ("t", "u", "cart", "angle"),
+        "two_link_arm": ("t", "tau_1", "tau_2", "angle_1", "angle_2"),
+        "quarter_car": ("t", "road", "travel", "body"),
     }.items():
         (tmp_path / folder).mkdir()
-        write_text(tmp_path / folder / "a.csv", dict(zip(columns, (T, SWEEP, ANSWER), strict=True)), {})
+        write_text(
+            tmp_path / folder / "a.csv",
+            dict(zip(columns, (T, SWEEP, ANSWER, 2.0 * ANSWER, 3.0 * ANSWER), strict=False)),
+            {},
+        )
         assert run_init(tmp_path / folder).model == folder
 
 
@@ -182,3 +193,55 @@ def test_odd_file_and_channel_names_are_written_as_they_are(tmp_path: Path, name
     run_init(tmp_path)
     (record,) = read_campaign(tmp_path).records
     np.testing.assert_allclose(record["x"], ANSWER, rtol=1e-12)
+
+
+def own_train(folder: Path) -> Path:
+    path = folder / "train.toml"
+    path.write_text(rig_file_text("drive_train").replace('name = "drive_train"', 'name = "train"'), "utf-8")
+    return path
+
+
+def test_columns_are_matched_to_the_signals_of_the_rig_that_is_named(tmp_path: Path) -> None:
+    odd = {
+        "Zeit [ms]": 1e3 * T,
+        "Strom [mA]": 1e3 * SWEEP,
+        "Angle of load [deg]": np.rad2deg(ANSWER),
+        "Motor": ANSWER,
+    }
+    write_text(tmp_path / "a.csv", odd, {})
+    draft = run_init(tmp_path, model="drive_train")
+    assert draft.n_blanks == 1
+    text = draft.path.read_text(encoding="utf-8")
+    assert 'motor_angle = "FILL IN"  # [rad], may be: "Motor"' in text
+    draft.path.write_text(text.replace('"FILL IN"', '"Motor"'), encoding="utf-8")
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["u"], SWEEP, rtol=1e-12)
+    np.testing.assert_allclose(record["load_angle"], ANSWER, rtol=1e-12)
+
+
+def test_a_sensor_that_was_not_recorded_stays_a_comment(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "load_angle": ANSWER, "Temp": 2.0 * ANSWER}, {})
+    draft = run_init(tmp_path, model="drive_train")
+    assert draft.n_blanks == 0
+    assert '# motor_angle =    # [rad], one of: "Temp"; or not recorded here' in draft.path.read_text("utf-8")
+    assert list(read_campaign(tmp_path).records[0].signals) == ["u", "load_angle"]
+
+
+def test_a_rig_of_ones_own_is_named_by_its_file(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "motor_angle": ANSWER, "load_angle": ANSWER}, {})
+    draft = run_init(tmp_path, rig_files=[own_train(tmp_path)])
+    assert draft.model == "train"
+    assert 'file = "train.toml"' in draft.path.read_text(encoding="utf-8")
+    assert read_campaign(tmp_path).rig.name == "train"
+
+
+def test_a_rig_file_elsewhere_is_named_with_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "records").mkdir()
+    write_text(tmp_path / "records" / "a.csv", {"t": T, "u": SWEEP, "motor_angle": ANSWER}, {})
+    file = own_train(tmp_path)
+    run_init(tmp_path / "records", model="train", rig_files=[file])
+    with pytest.raises(InputError, match=r"rig\.model: is 'train'"):
+        read_campaign(tmp_path / "records")
+    assert read_campaign(tmp_path / "records", own_rigs=own_rigs([file]).values()).rig.name == "train"
+    text = (tmp_path / "records" / "campaign.toml").read_text(encoding="utf-8")
+    assert "name it with --rigs, or copy it here" in text

@@ -9,6 +9,8 @@ from typing import Self
 from rigsight.api.diagnosis_result import DiagnosisResult
 from rigsight.api.estimator import CampaignEstimator, campaign_of
 from rigsight.effects import CATALOGUE, Effect
+from rigsight.records import Record
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign import Campaign
 from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.in_memory import effects_of
@@ -33,6 +35,8 @@ class Diagnoser(CampaignEstimator):
         Candidates fitted at the same time; None for one per processor.
     verbose
         Show progress on stderr.
+    rig
+        Rig of the records where `fit` is given records alone: a built-in one by its name, or one of your own.
 
     Attributes
     ----------
@@ -69,19 +73,21 @@ class Diagnoser(CampaignEstimator):
         seed: int = 0,
         n_jobs: int | None = None,
         verbose: bool = False,
+        rig: str | Rig | None = None,
     ) -> None:
         self.effects = effects
         self.seed = seed
         self.n_jobs = n_jobs
         self.verbose = verbose
+        self.rig = rig
 
-    def fit(self, campaign: Campaign | str | Path) -> Self:
+    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
         """Diagnose the gap between the simulation that a campaign gives and its records.
 
         Parameters
         ----------
         campaign
-            A campaign, or the toml file or the folder that holds one.
+            A campaign, the toml file or the folder that holds one, or records of `rig`.
 
         Returns
         -------
@@ -97,7 +103,7 @@ class Diagnoser(CampaignEstimator):
         effects = CATALOGUE if self.effects is None else effects_of(self.effects)
         own = [effect for effect in effects if effect not in CATALOGUE]
         jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign, own)
+        read = campaign_of(campaign, own, rig=self.rig)
         known = (*own, *read.modelled)
         with listening(quiet=not self.verbose) as listener:
             found = diagnose_campaign(read, effects, self.seed, jobs, listener)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
 from rigsight.api.discovery_result import DiscoveryResult
 from rigsight.api.estimator import CampaignEstimator, campaign_of
+from rigsight.records import Record
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign import Campaign
 from rigsight.workflow.discover import discover_campaign
 from rigsight.workflow.kernels import checked_jobs
@@ -33,6 +36,8 @@ class EquationDiscoverer(CampaignEstimator):
         Records discovered on at the same time; None for one per processor.
     verbose
         Show progress on stderr.
+    rig
+        Rig of the records where `fit` is given records alone: a built-in one by its name, or one of your own.
 
     Attributes
     ----------
@@ -65,6 +70,7 @@ class EquationDiscoverer(CampaignEstimator):
         seed: int = 0,
         n_jobs: int | None = None,
         verbose: bool = False,
+        rig: str | Rig | None = None,
     ) -> None:
         self.method = method
         self.pointwise = pointwise
@@ -72,14 +78,15 @@ class EquationDiscoverer(CampaignEstimator):
         self.seed = seed
         self.n_jobs = n_jobs
         self.verbose = verbose
+        self.rig = rig
 
-    def fit(self, campaign: Campaign | str | Path) -> Self:
+    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
         """Discover the equations behind the records of a campaign.
 
         Parameters
         ----------
         campaign
-            A campaign, or the toml file or the folder that holds one.
+            A campaign, the toml file or the folder that holds one, or records of `rig`.
 
         Returns
         -------
@@ -93,7 +100,7 @@ class EquationDiscoverer(CampaignEstimator):
             If the rig's own equations cannot be simulated near the records.
         """
         jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign)
+        read = campaign_of(campaign, rig=self.rig)
         with listening(quiet=not self.verbose) as listener:
             found = discover_campaign(
                 read,

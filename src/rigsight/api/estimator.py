@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from sklearn.utils.validation import check_is_fitted
 
 from rigsight.effects import Effect
+from rigsight.errors import InputError
 from rigsight.records import Record
+from rigsight.rigs import RIGS, Rig
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.in_memory import make_campaign, rig_of
 from rigsight.workflow.simulate import simulate_model
 
 if TYPE_CHECKING:
@@ -43,12 +46,13 @@ class CampaignEstimator(BaseEstimator):
     def predict(
         self, record: Record, initial_state: Mapping[str, float] | Literal["estimated"] | None = None
     ) -> Record:
-        """Simulate the fitted model for the input of a record.
+        """Simulate the fitted model for the inputs of a record.
 
         Parameters
         ----------
         record
-            Its input is simulated with its hold; its outputs are read only where initial states are estimated.
+            Its inputs are simulated, with its hold and its own constants; its outputs are read only where initial states are
+            estimated.
         initial_state
             As in `rigsight.simulate_model`: by default the static equilibrium at the first input sample.
 
@@ -94,19 +98,40 @@ class CampaignEstimator(BaseEstimator):
         return super().set_params(**params)
 
 
-def campaign_of(campaign: Campaign | str | Path, own_effects: Iterable[Effect] = ()) -> Campaign:
-    """Return a campaign, read where its file or folder is named.
+def campaign_of(
+    campaign: Campaign | Sequence[Record] | str | Path,
+    own_effects: Iterable[Effect] = (),
+    rig: str | Rig | None = None,
+) -> Campaign:
+    """Return a campaign, read where its file or folder is named, or made of records.
 
     Parameters
     ----------
     campaign
-        A campaign, or the toml file or the folder that holds one.
+        A campaign, the toml file or the folder that holds one, or records of `rig`.
     own_effects
         Effects that it may name beside those of the catalogue.
+    rig
+        Rig of the records, or one that the file may name.
 
     Raises
     ------
     InputError
-        Naming file and key of what cannot be used.
+        Naming file and key of what cannot be used; or if records come without a rig, or a campaign is about another one.
     """
-    return campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects)
+    found = None if rig is None else rig_of(rig)
+    if isinstance(campaign, Sequence) and not isinstance(campaign, str):
+        if found is None:
+            raise InputError(
+                "Records alone do not say which rig they are of: name it, as in rs.Diagnoser(rig=...), or make a campaign of "
+                "them with rs.make_campaign(rig, records)."
+            )
+        return make_campaign(found, campaign)
+    own_rigs = () if found is None or found.name in RIGS else (found,)
+    read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
+    if found is not None and read.rig.mechanism != found.mechanism:
+        raise InputError(
+            f"The campaign '{read.title}' is about the rig '{read.rig.name}', the estimator about '{found.name}'. Leave rig out, "
+            "or give records of that rig."
+        )
+    return read

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
 from rigsight.api.estimator import CampaignEstimator, campaign_of
 from rigsight.api.identification_result import IdentificationResult
+from rigsight.records import Record
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign import Campaign
 from rigsight.workflow.identify import checked_wishes, identify_campaign
 from rigsight.workflow.kernels import checked_jobs
@@ -30,6 +33,8 @@ class LinearIdentifier(CampaignEstimator):
         Records identified at the same time; None for one per processor.
     verbose
         Show progress on stderr.
+    rig
+        Rig of the records where `fit` is given records alone: a built-in one by its name, or one of your own.
 
     Attributes
     ----------
@@ -59,19 +64,21 @@ class LinearIdentifier(CampaignEstimator):
         resolution: float | None = None,
         n_jobs: int | None = None,
         verbose: bool = False,
+        rig: str | Rig | None = None,
     ) -> None:
         self.method = method
         self.resolution = resolution
         self.n_jobs = n_jobs
         self.verbose = verbose
+        self.rig = rig
 
-    def fit(self, campaign: Campaign | str | Path) -> Self:
+    def fit(self, campaign: Campaign | Sequence[Record] | str | Path) -> Self:
         """Identify the estimation records of a campaign; its validation records are only scored.
 
         Parameters
         ----------
         campaign
-            A campaign, or the toml file or the folder that holds one.
+            A campaign, the toml file or the folder that holds one, or records of `rig`.
 
         Returns
         -------
@@ -85,7 +92,7 @@ class LinearIdentifier(CampaignEstimator):
         """
         wishes = checked_wishes(self.method, self.resolution)
         jobs = checked_jobs(self.n_jobs)
-        read = campaign_of(campaign)
+        read = campaign_of(campaign, rig=self.rig)
         with listening(quiet=not self.verbose) as listener:
             found = identify_campaign(read, wishes, jobs, listener)
         self.identification_ = IdentificationResult.of(found)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from rigsight.errors import check_option
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
-from rigsight.rigs import RIGS
+from rigsight.rigs import Rig
+from rigsight.workflow.given_simulation import checked_numbers
+from rigsight.workflow.in_memory import rig_of
 
 
 def read_record(
     path: str | Path,
-    rig: str,
+    rig: str | Rig,
     *,
     columns: Mapping[str, ColumnMapping] | None = None,
     require_outputs: bool = True,
@@ -24,6 +25,7 @@ def read_record(
     hold: Hold = "foh",
     dt: float | None = None,
     resample: float | None = None,
+    constants: Mapping[str, float] | None = None,
 ) -> Record:
     r"""Read, check and repair one record.
 
@@ -32,7 +34,8 @@ def read_record(
     path
         Delimited text, or a measurement file of a format that ``rigsight inspect`` reads.
     rig
-        Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x) or ``"element"`` (t, x, force).
+        Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x), ``"element"`` (t, x, force), the name
+        of another built-in rig, or a rig of your own.
     columns
         Where signals and time ``t`` stand, and how they become SI units; by default in columns of their own names.
     require_outputs
@@ -51,6 +54,8 @@ def read_record(
         Sample time [s] of a file without time.
     resample
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
+    constants
+        Constants of the rig that have another value in this record: a known payload.
 
     Returns
     -------
@@ -79,13 +84,16 @@ def read_record(
     >>> record.name, record.n_samples, round(record.dt, 6), float(record["x"][0])
     ('push', 50, 0.01, 0.003)
     """
-    found = RIGS[check_option("The rig", rig, RIGS)]
+    found = rig_of(rig)
     return read_file(
         Path(path),
         found.inputs,
         found.outputs,
         columns=columns,
         require_outputs=require_outputs,
+        required_outputs=found.required_outputs,
+        absent_inputs=found.absent_inputs,
+        still_inputs=not found.has_one_motion,
         name=name,
         role=role,
         kind=kind,
@@ -93,4 +101,5 @@ def read_record(
         hold=hold,
         dt=dt,
         resample=resample,
+        constants=checked_numbers(Path(path).name, "constants", found, found.constants, constants or {}),
     )

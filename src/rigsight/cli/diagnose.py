@@ -14,6 +14,7 @@ from rigsight.cli.options import (
     Jobs,
     Json,
     OwnEffects,
+    OwnRigs,
     Quiet,
     ResultsFolder,
     Seed,
@@ -36,6 +37,7 @@ def diagnose(
         ),
     ] = None,
     effects: OwnEffects = None,
+    rigs: OwnRigs = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     json: Json = False,
@@ -49,6 +51,7 @@ def diagnose(
     with told(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
         from rigsight.workflow.own_effects import named, own_effects
+        from rigsight.workflow.own_rigs import own_rigs
 
         own = own_effects(effects or [], listener=listener)
         diagnosis = run_diagnose(
@@ -56,6 +59,7 @@ def diagnose(
             out,
             effects=named(effect or [], own),
             own_effects=own,
+            own_rigs=own_rigs(rigs or []).values(),
             seed=seed,
             n_jobs=jobs,
             listener=listener,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
+from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def export(
         bool, typer.Option("--source-only", help="An FMU without a binary: the importing tool compiles it.")
     ] = False,
     effects: OwnEffects = None,
+    rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -70,6 +71,7 @@ def export(
     with told(debug):
         from rigsight.workflow.export import run_export
         from rigsight.workflow.own_effects import own_effects
+        from rigsight.workflow.own_rigs import own_rigs
 
         file = run_export(
             model,
@@ -79,6 +81,7 @@ def export(
             step=step,
             source_only=source_only,
             own_effects=own_effects(effects or [], check=False),
+            own_rigs=own_rigs(rigs or []).values(),
         )
     if json:
         show_as_json({"target": to, "file": str(file)})

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, Quiet
+from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 
 
@@ -22,9 +22,10 @@ def init(
             "--model",
             metavar="RIG",
             show_default="the one that the channels fit best",
-            help="running_gear, axis or element.",
+            help="A rig that rigsight rigs lists, or one of --rigs.",
         ),
     ] = None,
+    rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -34,10 +35,9 @@ def init(
     Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten.
     """
     with told(debug):
-        from rigsight.rigs import RIGS
         from rigsight.workflow.init import run_init
 
-        draft = run_init(folder, model=model)
+        draft = run_init(folder, model=model, rig_files=rigs or [])
     if json:
         show_as_json(
             {
@@ -54,9 +54,8 @@ def init(
     count = len(draft.records)
     typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
     if model is None:
-        others = ", ".join(name for name in RIGS if name != draft.model)
         typer.echo(
-            f"The rig is a guess from the channels; remove the file and say --model for another ({others})."
+            f"The rig is a guess from the channels; remove the file and say --model for another ({', '.join(draft.others)})."
         )
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")

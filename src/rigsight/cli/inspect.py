@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, Quiet
+from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show, show_as_json
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ def inspect(
             metavar="FILE", help="A measured file: CSV, MATLAB, HDF5, MDF4, TDMS, Parquet or UFF."
         ),
     ],
+    rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -31,8 +32,9 @@ def inspect(
     """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
     with told(debug):
         from rigsight.workflow.inspect import run_inspect
+        from rigsight.workflow.own_rigs import own_rigs
 
-        found = run_inspect(file)
+        found = run_inspect(file, own_rigs(rigs or []).values())
     if json:
         show_as_json(found.to_json())
     elif not quiet:

@@ -28,6 +28,15 @@ OwnEffects = Annotated[
         help="A Python file that declares effects of your own; it is run. May be repeated.",
     ),
 ]
+OwnRigs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--rigs",
+        metavar="FILE",
+        show_default="none",
+        help="A file that declares a rig of your own, which is then known by its name. May be repeated.",
+    ),
+]
 Seed = Annotated[
     int,
     typer.Option("--seed", min=0, max=2**63 - 1, help="Seed of everything random."),

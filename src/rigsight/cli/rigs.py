@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json
+from rigsight.cli.options import Debug, Json, OwnRigs
 from rigsight.cli.terminal import show_as_json
 
 
@@ -15,23 +15,44 @@ def list_rigs(
     name: Annotated[
         str | None, typer.Argument(help="Print this rig's file, to copy and change.", show_default="list all")
     ] = None,
+    rigs: OwnRigs = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """List the rigs that come with rigsight, or print the file of one."""
+    """List the rigs that come with rigsight and check files of your own, or print the file of one.
+
+    Exit code 2 and the place in the file if one of --rigs cannot be used.
+    """
     with told(debug):
         from rigsight.errors import check_option
-        from rigsight.rigs import RIGS, rig_file_text
+        from rigsight.rigs import rig_file_text
+        from rigsight.workflow.own_rigs import known_rigs, own_rigs
 
+        files = own_rigs(rigs or [])
+        known = known_rigs(files.values())
         if name is not None:
-            text = rig_file_text(check_option("Rig", name, RIGS))
+            own = {rig.name: file for file, rig in files.items()}
+            check_option("Rig", name, known)
+            text = own[name].read_text("utf-8") if name in own else rig_file_text(name)
             if json:
                 show_as_json({"name": name, "file": text})
             else:
                 typer.echo(text, nl=False)
             return
         if json:
-            show_as_json({"rigs": [{"name": rig.name, "summary": rig.summary} for rig in RIGS.values()]})
+            listed = [
+                {
+                    "name": rig.name,
+                    "summary": rig.summary,
+                    "inputs": [signal.name for signal in rig.inputs],
+                    "outputs": [signal.name for signal in rig.outputs],
+                }
+                for rig in known.values()
+            ]
+            show_as_json({"rigs": listed})
             return
-        for rig in RIGS.values():
-            typer.echo(f"{rig.name:16}{rig.summary}")
+        width = max(map(len, known)) + 2
+        for rig in known.values():
+            typer.echo(f"{rig.name:{width}}{rig.summary}")
+        if files:
+            typer.echo(f"\nYour own, checked: {', '.join(rig.name for rig in files.values())}")

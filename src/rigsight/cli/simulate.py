@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
+from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
@@ -25,7 +25,7 @@ def simulate(
     record: Annotated[
         Path,
         typer.Argument(
-            metavar="RECORD", help="A measured file with time and input; other columns are ignored."
+            metavar="RECORD", help="A measured file with time and inputs; other columns are ignored."
         ),
     ],
     out: Annotated[
@@ -63,18 +63,29 @@ def simulate(
             help="States that start elsewhere (psi=0.01,w=0), or 'estimated' from the outputs in the record.",
         ),
     ] = None,
+    constant: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--constant",
+            metavar="NAME=VALUE",
+            show_default="the model's",
+            help="A constant of the rig that is another one in this record: m_load=1.2. May be repeated.",
+        ),
+    ] = None,
     effects: OwnEffects = None,
+    rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Predict the outputs of a model for the input of a record.
+    """Predict the outputs of a model for the inputs of a record.
 
-    Writes a CSV with time, input and simulated outputs in SI units (t,u,psi,y; axis: t,u,x; element: t,x,force).
+    Writes a CSV with time, inputs and simulated sensors in SI units (running_gear: t,u,psi,y; axis: t,u,x; element: t,x,force).
     """
     file = out or Path(f"{record.stem}_simulated.csv")
     with told(debug), listening(quiet):
         from rigsight.workflow.own_effects import own_effects
+        from rigsight.workflow.own_rigs import own_rigs
         from rigsight.workflow.simulate import run_simulate
 
         simulated = run_simulate(
@@ -83,7 +94,9 @@ def simulate(
             file,
             columns=_columns(column or [], unit or []),
             initial_state=_states(initial_state),
+            constants=_constants(constant or []),
             own_effects=own_effects(effects or [], check=False),
+            own_rigs=own_rigs(rigs or []).values(),
         )
     if json:
         content = {"file": str(file), "n_samples": simulated.n_samples, "notes": list(simulated.notes)}
@@ -105,6 +118,17 @@ def _columns(columns: list[str], units: list[str]) -> dict[str, ColumnMapping]:
         place = int(name) if name.isascii() and name.isdigit() else name
         mapped[signal] = ColumnMapping(place, unit=unit_of.get(signal))
     return mapped
+
+
+def _constants(given: list[str]) -> dict[str, float]:
+    constants = {}
+    for text in given:
+        name, value = _pair("--constant", text, "NAME=VALUE, for instance m_load=1.2")
+        try:
+            constants[name] = float(value)
+        except ValueError:
+            raise InputError(f"--constant '{text}' cannot be read; '{value}' is no number.") from None
+    return constants
 
 
 def _pair(option: str, text: str, form: str) -> tuple[str, str]:

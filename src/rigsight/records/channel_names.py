@@ -16,6 +16,8 @@ NAMES_OF: dict[str, tuple[str, ...]] = {
     "x": ("x", "position", "displacement", "weg", "pos", "auslenkung", "stroke", "travel", "hub", "deflection"),
     "force": ("force", "kraft", "f", "load", "last", "damper force", "dämpferkraft"),
 }  # fmt: skip
+_IN_PART = 0.9
+"""Below what a unit that fits makes clear: a word that is shared is a hint, no more."""
 # A last word without brackets is a unit only if it can hardly be anything else: x_a is no length of years.
 _UNITS_BEHIND = frozenset({
     "s", "ms", "us", "µs", "A", "mA", "V", "mV", "N", "kN", "mN", "Nm", "kNm",
@@ -38,20 +40,23 @@ def split_unit(name: str) -> tuple[str, str | None]:
 
 def closeness(name: str, signal: str) -> float:
     """Return how well a channel's name, without group and unit, fits a signal, from 0 (not at all) to 3 (its own name)."""
+    if signal in (name, name.rpartition("/")[2]):
+        return 3.0
     bare = split_unit(name)[0]
     whole, last = _plain(bare), _plain(bare.rpartition("/")[2])
-    known = NAMES_OF.get(signal)
-    if signal.lower() in (whole, last) or _words(signal) in (_words(bare), _words(bare.rpartition("/")[2])):
+    words, asked = _words(bare.rpartition("/")[2]), _words(signal)
+    if signal.lower() in (whole, last) or (asked and asked in (_words(bare), words)):
         return 3.0
-    words = set(last.split())
+    known = NAMES_OF.get(signal)
     if known is None:
         # A name that a rig's file gives: nobody knows others for it, but its words may stand in another order or among more.
-        known = tuple(_plain(signal).split())
-        if words and words >= set(known):
-            return 2.0
-    elif whole in known or last in known:
+        own = set(asked.split())
+        shared = own & set(words.split())
+        return 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))
+    if whole in known or last in known:
         return 2.0
-    return 1.0 if any(word in words for word in known if len(word) > 2) else 0.0
+    single = set(last.split())
+    return 1.0 if any(word in single for word in known if len(word) > 2) else 0.0
 
 
 def _plain(name: str) -> str:

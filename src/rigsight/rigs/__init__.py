@@ -19,6 +19,7 @@ from rigsight.rigs.rig import Motion as Motion
 from rigsight.rigs.rig import Rig as Rig
 from rigsight.rigs.rig import joint_of as joint_of
 from rigsight.rigs.rig_file import read_rig_file as read_rig_file
+from rigsight.rigs.rig_file import rig_of_tables as rig_of_tables
 from rigsight.rigs.signal import Signal as Signal
 
 __all__ = [
@@ -42,4 +43,5 @@ __all__ = [
     "reading_symbol",
     "relative_slopes",
     "rig_file_text",
+    "rig_of_tables",
 ]

@@ -150,7 +150,15 @@ class Rig:
     def in_own_parameters(
         self, given: Mapping[str, float], constants: Mapping[str, float]
     ) -> dict[str, float]:
-        """Return given values with alternatives turned into the parameters that follow from them."""
+        """Return given values with alternatives turned into the parameters that follow from them.
+
+        Parameters
+        ----------
+        given
+            Values by name [SI].
+        constants
+            The rig's constants by name [SI].
+        """
         own = dict(given)
         for alternative in self.alternatives:
             name = alternative.parameter.name
@@ -265,17 +273,36 @@ class Rig:
         """Return the parameter with its unit on this rig, at a place or at its first joint.
 
         The base quantity "drive" is a force of the size of the drive's, where "force" is one of the size of the spring's.
+
+        Parameters
+        ----------
+        parameter
+            Of an effect.
+        place
+            Name of a joint, drive or sensor.
         """
         units = self.units if place is None else self.units_at(place)
         units = {**units, "drive": units["force"]}
         return replace(parameter, unit=unit_text(parameter.dimension, units))
 
     def place_name(self, place: Place) -> str:
-        """Return how results call a place on this rig."""
+        """Return how results call a place on this rig.
+
+        Parameters
+        ----------
+        place
+            Kind of place.
+        """
         return self.mechanism.joints[0].name if place is Place.DYNAMICS else place.value
 
     def places(self, kind: Place) -> tuple[str, ...]:
-        """Return the names of the joints, drives, sensors or states at which effects of a kind can act."""
+        """Return the names of the joints, drives, sensors or states at which effects of a kind can act.
+
+        Parameters
+        ----------
+        kind
+            Kind of place.
+        """
         mechanism = self.mechanism
         found: Sequence[Drive | Joint | Sensor | RateState] = mechanism.joints
         if kind is Place.ACTUATOR:
@@ -287,17 +314,35 @@ class Rig:
         return tuple(place.name for place in found)
 
     def where(self, effect: Effect) -> str:
-        """Return how results call the place of an effect."""
+        """Return how results call the place of an effect.
+
+        Parameters
+        ----------
+        effect
+            At its place, or of no place.
+        """
         if effect.at is not None or not self.has_one_motion:
             return self.acts_at(effect)
         return self.place_name(effect.place)
 
     def acts_at(self, effect: Effect) -> str:
-        """Return the name of the joint, drive, sensor or state at which an effect acts; the first where it names none."""
+        """Return the name of the joint, drive, sensor or state at which an effect acts; the first where it names none.
+
+        Parameters
+        ----------
+        effect
+            At its place, or of no place.
+        """
         return effect.at if effect.at is not None else self.places(effect.place)[0]
 
     def offers(self, effect: Effect) -> bool:
-        """Return True if the effect makes sense on this rig."""
+        """Return True if the effect makes sense on this rig.
+
+        Parameters
+        ----------
+        effect
+            At its place, or of no place.
+        """
         if effect.at is not None and effect.at not in self.places(effect.place):
             return False
         if effect.place is Place.LATERAL_DYNAMICS:

@@ -68,6 +68,8 @@ class Model:
         return {
             "schema_version": SCHEMA_VERSION,
             "rig": rig.name,
+            # So that nothing else is needed: neither the user's file nor this version of a built-in one.
+            **({"declaration": dict(rig.declaration)} if rig.declaration else {}),
             "hold": self.hold,
             "constants": {n: v for n, v in self.values.items() if n in constants},
             "parameters": {n: v for n, v in self.values.items() if n in own},

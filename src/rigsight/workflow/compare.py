@@ -23,6 +23,7 @@ from rigsight.workflow.compare_files import comparison_csv, comparison_json
 from rigsight.workflow.diagnose import versions
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.model_file import MODEL_FILE, named_model
+from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -73,6 +74,7 @@ def run_compare(
     if out is not None:
         check_writable(Path(out))
     read = read_campaign(campaign)
+    check_takes("compare", read.rig, read.records)
     competitors = named_competitors(models, read)
     comparison = compare_campaign(read, competitors, method, step_seconds, jobs, listener)
     if out is not None:
@@ -106,6 +108,7 @@ def compare_campaign(
         If the method is unknown, the step window is no positive number, or no model can be simulated on any record.
     """
     _check_wishes(competitors, method, step_seconds)
+    check_takes("compare", campaign.rig, campaign.records)
     chosen = cast("Method", method)
     rig = campaign.rig
     structures = {c.model.structure.effect_names: c.model.structure for c in competitors}
@@ -210,6 +213,10 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
         raise InputError(
             f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
             f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."
+        )
+    if model.structure.rig.mechanism != campaign.rig.mechanism:
+        raise InputError(
+            f"Model '{name}' declares the rig '{campaign.rig.name}' with other equations than {campaign.called}. Leave it out."
         )
     return model
 

@@ -14,10 +14,13 @@ from threadpoolctl import threadpool_limits
 from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
+from rigsight.rigs import Rig
 from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.effect_names import effects_on
 from rigsight.workflow.fit_journal import FitJournal
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
 from rigsight.workflow.model_file import MODEL_FILE
+from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, Step, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -35,6 +38,7 @@ def run_diagnose(
     *,
     effects: Sequence[Effect] = CATALOGUE,
     own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
     seed: int = 0,
     n_jobs: int | None = None,
     listener: Listener = silent,
@@ -54,6 +58,8 @@ def run_diagnose(
         Candidates.
     own_effects
         Effects beside those of the catalogue that the simulation in question may have already.
+    own_rigs
+        Rigs that the campaign may name beside the built-in ones.
     seed
         Seed of the resampling behind probabilities.
     n_jobs
@@ -79,7 +85,9 @@ def run_diagnose(
             called = command or f"rigsight diagnose {shlex.quote(str(campaign))}"
             write_diagnosis(diagnosis, Path(out), called, seed, (*effects, *own_effects))
 
-    return diagnose_campaign(read_campaign(campaign, own_effects), effects, seed, jobs, listener, keep)
+    return diagnose_campaign(
+        read_campaign(campaign, own_effects, own_rigs), effects, seed, jobs, listener, keep
+    )
 
 
 def diagnose_campaign(
@@ -105,10 +113,17 @@ def diagnose_campaign(
 
     Raises
     ------
+    InputError
+        If a candidate is at a place that the rig does not have.
     SimulationError
         If the given simulation cannot be run.
     """
-    candidates = candidates_on(campaign.rig, effects, campaign.modelled)
+    check_takes("diagnose", campaign.rig, campaign.records)
+    # What nobody put anywhere is passed over where it makes no sense; a place that was named must be there.
+    named = [effect for effect in effects if effect.at is None] + [
+        *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
+    ]
+    candidates = candidates_on(campaign.rig, named, campaign.modelled)
     prepare_kernels(structures_to_try(campaign.rig, candidates, campaign.modelled), n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     journal = (

@@ -21,6 +21,7 @@ from rigsight.records import Record
 from rigsight.workflow.campaign import Campaign, read_campaign
 from rigsight.workflow.kernels import checked_jobs
 from rigsight.workflow.model_file import MODEL_FILE
+from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -115,6 +116,7 @@ def discover_campaign(
         If the rig's own equations cannot be simulated near the records.
     """
     chosen = cast("Method", check_option("The method", method, METHODS))
+    check_takes("discover", campaign.rig, campaign.records)
     task = discovery_task(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.

@@ -47,7 +47,7 @@ def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> E
     rig
         Where it acts.
     name
-        Of an effect, or ``effect@place``; the place may be left out where the rig has no other.
+        Of an effect, or ``effect@place``; the place may be left out where the effect makes sense at no other.
     known
         Effects by name, without places.
     where
@@ -67,11 +67,15 @@ def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> E
         # On a rig of one motion results call an effect by its name alone.
         is_usual = rig.has_one_motion and place == rig.acts_at(effect)
         return effect if is_usual else placed(effect, place)
-    places = rig.places(effect.place)
-    if len(places) > 1 and not rig.has_one_motion:
-        listed = ", ".join(f"{kind}{AT}{one}" for one in places)
+    if rig.has_one_motion:
+        return effect
+    at_places = [placed(effect, one) for one in rig.places(effect.place)]
+    offered = [one for one in at_places if rig.offers(one)]
+    if len(offered) > 1:
+        listed = ", ".join(one.name for one in offered)
         raise InputError(f"{where}: '{kind}' can act at several places of {rig.name}; name one: {listed}.")
-    return effect
+    # Where it makes no sense anywhere, the composition says so.
+    return offered[0] if offered else effect
 
 
 def _check_place(rig: Rig, effect: Effect, place: str, where: str) -> None:

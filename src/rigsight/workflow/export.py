@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, check_option
 from rigsight.export import TARGETS, export_model
+from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
 from rigsight.workflow.model_file import read_model
+from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.results import check_target, write_together
 
 
@@ -22,6 +24,7 @@ def run_export(
     step: float | None = None,
     source_only: bool = False,
     own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
 ) -> Path:
     """Write a model for another tool.
 
@@ -42,6 +45,8 @@ def run_export(
         True for an FMU without a binary.
     own_effects
         Effects that the model may name beside those of the catalogue.
+    own_rigs
+        Rigs that it may name beside the built-in ones, where it does not declare its own.
 
     Returns
     -------
@@ -53,7 +58,8 @@ def run_export(
         If the model cannot be read, the target cannot say it, or the file cannot be written.
     """
     chosen = TARGETS[check_option("Target", target, TARGETS)]
-    read = read_model(model, own_effects)
+    read = read_model(model, own_effects, own_rigs)
+    check_takes("export", read.structure.rig)
     file = Path(f"{read.structure.rig.name}{chosen.suffix}" if out is None else out)
     check_target(file)
     if file.suffix != chosen.suffix:

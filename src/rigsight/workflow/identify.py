@@ -30,6 +30,7 @@ from rigsight.workflow.identification_warnings import (
 )
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.model_file import MODEL_FILE
+from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -120,6 +121,7 @@ def identify_campaign(
     InputError
         If a record is too short for the resolution wished for, or no record shows the motion.
     """
+    check_takes("identify", campaign.rig, campaign.records)
     no_spring = campaign.parameters.get("k") == 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)

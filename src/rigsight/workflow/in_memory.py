@@ -10,7 +10,7 @@ from rigsight.errors import InputError, check_option
 from rigsight.parameters import ParameterSet
 from rigsight.records import Hold, Record
 from rigsight.records.plausibility import is_constant
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign import NO_VALIDATION, Campaign, of_first_record
@@ -146,7 +146,10 @@ def rig_of(rig: str | Rig) -> Rig:
     InputError
         Naming the nearest and all built-in rigs where a name is unknown.
     """
-    return rig if isinstance(rig, Rig) else RIGS[check_option("The rig", rig, RIGS)]
+    if isinstance(rig, str):
+        return RIGS[check_option("The rig", rig, RIGS)]
+    # The one of the same declaration that is known already, if there is one: its equations are made once.
+    return rig_of_tables(rig.declaration, f"Rig '{rig.name}'") if rig.declaration else rig
 
 
 def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:

@@ -12,9 +12,9 @@ from rigsight.errors import InputError, check_option
 from rigsight.records import Role
 from rigsight.records.channel_file import SUFFIXES
 from rigsight.records.csv_channels import open_measurement
-from rigsight.rigs import Rig
+from rigsight.rigs import RIGS, Rig
 from rigsight.workflow.campaign_file import MOST_RECORDS
-from rigsight.workflow.own_rigs import known_rigs, own_rigs
+from rigsight.workflow.own_rigs import own_rigs
 from rigsight.workflow.record_proposal import BLANK, Proposal, propose, quoted
 from rigsight.workflow.results import write_together
 
@@ -39,6 +39,8 @@ class Draft:
         Other measured files, and why they were not taken.
     n_blanks
         Values that are left to be filled in.
+    others
+        Rigs that it was chosen from, where it is a guess.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class Draft:
     records: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     n_blanks: int
+    others: tuple[str, ...] = ()
 
 
 def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterable[Path] = ()) -> Draft:
@@ -72,7 +75,8 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     if path.exists() or path.is_symlink():
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
     own = own_rigs(rig_files)
-    known = known_rigs(own.values())
+    # A user's own come first: they win where a built-in one fits as well.
+    known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
     rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
     files = sorted(
         file
@@ -96,7 +100,9 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
     text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, source, others), proposals, left_out)
     write_together(folder, {CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
-    return Draft(path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks)
+    return Draft(
+        path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks, others
+    )
 
 
 def _proposals(files: Sequence[Path], rigs: Sequence[Rig]) -> tuple[list[Proposal], list[tuple[str, str]]]:

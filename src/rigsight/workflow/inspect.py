@@ -90,7 +90,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
         if not channels:
             reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
             raise InputError(f"{path.name} ({file.format}) holds no signal over time: {reasons}.")
-        proposal = propose(path, file, (*RIGS.values(), *own_rigs))
+        proposal = propose(path, file, (*own_rigs, *RIGS.values()))
     return Inspection(
         path.name,
         file.format,

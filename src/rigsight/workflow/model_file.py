@@ -9,14 +9,16 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rigsight.discover.monomials import known_terms
-from rigsight.effects import Effect, effect_named
+from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
-from rigsight.rigs import RIGS
+from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
+from rigsight.workflow.effect_names import effect_on
 from rigsight.workflow.json_file import json_object
+from rigsight.workflow.own_rigs import known_rigs
 
 MODEL_FILE = "model.json"
 _MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
@@ -32,6 +34,7 @@ class ModelTable(BaseModel):
 
     schema_version: Literal[1]
     rig: str
+    declaration: dict[str, Any] = {}
     hold: Hold = "foh"
     constants: dict[str, Number] = {}
     parameters: dict[str, Number] = {}
@@ -40,7 +43,7 @@ class ModelTable(BaseModel):
     units: dict[str, str] = {}
 
 
-def read_model(model: str | Path, own_effects: Iterable[Effect] = ()) -> Model:
+def read_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs: Iterable[Rig] = ()) -> Model:
     """Read a model.
 
     Parameters
@@ -49,6 +52,8 @@ def read_model(model: str | Path, own_effects: Iterable[Effect] = ()) -> Model:
         A ``model.json`` or the folder that holds one.
     own_effects
         Effects that the model may name beside those known to everybody.
+    own_rigs
+        Rigs that a model without a declaration of its own may name beside the built-in ones.
 
     Raises
     ------
@@ -63,7 +68,7 @@ def read_model(model: str | Path, own_effects: Iterable[Effect] = ()) -> Model:
     rigsight.errors.InputError: diagnosis does not exist; name a model.json or the folder that holds one.
     """
     path = _locate(Path(model))
-    return _model(path, json_object(path, "model", _MEND), own_effects)
+    return _model(path, json_object(path, "model", _MEND), own_effects, own_rigs)
 
 
 def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> Model:
@@ -84,9 +89,11 @@ def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> 
     return _model(Path(MODEL_FILE), dict(content), own_effects)
 
 
-def _model(path: Path, content: dict[str, Any], own_effects: Iterable[Effect]) -> Model:
+def _model(
+    path: Path, content: dict[str, Any], own_effects: Iterable[Effect], own_rigs: Iterable[Rig] = ()
+) -> Model:
     table = _checked_table(path, content)
-    structure = _structure(path, table, own_effects)
+    structure = _structure(path, table, _rig(path, table, own_rigs), own_effects)
     return Model(structure, _values(path, structure, table), table.hold)
 
 
@@ -159,20 +166,39 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
     return f"{start}{message[0].lower()}{message[1:]}, got {shown(got)}."
 
 
-def _structure(path: Path, table: ModelTable, own_effects: Iterable[Effect]) -> Structure:
-    if table.rig not in RIGS:
+def _rig(path: Path, table: ModelTable, own_rigs: Iterable[Rig]) -> Rig:
+    """Return the rig that a model declares, or names."""
+    built_in = RIGS.get(table.rig)
+    if built_in is not None and built_in.declaration == table.declaration:
+        return built_in
+    if table.declaration:
+        rig = rig_of_tables(table.declaration, f"{path.name}: declaration")
+        if rig.name != table.rig:
+            raise InputError(
+                f"{path.name}: rig: is '{table.rig}', but declaration.name '{rig.name}'. Write the same for both."
+            )
+        return rig
+    known = known_rigs(own_rigs)
+    if table.rig not in known:
         raise InputError(
-            f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, RIGS)} Allowed: {', '.join(RIGS)}."
+            f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, known)} Allowed: {', '.join(known)}, or a rig of your "
+            "own whose tables stand under 'declaration'."
         )
+    return known[table.rig]
+
+
+def _structure(path: Path, table: ModelTable, rig: Rig, own_effects: Iterable[Effect]) -> Structure:
     known = {**known_terms(), **{effect.name: effect for effect in own_effects}}
     for name in table.effects:
-        if name not in known:
+        kind = kind_of(name)
+        if kind not in known:
             raise InputError(
-                f"{path.name}: effects: '{name}' is unknown.{nearest(name, known)} If it is an effect of your own, name the file "
+                f"{path.name}: effects: '{kind}' is unknown.{nearest(kind, known)} If it is an effect of your own, name the file "
                 f"that declares it: rigsight simulate MODEL RECORD --effects FILE. Known: {', '.join(known)}."
             )
+    effects = [effect_on(rig, name, known, f"{path.name}: effects") for name in table.effects]
     try:
-        return compose(RIGS[table.rig], [known[name] for name in table.effects])
+        return compose(rig, effects)
     except InputError as error:
         raise InputError(f"{path.name}: effects: {error}") from None
 

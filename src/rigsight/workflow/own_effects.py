@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from rigsight.discover.monomials import known_terms
-from rigsight.effects import CATALOGUE, Effect
+from rigsight.effects import AT, CATALOGUE, Effect, placed
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.records.ordinary_file import file_size
 from rigsight.simulate.printing.text import text
@@ -89,15 +89,20 @@ def own_effects(
 def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects of the catalogue and `own` with these names, all of them where none is named.
 
+    A name may say where the effect acts, ``coulomb_friction@shaft``; whether a rig has this place is not known here.
+
     Raises
     ------
     InputError
         Naming the nearest and all known effects.
     """
     known = {effect.name: effect for effect in (*CATALOGUE, *own)}
-    return tuple(known[check_option("Effect", name, known)] for name in dict.fromkeys(names)) or tuple(
-        known.values()
-    )
+    found = []
+    for name in dict.fromkeys(names):
+        kind, at, place = name.partition(AT)
+        effect = known[check_option("Effect", kind, known)]
+        found.append(placed(effect, place) if at else effect)
+    return tuple(found) or tuple(known.values())
 
 
 def equation_text(effect: Effect) -> str:

@@ -118,14 +118,18 @@ def _unit_of(channel: Channel) -> str | None:
 def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGuess:
     time, _ = _guess(TIME, "s", channels, (), is_text)
     taken = [time.channel] if time.channel is not None else []
-    signals, score = [], 0.0
-    for signal in (*rig.inputs, *rig.outputs):
+    signals = (*rig.inputs, *rig.outputs)
+    found, score = {}, 0.0
+    # Whose name is clear comes first, so that no other signal takes its channel.
+    for signal in sorted(
+        signals, key=lambda s: -max((closeness(c.name, s.name) for c in channels), default=0.0)
+    ):
         guess, closest = _guess(signal.name, signal.unit, channels, taken, is_text)
         if guess.channel is not None:
             taken.append(guess.channel)
             score += closest
-        signals.append(guess)
-    return FileGuess(rig, time, tuple(signals), score / len(signals))
+        found[signal.name] = guess
+    return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
 
 
 def _guess(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -16,9 +16,11 @@ from rigsight.errors import InputError, nearest
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import ColumnMapping, Record, read_record
 from rigsight.records.read_record import TIME
-from rigsight.simulate import parameter_vector, record_input, rest_state, simulate
+from rigsight.rigs import Rig
+from rigsight.simulate import parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.model import Model
-from rigsight.workflow.model_file import read_model
+from rigsight.workflow.given_simulation import checked_numbers
+from rigsight.workflow.model_file import MODEL_FILE, read_model
 from rigsight.workflow.results import check_target, write_together
 
 _DIGITS = "%.12g"
@@ -31,25 +33,31 @@ def run_simulate(
     *,
     columns: Mapping[str, ColumnMapping] | None = None,
     initial_state: Mapping[str, float] | Literal["estimated"] | None = None,
+    constants: Mapping[str, float] | None = None,
     own_effects: Sequence[Effect] = (),
+    own_rigs: Iterable[Rig] = (),
 ) -> Record:
-    """Simulate a model for the input of a record.
+    """Simulate a model for the inputs of a record.
 
     Parameters
     ----------
     model
         A ``model.json`` or the folder that holds one.
     record
-        Measured file with time and input; the outputs are read only where initial states are estimated.
+        Measured file with time and inputs; the outputs are read only where initial states are estimated.
     out
-        CSV file for time, input and simulated outputs; None writes nothing.
+        CSV file for time, inputs and simulated outputs; None writes nothing.
     columns
-        Where time ``t`` and the input stand; by default in columns of their own names.
+        Where time ``t`` and the inputs stand; by default in columns of their own names.
     initial_state
         States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
         input sample; "estimated" fits all of them to the outputs measured in the record, and nothing else.
+    constants
+        Constants of the rig that have another value in this record.
     own_effects
         Effects that the model may name beside those of the catalogue.
+    own_rigs
+        Rigs that it may name beside the built-in ones, where it does not declare its own.
 
     Raises
     ------
@@ -58,7 +66,7 @@ def run_simulate(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    read = read_model(model, own_effects)
+    read = read_model(model, own_effects, own_rigs)
     rig = read.structure.rig
     columns = columns or {}
     known = [TIME, *(signal.name for signal in rig.inputs)]
@@ -70,6 +78,7 @@ def run_simulate(
                 f"Column mapping '{name}': a simulation of {rig.name} does not read it.{nearest(name, known)} "
                 f"It reads: {', '.join(known)}."
             )
+    own = checked_numbers(MODEL_FILE, "constants", rig, rig.constants, constants or {})
     if out is not None:
         check_target(Path(out))
     estimated = initial_state == "estimated"
@@ -79,7 +88,11 @@ def run_simulate(
         rig.outputs if estimated else (),
         columns=columns,
         require_outputs=estimated,
+        required_outputs=rig.required_outputs,
+        absent_inputs=rig.absent_inputs,
+        still_inputs=not rig.has_one_motion,
         hold=read.hold,
+        constants=own,
     )
     simulated = simulate_model(read, driven, initial_state)
     if out is not None:
@@ -94,14 +107,15 @@ def simulate_model(
     record: Record,
     initial_state: Mapping[str, float] | Literal["estimated"] | None = None,
 ) -> Record:
-    """Simulate a model for the input of a record.
+    """Simulate a model for the inputs of a record.
 
     Parameters
     ----------
     model
         The model.
     record
-        Its input is simulated with its hold; its outputs are read only where initial states are estimated.
+        Its inputs are simulated, with its hold and its own constants; its outputs are read only where initial states are
+        estimated.
     initial_state
         States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
         input sample; ``"estimated"`` fits all of them to the outputs measured in the record, and nothing else.
@@ -113,7 +127,7 @@ def simulate_model(
     Raises
     ------
     InputError
-        If the record lacks the input, an initial state is unknown, or states cannot be estimated from the record.
+        If the record lacks an input, an initial state is unknown, or states cannot be estimated from the record.
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
 
@@ -139,9 +153,10 @@ def simulate_model(
 def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> NDArray[np.float64]:
     structure = model.structure
     names = list(structure.state_names)
-    # The displacement is state and output; the output's name is the one that a user has seen.
-    aliases = {structure.rig.outputs[0].name: names[0]} if structure.rig.is_driven else {}
-    vector = parameter_vector(structure, model.values)
+    # Where a sensor shows a state as it is, its name is the one that a user has seen.
+    sensors = structure.rig.mechanism.sensors
+    aliases = {s.name: s.reads.name for s in sensors if s.reads in structure.states}
+    vector = parameter_vector(structure, record_values(structure, model.values, record))
     state = rest_state(structure, vector, record_input(structure, record))
     for name, value in given.items():
         own = aliases.get(name, name)

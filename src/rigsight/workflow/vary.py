@@ -24,6 +24,7 @@ from rigsight.simulate.input_hold import hold_input
 from rigsight.simulate.model import Model
 from rigsight.workflow.kernels import prepare_kernels
 from rigsight.workflow.model_file import named_model
+from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -115,10 +116,11 @@ def run_vary(
     if out is not None:
         check_writable(Path(out))
     read = named_model(model)
+    check_takes("vary", read.structure.rig)
     if not read.structure.rig.is_driven:
         raise InputError(
             f"'vary' sweeps a rig whose input moves a mass, and {model} is of the rig '{read.structure.rig.name}', which "
-            "prescribes the motion. Use a model of 'axis' or 'running_gear'."
+            "prescribes the motion. Use a model of a driven rig."
         )
     check_in_range("The number of values (--steps)", steps, 2, _MOST_STEPS)
     check_in_range("The amplitude (--amplitude)", amplitude, np.nextafter(0.0, 1.0), 1e12)
