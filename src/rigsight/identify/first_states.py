@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +104,22 @@ def rig_state(
     -------
     Shape (n_states,).
     """
+    if not equations.shows_all_coordinates(set(record.signals)):
+        return _rig_state(equations, record, values, resting)
+    # Then it does not depend on the values, and every candidate asks for the same records.
+    known = _known.setdefault(record, {})
+    key = (id(equations), resting)
+    if key not in known:
+        known[key] = _rig_state(equations, record, values, resting)
+    return known[key].copy()
+
+
+_known: WeakKeyDictionary[Record, dict[tuple[int, int | None], Floats]] = WeakKeyDictionary()
+
+
+def _rig_state(
+    equations: RigEquations, record: Record, values: Mapping[str, float], resting: int | None
+) -> Floats:
     p = equations.parameters(values, record)
     u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
     begin = _equilibrium(equations, u, p)

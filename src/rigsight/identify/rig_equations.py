@@ -79,6 +79,20 @@ class RigEquations:
         """Return the parameter vector of values by name with the record's own constants; a missing one has its default."""
         return parameter_vector(self.structure, record_values(self.structure, values, record))
 
+    def shows_all_coordinates(self, measured: set[str]) -> bool:
+        """Return True if the readings of these sensors alone give all coordinates, whatever the parameters are."""
+        mechanism = self.rig.mechanism
+        coordinates = [coordinate.symbol for coordinate in mechanism.free]
+        if mechanism.states:
+            return False
+        read = [
+            sensor.reads
+            for sensor in mechanism.sensors
+            if sensor.name in measured and sensor.reads.free_symbols <= set(coordinates)
+        ]
+        slopes = sp.Matrix(read).jacobian(coordinates) if read else sp.Matrix(0, 0, [])
+        return bool(slopes.is_symbolic() is False and slopes.rank() == len(coordinates))
+
     def inputs_of(self, record: Record) -> tuple[HeldInput, Floats]:
         """Return a record's inputs between samples, and at them with their derivatives, shape (3 n_inputs, n_samples)."""
         held = record_input(self.structure, record)
