@@ -182,8 +182,9 @@ def _assembled(
     candidates = tuple(sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.excess)))
     chosen = judgement.model.effects if is_effect else ()
     tied = tuple(model.names for model in ranking.tied) if is_effect else ()
-    places = judgement.model.effects if judgement.verdict in ("effect", "unknown") else ()
-    where = tuple(rig.where(effect) for effect in places)
+    where = tuple(rig.where(effect) for effect in chosen)
+    if judgement.verdict == "unknown":
+        where = _evidence(found)
     return Diagnosis(
         title=task.title,
         rig=rig.name,
@@ -204,11 +205,20 @@ def _assembled(
         advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
         if is_effect
         else (),
+        places=found.places,
         localization=localize(bench, traces, scored_on, before, linear, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
     )
+
+
+def _evidence(found: Examination) -> tuple[str, ...]:
+    """Return the places to which a gap without a cause is traced: where a push takes most of it away, else the best effect's."""
+    if found.places:
+        return tuple(place.name for place in found.places if place.looked_at and place.share > 0.0)
+    rig = found.bench.rig
+    return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
 
 
 def _column(rig: Rig, model: Scored, output: str) -> NDArray[np.float64]:

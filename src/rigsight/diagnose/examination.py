@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.chance import fitted_in_windows, is_predictable
-from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear
+from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear, refine
 from rigsight.diagnose.data_quality import data_quality, with_best_model
 from rigsight.diagnose.finding import DataQuality
 from rigsight.diagnose.grow import Prepare, grown, pruned
 from rigsight.diagnose.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.one_law import told_apart
-from rigsight.diagnose.places import Search, SuspectedPlace, search_places
+from rigsight.diagnose.places import Search, search_places
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
-from rigsight.diagnose.result import NoiseFloor
+from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing, leading_output
@@ -189,9 +189,14 @@ def _singly(
     search = search_places(bench, linear, effects)
     if search.places:
         say("places")
-        if prepare is not None:
-            prepare([bench.composed((effect,), effect.special_cases) for effect in search.effects])
+    if search.places and prepare is not None:
+        prepare([bench.composed((effect,), effect.special_cases) for effect in search.effects])
     singles = fit_candidates(bench, linear, search.effects, say)
+    if search.others and min((model.excess for model in singles), default=np.inf) > AT_FLOOR:
+        # Nothing right may be lost where the places were ranked wrongly.
+        if prepare is not None:
+            prepare([bench.composed((effect,), effect.special_cases) for effect in search.others])
+        singles = refine(bench, [*singles, *fit_candidates(bench, linear, search.others, say)])
     return _Singly(windowing, bench, before, linear, quality, singles, search)
 
 

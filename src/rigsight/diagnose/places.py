@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rigsight.diagnose.result import SuspectedPlace
 from rigsight.diagnose.suspects import Lineup, Suspect
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -18,15 +19,6 @@ come second; a place that takes half as much away seldom is the true one.
 
 
 @dataclass(frozen=True)
-class SuspectedPlace:
-    """A joint, drive or sensor, and the share of the squared residual that the best push there takes away."""
-
-    name: str
-    share: float
-    looked_at: bool
-
-
-@dataclass(frozen=True)
 class Search:
     """Where to look, and for which effects.
 
@@ -36,10 +28,13 @@ class Search:
         All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
     effects
         Candidates at the places that are looked at.
+    others
+        The rest, for a gap that none of these explains.
     """
 
     places: tuple[SuspectedPlace, ...]
     effects: tuple[Effect, ...]
+    others: tuple[Effect, ...] = ()
 
 
 def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) -> Search:
@@ -66,10 +61,8 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
         key=lambda place: -place.share,
     )
     looked_at = {place.name for place in places if place.looked_at}
-    return Search(
-        tuple(places),
-        tuple(e for e in effects if e.pulsation is not None or bench.rig.acts_at(e) in looked_at),
-    )
+    first = [e for e in effects if e.pulsation is not None or bench.rig.acts_at(e) in looked_at]
+    return Search(tuple(places), tuple(first), tuple(effect for effect in effects if effect not in first))
 
 
 def _by_place(bench: Workbench, suspects: Sequence[Suspect]) -> dict[str, float]:

@@ -130,6 +130,15 @@ class Advice:
         }
 
 
+@dataclass(frozen=True)
+class SuspectedPlace:
+    """A joint, drive or sensor, and the share of the squared residual that the best push there takes away."""
+
+    name: str
+    share: float
+    looked_at: bool
+
+
 Stretches = tuple[tuple[NDArray[np.float64], float], ...]
 """Pieces of noise alone, shape (n_samples,) each, with their sample time [s]."""
 
@@ -221,6 +230,9 @@ class Diagnosis:
         The gap split by record, amplitude, band, state, time and signal path.
     effect_shares
         Effect -> output -> share of the closed gap that it explains, where the verdict names several.
+    places
+        Share of the squared gap of the re-identified equations that the best push at each joint, drive and sensor takes away, the
+        largest first; empty on a rig with one motion.
     missing_force
         What sparse regression makes of the force that is lacking, where no effect explains the gap.
     """
@@ -245,6 +257,7 @@ class Diagnosis:
     data_quality: DataQuality | None = None
     localization: Localization = field(default_factory=Localization)
     effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    places: tuple[SuspectedPlace, ...] = ()
     missing_force: MissingForce | None = None
 
     def to_json(self) -> dict[str, Any]:
@@ -279,6 +292,10 @@ class Diagnosis:
                 for floor in self.noise_floors
             },
             **self.localization.to_json(),
+            "gap_by_place": [
+                {"place": place.name, "share": _number(place.share), "looked_at": place.looked_at}
+                for place in self.places
+            ],
             "effect_shares": {
                 effect: {output: _number(share) for output, share in shares.items()}
                 for effect, shares in self.effect_shares.items()

@@ -33,6 +33,8 @@ MOST_SUBSTEPS = 16
 _WORTH_REFINING = 1e-3
 """Share of the cost that finer steps must promise to remove."""
 _WORSE = 1e3
+_DIVERGED = 1e100
+"""Sum of squares, in units of the noise, of a simulation that left the range in which an optimizer can compare numbers."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ class Problem:
             products = np.array(self._products(theta))
             cost = float(np.sum(products[:, 0, 0]))
             normal, gradient = self._put_together(products[:, 1:, 1:], products[:, 0, 1:])
-        if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
+        if not (cost < _DIVERGED and np.all(np.abs(normal) < _DIVERGED)):
             cost = float("inf")
         self._best = min(self._best, cost)
         self._last = Evaluation(theta.copy(), cost, normal, gradient)
