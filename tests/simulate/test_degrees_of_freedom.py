@@ -137,16 +137,7 @@ def test_a_rig_starts_where_it_hangs() -> None:
     assert 3.0 * 2.0 * -angle[0] == pytest.approx(9.81 * 0.15 * np.sin(angle[0] + 0.05), rel=1e-6)
 
 
-@pytest.mark.parametrize("effect", ["input_delay@motor", "sensor_delay@angle"])
-def test_a_delay_within_a_loop_is_refused(effect: str) -> None:
-    name, place = effect.split("@")
-    with pytest.raises(InputError, match="delays are those"):
-        compose(RIGS["servo"], [placed(effect_named(name), place)])
-
-
-@pytest.mark.parametrize(
-    "effect", ["coulomb_friction@shoulder", "sensor_delay@y", "input_dead_zone@yaw_dynamics"]
-)
+@pytest.mark.parametrize("effect", ["coulomb_friction@shoulder", "input_dead_zone@yaw_dynamics"])
 def test_a_place_that_cannot_take_an_effect_is_refused(effect: str) -> None:
     name, place = effect.split("@")
     with pytest.raises(InputError, match=f"'{effect}'"):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import lsq_linear
 
+from rigsight import rigs
 from rigsight.effects import effect_named, placed
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, read_rig_file
@@ -26,7 +27,7 @@ from rigsight.simulate import (
 from rigsight.simulate.input_hold import Hold
 
 Floats = NDArray[np.float64]
-FILES = Path(__file__).parents[1] / "rigs" / "files"
+FILES = Path(rigs.__file__).parent / "files"
 DT, N = 5e-3, 250
 T = DT * np.arange(N)
 

@@ -9,8 +9,8 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
-from rigsight.simulate.kernel_equations import KernelEquations, template
-from rigsight.simulate.kernel_source import ACCURATE
+from rigsight.simulate.kernel_equations import KernelEquations
+from rigsight.simulate.kernel_source import accurate_integrator
 from rigsight.simulate.printing.c import C
 from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL
@@ -187,7 +187,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         "HISTORY_MEMBERS": (f"    double first, pieces[{upper}_HISTORY][4];\n" if delayed else "")
         + (f"    double origin[2], readings[{upper}_HISTORY][2];\n" if late else ""),
         "KERNEL": "\n".join(
-            [equations.text("const parameters *p", list(names.values())), *map(template, ACCURATE)]
+            [equations.text("const parameters *p", list(names.values())), accurate_integrator(equations)]
         ),
         "REST": "" if rest is None else _rest(exported, names),
         "REST_CALL": "    (void)p; (void)u;\n" if rest is None else _REST_CALL.format(name=name),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from rigsight.effects import Place
+from rigsight.errors import InputError
 from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.simulate import parameter_vector
@@ -106,6 +107,22 @@ class Exported:
         return {**signals, **{symbol: quantity.name for symbol, quantity in (*parameters, *states)}}
 
 
+def _check_delays(structure: Structure) -> None:
+    """Refuse delays but that of the only input and that of the first sensor."""
+    remembered = {history.symbol.name.partition(":")[0] for history in structure.histories}
+    late = [e.name for e in structure.effects if e.name in remembered]
+    late += [
+        output.name
+        for output, delay in zip(structure.rig.outputs[1:], structure.shown_late[1:], strict=True)
+        if delay is not None
+    ]
+    if late:
+        raise InputError(
+            f"A delay at {', '.join(late)} cannot be exported: that of the only input and that of the first sensor can. "
+            "Simulate the model here, or leave the delay out."
+        )
+
+
 def exported(model: Model, hold: Hold, step: float) -> Exported:
     """Return a model in the form that every target prints.
 
@@ -121,9 +138,10 @@ def exported(model: Model, hold: Hold, step: float) -> Exported:
     Raises
     ------
     InputError
-        If a parameter has no value.
+        If a parameter has no value, or something is late for which no target has a memory.
     """
     structure, values = without_vanished_effects(model.structure, model.values)
+    _check_delays(structure)
     names = _Names()
     inputs = [names.quantity(s.name, s.name, s.unit, s.description) for s in structure.rig.inputs]
     if not structure.rig.is_driven:

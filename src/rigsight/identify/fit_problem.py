@@ -22,6 +22,7 @@ from rigsight.simulate import (
     Substeps,
     carries_tangents,
     choose_substeps,
+    differs_at_events,
     normal_equations,
     simulate_sets,
     simulate_tangents,
@@ -74,8 +75,7 @@ class Problem:
         self.coordinates = coordinates
         self.n_states = n_states
         self.upper = upper
-        # Dry friction carries tangents, unless states have ends or a sensor is late.
-        has_events = bool(np.any(data.limited)) or data.structure.measured_late is not None
+        has_events = bool(np.any(data.limited)) or differs_at_events(data.structure)
         self.steps = np.full(upper.size, STEP if has_events else FINE_STEP)
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
@@ -272,7 +272,7 @@ class Problem:
     def _products(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """Return per record the products of its residual and its derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
         data = self.data
-        if data.structure.measured_late is not None:
+        if data.structure.is_shifted or data.structure.histories:
             columns = [np.column_stack(parts) for parts in self.sensitivities(theta)]
             return [np.asarray(own.T @ own) for own in columns]
         fitted, lengths = self._fitted_records(), [record.record.n_samples for record in data.records]

@@ -7,6 +7,7 @@ from rigsight.simulate.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.simulation import carries_tangents as carries_tangents
 from rigsight.simulate.simulation import choose_substeps as choose_substeps
+from rigsight.simulate.simulation import differs_at_events as differs_at_events
 from rigsight.simulate.simulation import normal_equations as normal_equations
 from rigsight.simulate.simulation import parameter_vector as parameter_vector
 from rigsight.simulate.simulation import record_input as record_input
@@ -30,6 +31,7 @@ __all__ = [
     "carries_tangents",
     "choose_substeps",
     "compose",
+    "differs_at_events",
     "normal_equations",
     "parameter_vector",
     "record_input",

@@ -79,14 +79,6 @@ def _check_effects(rig: Rig, effects: tuple[Effect, ...]) -> None:
     for effect in effects:
         if not rig.offers(effect):
             raise InputError(f"Effect '{effect.name}' makes no sense on the rig '{rig.name}'.")
-        late_elsewhere = effect.measured_late is not None and rig.acts_at(effect) != rig.outputs[0].name
-        if late_elsewhere or (
-            (effect.delay is not None or effect.measured_late is not None) and not rig.has_one_motion
-        ):
-            raise InputError(
-                f"Effect '{effect.name}' cannot be simulated on the rig '{rig.name}': delays are those of a rig with one input, "
-                "one joint and no feedback, and of its first sensor."
-            )
     if len(set(names)) < len(names):
         raise InputError(f"An effect is named twice: {', '.join(names)}.")
 

@@ -9,6 +9,8 @@ from functools import cached_property
 
 import sympy as sp
 
+from rigsight.effects.symbols import positive_part
+
 
 class Kind(StrEnum):
     """What a named value of the equations is."""
@@ -160,6 +162,70 @@ class EquationTree:
         """Return an expression without definitions; what is late stands in it as if it arrived at once."""
         return expression.xreplace(self._values)
 
+    def remembering(self, expression: sp.Expr) -> sp.Expr:
+        """Return an expression without definitions but those in `remembered`, which stand in it under their own symbols."""
+        return expression.xreplace(self._remembering_values)
+
+    @cached_property
+    def remembered(self) -> tuple[sp.Symbol, ...]:
+        """What is late and has to be remembered while it is simulated, in the order of definition.
+
+        That is all that is late but two: the only input of a rig on its way into it, where the whole record is shifted; and a
+        reading that nothing else reads, which is shifted behind the simulation, if its rate has no jumps between samples.
+        """
+        delayed = [d.symbol for d in self.definitions if isinstance(d.expression, late)]
+        return tuple(s for s in delayed if not self._is_arrival(s) and not self._is_shown_late(s))
+
+    def _readers(self, symbol: sp.Symbol) -> tuple[list[sp.Symbol], bool, bool]:
+        """Return the definitions that read a symbol, and whether the motion or a state, and whether an output does."""
+        read = [d.symbol for d in self.definitions if symbol in d.expression.free_symbols]
+        moving = [*self.motion.mass, *(term for terms in self.motion.terms for term in terms)]
+        moving += [part for s in self.states for part in (*s.terms, s.limit or sp.Integer(0))]
+        shown = any(symbol in term.free_symbols for output in self.outputs for term in output.terms)
+        return read, any(symbol in expression.free_symbols for expression in moving), shown
+
+    def _is_arrival(self, symbol: sp.Symbol) -> bool:
+        """Return True for the only input on its way into the rig, which reads nothing of it as it is now."""
+        root, _ = self.lateness(symbol)
+        while root != symbol:
+            read, moves, shown = self._readers(root)
+            if (
+                len(self.inputs) != 1
+                or len(read) != 1
+                or moves
+                or shown
+                or root not in (*self.inputs, *self._expressions)
+            ):
+                return False
+            if not isinstance(self._expressions[read[0]], late):
+                return False
+            root = read[0]
+        return self.lateness(symbol)[0] in self.inputs
+
+    def _is_shown_late(self, symbol: sp.Symbol) -> bool:
+        """Return True for a reading that nothing else reads, and whose rate is one of states alone and without kinks."""
+        last, (reading, _) = symbol, self.lateness(symbol)
+        while True:
+            read, moves, shown = self._readers(last)
+            if moves or len(read) + shown != 1 or (shown and (last,) not in [o.terms for o in self.outputs]):
+                return False
+            if shown:
+                break
+            last = read[0]
+            if not isinstance(self._expressions[last], late):
+                return False
+        rate = self.rate_of(reading)
+        return not rate.free_symbols & set(self.inputs) and not rate.atoms(sp.sign, sp.Abs, positive_part)
+
+    def rate_of(self, reading: sp.Expr) -> sp.Expr:
+        """Return the time derivative of an expression of the states; what is late stands in it as if it arrived at once."""
+        motion, flat = self.motion, self.flattened(reading)
+        rates = dict(zip(motion.coordinates, motion.velocities, strict=True))
+        rates |= zip(motion.velocities, motion.accelerations, strict=True)
+        rates |= {state.symbol: state.rate for state in self.states}
+        present = [s for s in rates if s in flat.free_symbols]
+        return sum((sp.diff(flat, s) * self.flattened(rates[s]) for s in present), start=sp.Integer(0))
+
     def lateness(self, symbol: sp.Symbol) -> tuple[sp.Symbol, sp.Expr | None]:
         """Return what a symbol was before it was delayed, and by how much in all; None without a delay."""
         delays: list[sp.Expr] = []
@@ -171,6 +237,15 @@ class EquationTree:
     @cached_property
     def _expressions(self) -> Mapping[sp.Symbol, sp.Expr]:
         return {definition.symbol: definition.expression for definition in self.definitions}
+
+    @cached_property
+    def _remembering_values(self) -> Mapping[sp.Symbol, sp.Expr]:
+        values: dict[sp.Symbol, sp.Expr] = {}
+        for symbol, expression in self._expressions.items():
+            if symbol not in self.remembered:
+                now = expression.args[0] if isinstance(expression, late) else expression
+                values[symbol] = now.xreplace(values)
+        return values
 
     @cached_property
     def _values(self) -> Mapping[sp.Symbol, sp.Expr]:

@@ -88,13 +88,15 @@ class Kernel:
         self._one.argtypes = [
             _DOUBLES, _LONG, _DOUBLE, _LONG, _INT, _DOUBLE, _DOUBLES, _DOUBLES, _DOUBLE, _DOUBLES, _LONG, _INTS,
         ]  # fmt: skip
+        self.carries_tangents = hasattr(loaded, "tangent_equations")
+        """Whether `tangent_equations` and `simulate_tangents` can be called, or else `normal_equations`."""
+        if structure.histories:
+            return
         self._lanes = loaded.simulate_lanes
         self._lanes.restype = None
         self._lanes.argtypes = [
             _DOUBLES, _LONG, _DOUBLE, _LONG, _INTS, _DOUBLE, _DOUBLES, _LONG, _LONG, _DOUBLES, _DOUBLES,
         ]  # fmt: skip
-        self.carries_tangents = hasattr(loaded, "tangent_equations")
-        """Whether `tangent_equations` and `simulate_tangents` can be called, or else `normal_equations`."""
         if self.carries_tangents:
             self._tangents = loaded.tangent_equations
             self._tangents.restype = _INT
@@ -135,7 +137,7 @@ class Kernel:
         Returns
         -------
         status
-            0, or why it stopped: 1 for too many steps, 2 for a motion beyond the range of numbers.
+            0, or why it stopped: 1 for too many steps, 2 for a motion beyond the range of numbers, 3 for lack of memory.
         out
             What is computed at each sample, shape (n_samples, n_computed).
         state

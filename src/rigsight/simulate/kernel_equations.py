@@ -55,7 +55,9 @@ class KernelEquations:
             "live_rates": [gathered(rate, fixed) for rate in self._live_rates()],
             "speeds": speeds,
             "speed_slopes": [self._slope(speed) for speed in speeds],
-            "limits": [e.limit for e in structure.equations if e.limit is not None],
+            "limits": [e.limit for e in structure.remembering_equations if e.limit is not None],
+            "signals": [history.signal for history in structure.histories],
+            "delays": [history.delay for history in structure.histories],
             "delay": [structure.delay if structure.delay is not None else sp.Integer(0)],
         }
         flat, hoisted = hoist_constants(
@@ -65,7 +67,9 @@ class KernelEquations:
         self.constants: dict[sp.Symbol, sp.Expr] = hoisted
         remaining = iter(flat)
         self._groups = {name: [next(remaining) for _ in group] for name, group in groups.items()}
-        limited_states = (i for i, equation in enumerate(structure.equations) if equation.limit is not None)
+        limited_states = (
+            i for i, equation in enumerate(structure.remembering_equations) if equation.limit is not None
+        )
         self.limits = dict(zip(limited_states, self._groups["limits"], strict=True))
 
     def text(self, parameters: str, parameter_names: Sequence[str]) -> str:
@@ -80,7 +84,7 @@ class KernelEquations:
         """
         structure, frictions = self.structure, self.frozen.frictions
         single, dependent = self.frozen.single_friction, self.frozen.dependent_modes
-        n_states, n_modes = len(structure.states), len(self.frozen.modes)
+        n_states, n_modes, n_late = len(structure.states), len(self.frozen.modes), len(structure.histories)
         names = self._names
         prepare = dict(zip(structure.parameter_symbols, parameter_names, strict=True))
         switches = [*elements("g", n_modes), *elements("d", n_modes)]
@@ -104,6 +108,11 @@ class KernelEquations:
             "FRICTION_IS_SHOWN": int(self.friction_is_shown),
             "VELOCITY": (structure.velocity_index or 0) if single is None else single.velocity,
             "HAS_DELAY": int(structure.delay is not None),
+            "N_LATE": len(structure.histories),
+            "SIGNALS": function_body(
+                ("now", "x", "q", "w"), elements("w", n_late), self._groups["signals"], names
+            ),
+            "DELAYS": function_body(("q", "by"), elements("by", n_late), self._groups["delays"], names),
             "HAS_LIMITS": int(bool(self.limits) and n_modes > 0),
             "N_DEPENDENT": len(dependent),
             "DEPENDENT_MODES": ", ".join(map(str, dependent)) or "0",
@@ -228,6 +237,8 @@ class KernelEquations:
         return {
             **inputs,
             TIME: "now->time",
+            **{history.symbol: f"now->late[{i}]" for i, history in enumerate(self.structure.histories)},
+            **{rate: f"now->late_rate[{i}]" for i, rate in enumerate(self._late_rates)},
             **{
                 FrozenStructure.friction_sign(i): f"s[{own.mode}]"
                 for i, own in enumerate(self.frozen.frictions)
@@ -245,6 +256,20 @@ class KernelEquations:
     def _rate_symbols(self) -> tuple[sp.Symbol, ...]:
         return tuple(sp.Symbol(f"rate_{i}", real=True) for i in range(len(self.structure.states)))
 
+    @cached_property
+    def _late_rates(self) -> tuple[sp.Symbol, ...]:
+        return tuple(sp.Symbol(f"late_rate_{i}", real=True) for i in range(len(self.structure.histories)))
+
+    @property
+    def reads_late(self) -> str:
+        """For each signal that acts late which of them it reads itself, as an array of C."""
+        histories = self.structure.histories
+        rows = [
+            ", ".join(str(int(other.symbol in own.signal.free_symbols)) for other in histories)
+            for own in histories
+        ]
+        return ", ".join(f"{{{row}}}" for row in rows)
+
     def _slope(self, expression: sp.Expr) -> sp.Expr:
         """Return the total derivative of an expression by time, between events."""
         along = {
@@ -254,6 +279,7 @@ class KernelEquations:
         for i in range(len(self.structure.rig.inputs)):
             value, rate, curvature = input_symbols(i)
             along |= {value: rate, rate: curvature}
+        along |= {h.symbol: rate for h, rate in zip(self.structure.histories, self._late_rates, strict=True)}
         present = expression.free_symbols
         return sum(
             (sp.diff(expression, s) * rate for s, rate in along.items() if s in present), start=sp.Integer(0)
@@ -278,8 +304,15 @@ class KernelEquations:
         exact as long as its rate keeps its sign. The sign of a velocity that dry friction can hold is an argument.
         """
         structure = self.structure
-        held = {e.symbol: limited(e.symbol, e.limit) for e in structure.equations if e.limit is not None}
-        return [equation.rate.xreplace({**self._friction_signs, **held}) for equation in structure.equations]
+        held = {
+            e.symbol: limited(e.symbol, e.limit)
+            for e in structure.remembering_equations
+            if e.limit is not None
+        }
+        return [
+            equation.rate.xreplace({**self._friction_signs, **held})
+            for equation in structure.remembering_equations
+        ]
 
     @cached_property
     def _followed(self) -> dict[int, tuple[str, str]]:
@@ -288,12 +321,12 @@ class KernelEquations:
             input_symbols(i)[1]: (f"from->u[{i}]", f"now->u[{i}]")
             for i in range(len(self.structure.rig.inputs))
         }
-        for i, equation in enumerate(self.structure.equations):
+        for i, equation in enumerate(self.structure.remembering_equations):
             if equation.limit is None:
                 motions.setdefault(equation.rate, (f"x[{i}]", f"y[{i}]"))
         return {
             i: motions[equation.rate]
-            for i, equation in enumerate(self.structure.equations)
+            for i, equation in enumerate(self.structure.remembering_equations)
             if equation.limit is not None and equation.rate in motions
         }
 

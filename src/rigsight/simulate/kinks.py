@@ -89,7 +89,7 @@ class FrozenStructure:
     def friction_signs(self, structure: Structure) -> dict[sp.Expr, sp.Expr]:
         """Return the signs of velocities that dry friction can hold as the equations hold them, and the symbols for them."""
         found: dict[sp.Expr, sp.Expr] = {}
-        expressions = [*(e.rate for e in structure.equations), *structure.computed_outputs]
+        expressions = [*(e.rate for e in structure.remembering_equations), *structure.computed_outputs]
         for atom in set().union(*(expression.atoms(sp.sign) for expression in expressions)):
             argument = self.in_modes(atom.args[0])
             for index, own in enumerate(self.frictions):
@@ -124,7 +124,12 @@ class FrozenStructure:
 def freeze(structure: Structure) -> FrozenStructure:
     """Replace every Abs, sign and positive part in a structure's equations by a mode symbol."""
     constant = set(structure.parameter_symbols)
-    expressions = [*(state.limited_rate for state in structure.equations), *structure.computed_outputs]
+    expressions = [
+        *(state.limited_rate for state in structure.remembering_equations),
+        *structure.computed_outputs,
+    ]
+    # A kink of what acts later is an event when it happens: when it acts, the past has a corner there.
+    expressions += [history.signal for history in structure.histories]
     modes: dict[sp.Expr, sp.Symbol] = {}
     replacements = []
     while True:
@@ -150,10 +155,10 @@ def freeze(structure: Structure) -> FrozenStructure:
         }
         replacements.append(replacement)
         expressions = [expression.xreplace(replacement) for expression in expressions]
-    n_states = len(structure.states)
+    n_states, n_rates = len(structure.states), len(structure.states) + len(structure.computed_outputs)
     return FrozenStructure(
         rates=tuple(expressions[:n_states]),
-        outputs=tuple(expressions[n_states:]),
+        outputs=tuple(expressions[n_states:n_rates]),
         modes=tuple(modes.values()),
         switches=tuple(modes),
         frictions=_frictions(structure, modes, expressions),

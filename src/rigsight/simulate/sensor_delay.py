@@ -1,4 +1,4 @@
-"""What does a sensor that is late show of a simulated output?"""
+"""What do sensors that are late show of simulated outputs?"""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigsight.simulate.structure import Structure
 def as_measured(
     structure: Structure, p: NDArray[np.float64], out: NDArray[np.float64], held: HeldInput
 ) -> NDArray[np.float64]:
-    """Shift the first output by its sensor's delay; before the record the motion went on as it started.
+    """Shift outputs by the delays of their sensors; before the record the motion went on as it started.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def as_measured(
     p
         Parameter values, shape (n_parameters, n_sets).
     out
-        What the kernel computed, shape (n_samples, n_computed, n_sets); the last column is the rate of the first if it is late.
+        What the kernel computed, shape (n_samples, n_computed, n_sets); the last columns are the rates of those that are late.
     held
         Input of the simulation, for its sample time.
 
@@ -33,24 +33,36 @@ def as_measured(
     -------
     Shape (n_samples, n_outputs, n_sets), by cubic Hermite interpolation: of fourth order in the sample time.
     """
-    if structure.measured_late is None:
+    if not structure.is_shifted:
         return out
     n_samples = out.shape[0]
     visible = out[:, : len(structure.outputs)].copy()
     if n_samples < 2:
         return visible
     dt = held.interval * held.per_sample
-    delays = np.broadcast_to(_function(structure.parameter_symbols, structure.measured_late)(*p), p.shape[1])
-    value, rate = out[:, 0], out[:, -1] * dt
+    late = [(i, delay) for i, delay in enumerate(structure.shown_late) if delay is not None]
+    for column, (output, delay) in enumerate(late, len(structure.outputs)):
+        values = _function(structure.parameter_symbols, delay)(*p)
+        delays = np.broadcast_to(values, p.shape[1])
+        visible[:, output] = _shifted(out[:, output], out[:, column] * dt, delays / dt)
+    return visible
+
+
+def _shifted(
+    value: NDArray[np.float64], rise: NDArray[np.float64], delays: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return values, shape (n_samples, n_sets), so many samples late; `rise` is their slope per sample."""
+    n_samples = value.shape[0]
+    shifted = np.empty_like(value)
     for i, delay in enumerate(delays):
-        place = np.arange(n_samples) - float(delay) / dt
+        place = np.arange(n_samples) - float(delay)
         start = np.clip(np.floor(place).astype(np.int64), 0, n_samples - 2)
         s = place - start
-        x, v = value[:, i], rate[:, i]
+        x, v = value[:, i], rise[:, i]
         a, b, va, vb = x[start], x[start + 1], v[start], v[start + 1]
         inside = a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb)))
-        visible[:, 0, i] = np.where(s < 0.0, x[0] + v[0] * place, inside)
-    return visible
+        shifted[:, i] = np.where(s < 0.0, x[0] + v[0] * place, inside)
+    return shifted
 
 
 @lru_cache(maxsize=1024)

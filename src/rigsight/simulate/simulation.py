@@ -14,6 +14,7 @@ from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
 from rigsight.simulate.kernel import FittedRecord
 from rigsight.simulate.kernel_cache import kernel_of
+from rigsight.simulate.kinks import freeze
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
@@ -34,6 +35,7 @@ _SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 _REASONS = {
     1: "more than 20000 steps were needed within one sample; the model is too stiff or chatters",
     2: "the motion left the range of numbers; the model is unstable with these parameters",
+    3: "there is no memory for what its delays remember",
 }
 
 
@@ -193,17 +195,37 @@ def simulate_sets(
     n_samples
         Samples of the record.
     substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`.
+        Runge-Kutta steps per piece of the input, see `choose_substeps`. Where something acts late within the rig, each set is
+        simulated accurately, one after the other, and they are not read.
 
     Returns
     -------
     Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
     """
+    if structure.histories:
+        return _one_by_one(structure, held, p, initial_states, n_samples)
     steps = Substeps.per_piece(
         substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
     )
     out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
     return as_measured(structure, p, out, held)
+
+
+def _one_by_one(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+    n_samples: int,
+) -> NDArray[np.float64]:
+    """Return the outputs of sets that each have a past of their own, shape (n_samples, n_outputs, n_sets)."""
+    sets = []
+    for own, state in zip(p.T, initial_states.T, strict=True):
+        status, out, _ = kernel_of(structure).simulate_one(
+            held, own, _state_vector(structure, state), LOCAL_PER_GLOBAL * DEFAULT_ACCURACY, n_samples
+        )
+        sets.append(out if status == 0 else np.full_like(out, np.nan))
+    return as_measured(structure, p, np.stack(sets, axis=2), held)
 
 
 def normal_equations(
@@ -236,7 +258,7 @@ def normal_equations(
     ValueError
         If a sensor is late.
     """
-    if structure.measured_late is not None:
+    if structure.is_shifted or structure.histories:
         raise ValueError("What a late sensor shows is known once all of a record is simulated.")
     return kernel_of(structure).normal_equations(records, p, initial_states)
 
@@ -244,6 +266,13 @@ def normal_equations(
 def carries_tangents(structure: Structure) -> bool:
     """Return True if the kernel of a structure carries derivatives along, False if it takes differences of sets."""
     return kernel_of(structure).carries_tangents
+
+
+def differs_at_events(structure: Structure) -> bool:
+    """Return True where differences of sets have to be long: events and steps of each set lie elsewhere by a tolerance."""
+    if structure.is_shifted or structure.histories:
+        return True
+    return bool(freeze(structure).frictions) and not carries_tangents(structure)
 
 
 def tangent_equations(
@@ -341,6 +370,8 @@ def choose_substeps(
     SimulationError
         If no number of substeps up to `most` reaches it, or the accurate integrator itself fails.
     """
+    if structure.histories:
+        return Substeps(1)
     taken = np.zeros(held.n_pieces, dtype=np.intc)
     exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
     size = np.std(exact, axis=0) + 1e-300

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,6 +46,25 @@ class StateEquation:
 
 
 @dataclass(frozen=True)
+class History:
+    """A signal that acts late within the rig, so that its past is remembered.
+
+    Attributes
+    ----------
+    symbol
+        What stands for it where it acts.
+    signal
+        The signal, of states, inputs, parameters and other histories.
+    delay
+        Time by which it is late, of parameters.
+    """
+
+    symbol: sp.Symbol
+    signal: sp.Expr
+    delay: sp.Expr
+
+
+@dataclass(frozen=True)
 class Structure:
     """The equations of a rig with its effects.
 
@@ -70,38 +89,79 @@ class Structure:
 
     @cached_property
     def equations(self) -> tuple[StateEquation, ...]:
-        """The states with their rates, dimensions and limits: coordinates, velocities, then the others."""
+        """The states with their rates, dimensions and limits: coordinates, velocities, then the others.
+
+        What is late stands in them as if it arrived at once.
+        """
+        return self._equations(self.tree.flattened)
+
+    @cached_property
+    def remembering_equations(self) -> tuple[StateEquation, ...]:
+        """The same with the symbols of `histories`, as they are simulated."""
+        return self._equations(self.tree.remembering) if self.histories else self.equations
+
+    def _equations(self, flattened: Callable[[sp.Expr], sp.Expr]) -> tuple[StateEquation, ...]:
         tree, motion = self.tree, self.tree.motion
         coordinates = zip(motion.coordinates, motion.velocities, motion.dimensions, strict=True)
         velocities = zip(motion.velocities, motion.accelerations, motion.rate_dimensions, strict=True)
         return (
             *(StateEquation(*coordinate) for coordinate in coordinates),
-            *(StateEquation(symbol, tree.flattened(rate), size) for symbol, rate, size in velocities),
+            *(StateEquation(symbol, flattened(rate), size) for symbol, rate, size in velocities),
             *(
-                StateEquation(state.symbol, tree.flattened(state.rate), state.dimension, state.limit)
+                StateEquation(state.symbol, flattened(state.rate), state.dimension, state.limit)
                 for state in tree.states
             ),
         )
 
     @cached_property
     def outputs(self) -> tuple[sp.Expr, ...]:
-        """The rig's outputs as expressions."""
+        """The rig's outputs as expressions; what is late stands in them as if it arrived at once."""
         return tuple(self.tree.flattened(sp.Add(*output.terms)) for output in self.tree.outputs)
 
     @cached_property
-    def delay(self) -> sp.Expr | None:
-        """Time by which the input arrives late, or None."""
-        arriving = [
-            self.tree.lateness(d.symbol) for d in self.tree.definitions if isinstance(d.expression, late)
-        ]
-        delays = [delay for source, delay in arriving if source == INPUT]
-        return delays[-1] if delays else None
+    def histories(self) -> tuple[History, ...]:
+        """What acts late within the rig and is remembered while it is simulated."""
+        tree = self.tree
+        late_signals = {
+            d.symbol: d.expression.args for d in tree.definitions if isinstance(d.expression, late)
+        }
+        return tuple(
+            History(symbol, tree.remembering(late_signals[symbol][0]), late_signals[symbol][1])
+            for symbol in tree.remembered
+        )
 
     @cached_property
+    def shown_late(self) -> tuple[sp.Expr | None, ...]:
+        """For each output the time by which it is shown late behind the simulation, or None."""
+        delays = []
+        for output in self.tree.outputs:
+            reading = sp.Add(*output.terms)
+            known = reading in self.tree.remembered
+            delays.append(None if known else self.tree.lateness(reading)[1])
+        return tuple(delays)
+
+    @property
+    def is_shifted(self) -> bool:
+        """Whether outputs are known only once all of a record is simulated."""
+        return any(delay is not None for delay in self.shown_late)
+
+    @cached_property
+    def delay(self) -> sp.Expr | None:
+        """Time by which the only input arrives late, or None."""
+        tree = self.tree
+        arriving = [
+            tree.lateness(d.symbol)[1]
+            for d in tree.definitions
+            if isinstance(d.expression, late)
+            and d.symbol not in tree.remembered
+            and tree.lateness(d.symbol)[0] == INPUT
+        ]
+        return arriving[-1] if arriving else None
+
+    @property
     def measured_late(self) -> sp.Expr | None:
         """Time by which the first output is measured late, or None."""
-        reading = sp.Add(*self.tree.outputs[0].terms)
-        return self.tree.lateness(reading)[1]
+        return self.shown_late[0]
 
     @property
     def velocity_index(self) -> int | None:
@@ -113,14 +173,20 @@ class Structure:
         """Parameter names in order."""
         return tuple(parameter.name for parameter in self.parameters)
 
-    @property
+    @cached_property
     def computed_outputs(self) -> tuple[sp.Expr, ...]:
-        """The outputs, and behind them the rate of the first where it is measured late: it is interpolated with it."""
-        if self.measured_late is None:
-            return self.outputs
-        reading = self.outputs[0]
-        rate = sum((sp.diff(reading, s.symbol) * s.rate for s in self.equations), start=sp.Integer(0))
-        return (*self.outputs, rate)
+        """The outputs, and behind them the rates of those that are shown late: they are interpolated with them."""
+        shown = self.outputs
+        if self.histories:
+            shown = tuple(self.tree.remembering(sp.Add(*output.terms)) for output in self.tree.outputs)
+        rates = [
+            sum(
+                (sp.diff(reading, s.symbol) * s.rate for s in self.remembering_equations), start=sp.Integer(0)
+            )
+            for reading, delay in zip(shown, self.shown_late, strict=True)
+            if delay is not None
+        ]
+        return (*shown, *rates)
 
     @property
     def states(self) -> tuple[sp.Symbol, ...]:
