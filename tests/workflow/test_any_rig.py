@@ -147,6 +147,15 @@ def test_time_alone_simulates_a_rig_without_inputs(tmp_path: Path) -> None:
     assert angle.min() < -0.5
 
 
+@pytest.mark.parametrize("name", ["axis", "cart_pendulum"])
+def test_start_values_of_a_rig_file_are_where_it_starts(name: str) -> None:
+    coordinate, sensor = {"axis": ("x", "x"), "cart_pendulum": ("phi", "angle")}[name]
+    rig = rig_of_text(f"{rig_file_text(name)}\n[initial]\n{coordinate} = 0.3\n")
+    pendulum = {"m_c": 1.0, "m_p": 0.2, "s": 0.05, "I_p": 0.02, "k_u": 1.0, "d_c": 1.0, "d_p": 0.01}
+    values = {"m": 2.0, "d": 5.0, "k": 8.0} if name == "axis" else pendulum
+    assert simulated(rig, values, {"u": np.zeros(T.size)})[sensor][0] == 0.3
+
+
 def test_a_free_motion_needs_no_column_of_the_input(tmp_path: Path) -> None:
     write_train_campaign(tmp_path)
     record = simulated("drive_train", TRAIN, CURRENT)

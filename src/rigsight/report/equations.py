@@ -9,8 +9,9 @@ from markupsafe import Markup
 
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect
+from rigsight.report.declared import effect_of, rig_of
 from rigsight.report.wording import effect_label, sentence_case
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 from rigsight.simulate.printing.mathml import mathml_equation
 from rigsight.simulate.printing.shown import shown_equations
@@ -39,12 +40,14 @@ def equation_groups(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[E
     known
         Declared effects by name; nothing is returned where one of the simulation is missing.
     """
-    rig = RIGS.get(diagnosis.rig)
+    rig = rig_of(diagnosis)
     # What the given simulation had already stands in the model beside what was added.
     names = dict.fromkeys([*diagnosis.model.get("effects", ()), *diagnosis.effects])
-    if rig is None or not names.keys() <= known.keys():
+    effects = [effect_of(name, known) for name in names]
+    named = [effect for effect in effects if effect is not None]
+    if rig is None or len(named) < len(effects):
         return []
-    return equations_of(rig, [known[name] for name in names])
+    return equations_of(rig, named)
 
 
 def equations_of(rig: Rig, effects: Sequence[Effect]) -> list[EquationGroup]:

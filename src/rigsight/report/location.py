@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from rigsight import plot
 from rigsight.diagnose.gap_parts import AmplitudePart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
+from rigsight.report.declared import rig_of
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
 from rigsight.report.sections import output_label
@@ -22,7 +23,6 @@ from rigsight.report.wording import (
     stages_told,
     told_unit,
 )
-from rigsight.rigs import RIGS
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,12 @@ def _lacking(states: Sequence[StatePart]) -> str:
 
 def _motion(diagnosis: Diagnosis) -> str:
     """Return the name of the signal that is the displacement."""
-    rig = RIGS.get(diagnosis.rig)
-    return "x" if rig is None else (rig.outputs if rig.is_driven else rig.inputs)[0].name
+    rig = rig_of(diagnosis)
+    return (
+        "x"
+        if rig is None or not rig.has_one_motion
+        else (rig.outputs if rig.is_driven else rig.inputs)[0].name
+    )
 
 
 def _place(part: StatePart, motion: str) -> str:

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from rigsight import plot
 from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.report.declared import rig_of
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
 from rigsight.report.wording import listed, sentence_case, stage_names
-from rigsight.rigs import RIGS
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _PERIODS = 4
@@ -32,8 +32,8 @@ def loop_figures(diagnosis: Diagnosis) -> list[PageFigure]:
     diagnosis
         The result.
     """
-    rig = RIGS.get(diagnosis.rig)
-    if rig is None or rig.is_driven or diagnosis.windows is not None:
+    rig = rig_of(diagnosis)
+    if rig is None or rig.is_driven or not rig.has_one_motion or diagnosis.windows is not None:
         return []
     motion, force = rig.inputs[0].name, rig.outputs[0].name
     able = [trace for trace in diagnosis.traces if motion in trace.inputs and force in trace.measured]

@@ -24,9 +24,9 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.record_response import Method
 from rigsight.records import Record
 from rigsight.records.record import Hold, Kind
+from rigsight.report.declared import rig_of
 from rigsight.report.windowed_responses import windowed_response
 from rigsight.report.wording import stage_names
-from rigsight.rigs import RIGS
 
 _METHOD: Method = "local_rational"
 _FEWEST_LINES = 8
@@ -67,9 +67,9 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
     trace
         One of its records.
     """
-    rig = RIGS.get(diagnosis.rig)
+    rig = rig_of(diagnosis)
     signals = {*trace.inputs, *trace.measured}
-    if rig is None or not rig.is_driven:
+    if rig is None or not rig.is_driven or not rig.has_one_motion:
         return ()
     if not {rig.inputs[0].name, rig.outputs[0].name} <= signals:
         return ()

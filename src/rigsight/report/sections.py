@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
 from rigsight.diagnose.result import STAGES, Diagnosis, Estimate
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
+from rigsight.report.declared import effect_of, rig_of
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written, written_limits
 from rigsight.report.wording import (
@@ -23,7 +24,6 @@ from rigsight.report.wording import (
     sentence_case,
     stages_told,
 )
-from rigsight.rigs import RIGS
 
 if TYPE_CHECKING:
     from rigsight.plot import Figure
@@ -59,8 +59,8 @@ class FindingRow:
 def effect_summaries(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> list[tuple[str, str, str]]:
     """Return label, name and summary of every effect named; the summary of one that is not among the known is empty."""
     return [
-        (sentence_case(effect_label(name)), name, known[name].summary if name in known else "")
-        for name in diagnosis.effects
+        (sentence_case(effect_label(name)), name, effect.summary if effect is not None else "")
+        for name, effect in ((name, effect_of(name, known)) for name in diagnosis.effects)
     ]
 
 
@@ -214,7 +214,7 @@ def floor_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 def output_label(diagnosis: Diagnosis, output: str) -> str:
     """Return an output for people: ``"yaw angle psi"``; the bare name on a rig that is not ours."""
-    rig = RIGS.get(diagnosis.rig)
+    rig = rig_of(diagnosis)
     meaning = next((s.description for s in rig.outputs if s.name == output), "") if rig else ""
     return meaning if meaning.startswith(output) else f"{meaning} {output}".strip()
 
@@ -243,9 +243,12 @@ def other_notes(diagnosis: Diagnosis) -> list[str]:
 
 
 def _parameters(diagnosis: Diagnosis, known: Mapping[str, Effect]) -> Iterator[Parameter]:
-    rig = RIGS.get(diagnosis.rig)
+    rig = rig_of(diagnosis)
     if rig:
         yield from rig.parameters
     for name in (*diagnosis.model.get("effects", ()), *diagnosis.effects):
-        if name in known:
-            yield from known[name].parameters
+        effect = effect_of(name, known)
+        for parameter in () if effect is None else effect.parameters:
+            yield parameter
+            # Where two effects share a name, theirs is in front of it.
+            yield replace(parameter, name=f"{name}.{parameter.name}")

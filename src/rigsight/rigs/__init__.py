@@ -5,6 +5,7 @@ from rigsight.rigs.built_in import ELEMENT as ELEMENT
 from rigsight.rigs.built_in import RIGS as RIGS
 from rigsight.rigs.built_in import ROLLING as ROLLING
 from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
+from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
@@ -36,6 +37,7 @@ __all__ = [
     "Sensor",
     "Signal",
     "acceleration",
+    "declared_rig",
     "evaluated",
     "force_symbol",
     "joint_of",

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from typing import Any
 
 from rigsight.rigs.rig import Rig
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.rig_file import rig_of_tables, rig_of_text
 
 
 class BuiltInRigs(Mapping[str, Rig]):
@@ -27,6 +28,33 @@ class BuiltInRigs(Mapping[str, Rig]):
 
 
 RIGS = BuiltInRigs()
+
+
+def declared_rig(name: str, declaration: Mapping[str, Any], source: str = "declaration") -> Rig | None:
+    """Return the rig of a model or a result: the one that it declares, else a built-in one.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    declaration
+        The tables of its file; empty in a result that was written before rigs were carried along.
+    source
+        How messages call the declaration.
+
+    Returns
+    -------
+    None where nothing is declared and no built-in rig has the name.
+
+    Raises
+    ------
+    InputError
+        Naming the table and key of what is wrong in the declaration.
+    """
+    built_in = RIGS.get(name)
+    if not declaration or (built_in is not None and built_in.declaration == declaration):
+        return built_in
+    return rig_of_tables(declaration, source)
 
 
 def rig_file_text(name: str) -> str:

@@ -46,8 +46,8 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
     Shape (n_states,).
     """
     state = np.zeros(max(1, len(structure.states)))
-    if not structure.rig.has_one_motion:
-        inputs = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, :, 0]
+    if not structure.rig.has_one_motion or structure.rig.mechanism.initial:
+        inputs = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, : len(structure.rig.inputs), 0]
         given = {
             structure.states.index(symbol): _value(structure, p, value)
             for symbol, value in structure.rig.mechanism.initial.items()

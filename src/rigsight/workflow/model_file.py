@@ -12,7 +12,7 @@ from rigsight.discover.monomials import known_terms
 from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold
-from rigsight.rigs import RIGS, Rig, rig_of_tables
+from rigsight.rigs import Rig, declared_rig
 from rigsight.rigs.published import published_sets
 from rigsight.simulate import Structure, compose, structure_named
 from rigsight.simulate.model import SCHEMA_VERSION, Model
@@ -168,11 +168,9 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
 
 def _rig(path: Path, table: ModelTable, own_rigs: Iterable[Rig]) -> Rig:
     """Return the rig that a model declares, or names."""
-    built_in = RIGS.get(table.rig)
-    if built_in is not None and built_in.declaration == table.declaration:
-        return built_in
     if table.declaration:
-        rig = rig_of_tables(table.declaration, f"{path.name}: declaration")
+        rig = declared_rig(table.rig, table.declaration, f"{path.name}: declaration")
+        assert rig is not None
         if rig.name != table.rig:
             raise InputError(
                 f"{path.name}: rig: is '{table.rig}', but declaration.name '{rig.name}'. Write the same for both."
