@@ -243,7 +243,7 @@ class KernelEquations:
 
     @cached_property
     def _rate_symbols(self) -> tuple[sp.Symbol, ...]:
-        return tuple(sp.Symbol(f"rate_{i}", real=True) for i in range(len(self.structure.states)))
+        return tuple(sp.Symbol(f"rate {i}", real=True) for i in range(len(self.structure.states)))
 
     def _slope(self, expression: sp.Expr) -> sp.Expr:
         """Return the total derivative of an expression by time, between events."""
