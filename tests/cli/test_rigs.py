@@ -74,3 +74,31 @@ def test_a_command_that_cannot_take_every_rig_yet_says_so(
     assert f"'rigsight {command}' cannot take the rig" in stderr
     assert stderr.count("\n") == 1
     assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_a_rig_is_drawn(run, tmp_path, ending: str, start: bytes) -> None:
+    file = tmp_path / f"servo.{ending}"
+    assert run("rigs", "servo", "--picture", str(file))[0] == 0
+    assert file.read_bytes().startswith(start)
+
+
+def test_a_rig_of_ones_own_is_drawn(run, tmp_path: Path) -> None:
+    own, picture = tmp_path / "mine.toml", tmp_path / "mine.svg"
+    own.write_text(rig_file_text("drive_train").replace('"drive_train"', '"mine"'), "utf-8")
+    assert run("rigs", "mine", "--rigs", own, "--picture", picture)[0] == 0
+    assert "load_bearing" in picture.read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--picture", "a.png"), "Which rig is to be drawn?"),
+        (("servo", "--picture", "a.bmp"), "Allowed: '.png', '.svg'"),
+        (("servos", "--picture", "a.png"), "Did you mean 'servo'?"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_message(run, arguments: tuple[str, ...], told: str) -> None:
+    code, stdout, stderr = run("rigs", *arguments)
+    assert (code, stdout) == (2, "")
+    assert told in " ".join(stderr.split())

@@ -66,7 +66,7 @@ def test_every_pair_has_equations():
             rates = [*(state.limited_rate for state in structure.equations), *structure.outputs]
             free = set().union(*(rate.free_symbols for rate in rates))
             known = {*structure.parameter_symbols, *structure.states}
-            assert {s.name for s in free - known} <= {"input_value", "input_rate", "time"}
+            assert {s.name for s in free - known} <= {"input value", "input rate", "time now"}
 
 
 def test_vanished_effects_are_left_out(axis, axis_values, make_record):

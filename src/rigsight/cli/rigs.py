@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,23 +14,36 @@ from rigsight.cli.terminal import show_as_json
 
 def list_rigs(
     name: Annotated[
-        str | None, typer.Argument(help="Print this rig's file, to copy and change.", show_default="list all")
+        str | None,
+        typer.Argument(help="Print this rig's file, to copy and change.", show_default="list all"),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--picture", metavar="FILE", help="Draw the rig NAME instead, into a PNG or SVG file."),
     ] = None,
     rigs: OwnRigs = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """List the rigs that come with rigsight and check files of your own, or print the file of one.
+    """List the rigs that come with rigsight and check files of your own, print the file of one, or draw it.
 
     Exit code 2 and the place in the file if one of --rigs cannot be used.
     """
     with told(debug):
-        from rigsight.errors import check_option
+        from rigsight.errors import InputError, check_option
         from rigsight.rigs import rig_file_text
         from rigsight.workflow.own_rigs import known_rigs, own_rigs
 
         files = own_rigs(rigs or [])
         known = known_rigs(files.values())
+        if picture is not None:
+            from rigsight.workflow.rig_picture_file import write_rig_picture
+
+            if name is None:
+                raise InputError("Which rig is to be drawn? Name it: rigsight rigs NAME --picture FILE.png.")
+            written = str(write_rig_picture(known[check_option("Rig", name, known)], picture))
+            show_as_json({"name": name, "picture": written}) if json else typer.echo(written)
+            return
         if name is not None:
             own = {rig.name: file for file, rig in files.items()}
             check_option("Rig", name, known)

@@ -39,7 +39,7 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
     rng = np.random.default_rng(0)
     still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
     defaults = {p.name: p.default for p in (*rig.constants, *rig.parameters) if p.default is not None}
-    values = {f"p_{name}": value for name, value in {**defaults, **known}.items()}
+    values = {f"parameter {name}": value for name, value in {**defaults, **known}.items()}
     for _ in range(_DRAWS):
         numbers = [
             0.0 if symbol in still else values.get(str(symbol), float(rng.uniform(0.2, 0.8)))

@@ -20,6 +20,7 @@ from rigsight.report.quantities import Written
 from rigsight.report.record_views import record_views
 from rigsight.report.response_charts import amplitude_figures
 from rigsight.report.responses import record_responses
+from rigsight.report.rig_figure import rig_figure
 from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
@@ -80,6 +81,7 @@ def render_report(
             )
             if diagnosis.effects
             else "",
+            rig_figure=rig_figure(diagnosis),
             budget=sections.budget_figure(diagnosis),
             budget_rows=sections.budget_rows(diagnosis),
             path_sentence=diagnosis.localization.sentence.replace("->", "\u2192"),

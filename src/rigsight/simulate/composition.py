@@ -63,7 +63,7 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
     parameters = _parameters(rig, effects, unique, dict(fixed))
-    symbols = {p.name: sp.Symbol(f"p_{p.name}", real=True) for p in parameters}
+    symbols = {p.name: sp.Symbol(f"parameter {p.name}", real=True) for p in parameters}
     return Structure(
         rig=rig,
         effects=effects,

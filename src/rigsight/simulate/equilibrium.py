@@ -158,7 +158,7 @@ def _balance_of(key: _Key) -> _Balance:
     rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
     at_rest: dict[sp.Expr, sp.Expr] = dict.fromkeys((*rising, TIME), sp.Integer(0))
     still = {**at_rest, **dict.fromkeys(tree.motion.velocities, sp.Integer(0))}
-    before = [sp.Symbol(f"before_{i}", real=True) for i in range(len(states))]
+    before = [sp.Symbol(f"before {i}", real=True) for i in range(len(states))]
     moved = {**at_rest, **_moved(structure, before)}
     of_first_order = structure.equations[2 * len(tree.motion.coordinates) :]
     rates, remembers = [], False

@@ -22,7 +22,7 @@ def hoist_constants(
     hoisted: dict[sp.Expr, sp.Symbol] = {}
 
     def symbol_for(expression: sp.Expr) -> sp.Symbol:
-        return hoisted.setdefault(expression, sp.Symbol(f"q{len(hoisted)}", real=True))
+        return hoisted.setdefault(expression, sp.Symbol(f"constant {len(hoisted)}", real=True))
 
     def walk(expression: sp.Expr) -> sp.Expr:
         if expression.is_number:

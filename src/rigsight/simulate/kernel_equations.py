@@ -254,7 +254,7 @@ class KernelEquations:
 
     @cached_property
     def _rate_symbols(self) -> tuple[sp.Symbol, ...]:
-        return tuple(sp.Symbol(f"rate_{i}", real=True) for i in range(len(self.structure.states)))
+        return tuple(sp.Symbol(f"rate {i}", real=True) for i in range(len(self.structure.states)))
 
     @cached_property
     def _late_rates(self) -> tuple[sp.Symbol, ...]:

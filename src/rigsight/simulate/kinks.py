@@ -84,7 +84,7 @@ class FrozenStructure:
     @staticmethod
     def friction_sign(index: int) -> sp.Symbol:
         """Return the symbol that stands for the sign of one of the frictions, or for its multiplier while it sticks."""
-        return sp.Symbol(f"friction_sign_{index}", real=True)
+        return sp.Symbol(f"friction sign {index}", real=True)
 
     def friction_signs(self, structure: Structure) -> dict[sp.Expr, sp.Expr]:
         """Return the signs of velocities that dry friction can hold as the equations hold them, and the symbols for them."""
@@ -139,7 +139,7 @@ def freeze(structure: Structure) -> FrozenStructure:
         argument = kink.args[0]
         flipped = argument.could_extract_minus_sign()
         switch = -argument if flipped else argument
-        mode = modes.setdefault(switch, sp.Symbol(f"mode_{len(modes)}", real=True))
+        mode = modes.setdefault(switch, sp.Symbol(f"mode {len(modes)}", real=True))
         powers = {
             power: absolute(switch) ** power.exp
             for expression in expressions

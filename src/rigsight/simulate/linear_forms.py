@@ -48,7 +48,7 @@ def linear_forms(
     def factor(derivative: sp.Expr) -> sp.Expr:
         if derivative.is_number or derivative in constants:
             return derivative
-        return factors.setdefault(derivative, sp.Symbol(f"d{len(factors)}", real=True))
+        return factors.setdefault(derivative, sp.Symbol(f"factor {len(factors)}", real=True))
 
     sums = []
     for expression in expressions:

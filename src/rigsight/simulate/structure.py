@@ -13,11 +13,11 @@ from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate.equation_tree import EquationTree, late, rate_within
 
-INPUT = sp.Symbol("input_value", real=True)
-INPUT_RATE = sp.Symbol("input_rate", real=True)
-INPUT_CURVATURE = sp.Symbol("input_curvature", real=True)
-"""The first input of a rig, and its first and second derivative by time."""
-TIME = sp.Symbol("time", real=True)
+INPUT = sp.Symbol("input value", real=True)
+INPUT_RATE = sp.Symbol("input rate", real=True)
+INPUT_CURVATURE = sp.Symbol("input curvature", real=True)
+"""The first input of a rig, and its first and second derivative by time; names of a rig hold no blank, so none is called so."""
+TIME = sp.Symbol("time now", real=True)
 
 
 def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
@@ -25,7 +25,7 @@ def input_symbols(index: int) -> tuple[sp.Symbol, sp.Symbol, sp.Symbol]:
     if index == 0:
         return INPUT, INPUT_RATE, INPUT_CURVATURE
     value, rate, curvature = (
-        sp.Symbol(f"{s.name}_{index}", real=True) for s in (INPUT, INPUT_RATE, INPUT_CURVATURE)
+        sp.Symbol(f"{s.name} {index}", real=True) for s in (INPUT, INPUT_RATE, INPUT_CURVATURE)
     )
     return value, rate, curvature
 

@@ -13,7 +13,7 @@ from rigsight.simulate.linear_forms import linear_forms, slope
 from rigsight.simulate.printing.c import C, limited
 from rigsight.simulate.structure import INPUT, INPUT_RATE
 
-_EARLIER = sp.Symbol("earlier_input", real=True)
+_EARLIER = sp.Symbol("earlier input", real=True)
 
 
 def carries_tangents(equations: KernelEquations) -> bool:
@@ -45,7 +45,7 @@ def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
     arriving = {INPUT: INPUT + _EARLIER * INPUT_RATE} if structure.delay is not None else {}
     rates, outputs = [rate.xreplace(arriving) for rate in equations.lane_rates], equations.outputs
     groups: dict[str, tuple[Sequence[str], Sequence[sp.Expr], Mapping[sp.Symbol, sp.Symbol]]] = {
-        "RATE": (elements("r", n), rates, {**of_states, _EARLIER: real("earlier")}),
+        "RATE": (elements("r", n), rates, {**of_states, _EARLIER: real("(earlier)")}),
         "OUTPUT": (elements("r", len(outputs)), outputs, of_states),
         "DELAY": (["const lanes delay"], equations.delay, {}),
     }
