@@ -233,7 +233,7 @@ class Lineup:
         self, index: int, record: Record, p: Floats | None = None, x0: Floats | None = None
     ) -> Floats:
         """Return the outputs along a record, shape (n_samples, n_outputs), with sets behind where `p` and `x0` have several."""
-        sets = self._p[:, None] if p is None else p
+        sets = self._with_own_constants(record, self._p[:, None] if p is None else p)
         states = self._first[index][:, None] if x0 is None else x0
         held = record_input(self._structure, record)
         with np.errstate(all="ignore"):
@@ -241,6 +241,13 @@ class Lineup:
                 self._structure, held, sets, states, record.n_samples, self._fit.substeps[index]
             )
         return out[:, :, 0] if p is None else out
+
+    def _with_own_constants(self, record: Record, p: Floats) -> Floats:
+        """Return parameter sets, shape (n_parameters, n_sets), with the constants that a record has of its own."""
+        own = p.copy()
+        for name, value in record.constants.items():
+            own[self._structure.names.index(name)] = value
+        return own
 
     def _free_answers(self) -> list[list[Floats]]:
         """Return the answers to small changes of the free parameters, and of each record's initial states."""

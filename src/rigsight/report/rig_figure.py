@@ -9,7 +9,7 @@ from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import Place, kind_of
 from rigsight.report.figures import PageFigure, page_figure
 from rigsight.report.wording import effect_label, listed
-from rigsight.rigs import RIGS, Rig, reading_symbol
+from rigsight.rigs import Rig, declared_rig, reading_symbol
 
 _LEAST = 0.05
 """Probability from which another candidate's place is colored; below it, it is no rival (95 % are accounted for)."""
@@ -17,8 +17,8 @@ _UNEXPLAINED = "unexplained"
 
 
 def rig_figure(diagnosis: Diagnosis) -> PageFigure | None:
-    """Return the picture of the rig with the suspected places marked; None for a rig that does not come with the package."""
-    rig = RIGS.get(diagnosis.rig)
+    """Return the picture of the rig with the suspected places marked; None for a rig that nothing declares."""
+    rig = declared_rig(diagnosis.rig, diagnosis.model.get("declaration", {}))
     if rig is None:
         return None
     marks = suspected_places(diagnosis, rig)
