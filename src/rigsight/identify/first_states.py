@@ -174,8 +174,6 @@ def _equilibrium(equations: RigEquations, u: Floats, p: Floats) -> Floats:
     values = dict(zip(equations.structure.names, p, strict=True))
     for symbol, expression in equations.rig.mechanism.initial.items():
         state[equations.state_names.index(symbol.name)] = evaluated(expression, values)
-    for own in equations.rig.mechanism.states:
-        state[equations.state_names.index(own.name)] = evaluated(own.start, values)
     held = np.ones(state.size, dtype=bool)
     held[n : 2 * n] = False
     resting = np.where(held, state, 0.0)

@@ -106,6 +106,10 @@ def _check_references(declaration: Declaration) -> None:
     free = [name for name, own in table.coordinates.items() if own.prescribed_by is None]
     known = [*free, *map(rate_name, free), *table.states]
     for name in table.initial:
+        if name in table.states and table.states[name].start is not None:
+            declaration.refuse(
+                ("initial", name), f"'{name}' starts twice: states.{name}.start says it too; take one out"
+            )
         if name in known:
             continue
         if (

@@ -96,13 +96,19 @@ def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
                 symbols[name],
                 sympy(("states", name, "rate")),
                 own.unit,
-                sympy(("states", name, "start")),
                 own.about,
             )
             for name, own in table.states.items()
         ),
         signals={symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"},
-        initial={symbols[name]: sympy(("initial", name)) for name in table.initial},
+        initial={
+            **{symbols[name]: sympy(("initial", name)) for name in table.initial},
+            **{
+                symbols[name]: sympy(("states", name, "start"))
+                for name, own in table.states.items()
+                if own.start is not None
+            },
+        },
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
     )
 

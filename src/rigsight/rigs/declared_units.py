@@ -52,7 +52,8 @@ class _Units:
         for name, state in self._table.states.items():
             measured = dimension(state.unit)
             self._is(("states", name, "rate"), measured / self._second, "as the unit of the state demands")
-            self._is(("states", name, "start"), measured, "as the state is")
+            if state.start is not None:
+                self._is(("states", name, "start"), measured, "as the state is")
         for name, alternative in self._table.alternatives.items():
             gives = alternative.gives
             self._is(("alternatives", name, "value"), self._dimensions[gives], f"as {gives} is")

@@ -132,8 +132,6 @@ class RateState:
         Its time derivative.
     unit
         SI unit.
-    start
-        Its value at the start of a record.
     about
         What it is.
     """
@@ -141,7 +139,6 @@ class RateState:
     symbol: sp.Symbol
     rate: sp.Expr
     unit: str
-    start: sp.Expr = sp.S.Zero
     about: str = ""
 
     @property

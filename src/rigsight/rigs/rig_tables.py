@@ -81,7 +81,7 @@ class _SensorTable(_Table):
 class _StateTable(_Table):
     rate: Formula
     unit: Text
-    start: Formula = 0.0
+    start: Formula | None = None
     about: Text = ""
 
 

@@ -1,4 +1,4 @@
-"""Static equilibrium from which a record starts when nothing else is known."""
+"""Where does a record start when nothing else is known? Where the rig says, and in static equilibrium."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ TOLERANCE = 1e-9
 
 
 def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
-    """Return the static equilibrium at the first input sample, reached from rest without memory.
+    """Return the states at the start of a record: those that the rig gives, and all others in static equilibrium with them.
 
-    The input is raised slowly from zero, so that hysteresis and friction hold what they would on a rig. A rig without a
-    spring has no equilibrium: it starts at its rest position.
+    That is the equilibrium under the first sample of the inputs, reached from rest without memory: they are raised slowly from
+    zero, so that hysteresis and friction hold what they would on a rig. A rig without a spring has no equilibrium: it starts at
+    its rest position.
 
     Parameters
     ----------
@@ -45,15 +46,25 @@ def rest_state(structure: Structure, p: NDArray[np.float64], held: HeldInput) ->
     -------
     Shape (n_states,).
     """
-    state = np.zeros(max(1, len(structure.states)))
-    if not structure.rig.has_one_motion or structure.rig.mechanism.initial:
+    states = structure.states
+    given = {
+        states.index(symbol): _value(structure, p, value)
+        for symbol, value in structure.rig.mechanism.initial.items()
+        if symbol in states
+    }
+    moving = {states.index(rate) for rate in structure.tree.motion.velocities}
+    if structure.rig.has_one_motion and not set(given) - moving:
+        state = _risen(structure, p, held)
+    else:
         inputs = held.coefficients.reshape(held.n_pieces + 1, -1, 4)[0, : len(structure.rig.inputs), 0]
-        given = {
-            structure.states.index(symbol): _value(structure, p, value)
-            for symbol, value in structure.rig.mechanism.initial.items()
-            if symbol in structure.states
-        }
-        return equilibrium(structure, p, inputs, given)
+        state = equilibrium(structure, p, inputs, given)
+    state[list(given)] = list(given.values())
+    return state
+
+
+def _risen(structure: Structure, p: NDArray[np.float64], held: HeldInput) -> NDArray[np.float64]:
+    """Return where a rig of one motion rests after a slow rise of its input, simulated with much damping."""
+    state = np.zeros(max(1, len(structure.states)))
     motion = structure.rig.motion
     if motion.inertia is None:
         return state

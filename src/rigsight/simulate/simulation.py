@@ -1,8 +1,8 @@
-"""Simulate a structure for a record's input: one parameter set accurately, or many side by side."""
+"""Simulate a structure for a record's input: one parameter set, accurately."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,14 +12,11 @@ from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
-from rigsight.simulate.kernel import FittedRecord
 from rigsight.simulate.kernel_cache import kernel_of
-from rigsight.simulate.kinks import freeze
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.structure import Structure
-from rigsight.simulate.substeps import Substeps
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""
@@ -28,9 +25,6 @@ LOCAL_PER_GLOBAL = 0.03
 
 Ten times as much costs a tenth less time, and is five times beside the wish where dry friction sticks and slips in a wide sweep.
 """
-_CAUTION = 0.6
-"""Share of the predicted number of substeps that is tried first."""
-_SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 
 _REASONS = {
     1: "more than 20000 steps were needed within one sample; the model is too stiff or chatters",
@@ -65,7 +59,7 @@ def simulate(
     record: Record,
     initial_state: NDArray[np.float64] | None = None,
     accuracy: float = DEFAULT_ACCURACY,
-    before: NDArray[np.float64] | None = None,
+    before: NDArray[np.float64] | Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Record:
     """Simulate a record's input and return the outputs as a record of the same form.
 
@@ -82,21 +76,27 @@ def simulate(
     accuracy
         Relative RMS error to aim for.
     before
-        Input samples (the prescribed displacement, where there is one) just before the record at its sample time, shape
-        (n_before,): what hysteresis, friction and delays remember. The initial state is then that at the first of them.
+        Input samples (the prescribed displacement, where there is one) just before the record at its sample time: what
+        hysteresis, friction and delays remember. Shape (n_before, n_inputs) in the order of the rig's inputs, (n_before,) of a
+        rig with one input, or the samples of each input by its name. The initial state is then that at the first of them.
 
     Raises
     ------
+    InputError
+        If `before` is not samples of each of the rig's inputs.
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
-    if before is not None and len(before) > 0:
-        source = structure.rig.inputs[0].name
-        earlier = np.concatenate([before, record[source]])
-        longer = replace(record, signals={source: earlier}, t0=record.t0 - len(before) * record.dt)
+    if before is not None:
+        earlier = _before(structure, before)
+        n_before = next(iter(earlier.values())).size
+        if n_before == 0:
+            return simulate(structure, values, record, initial_state, accuracy)
+        signals = {name: np.concatenate([samples, record[name]]) for name, samples in earlier.items()}
+        longer = replace(record, signals=signals, t0=record.t0 - n_before * record.dt)
         whole = simulate(structure, values, longer, initial_state, accuracy)
         names = [signal.name for signal in structure.rig.outputs]
-        return record.with_signals(**{name: whole[name][len(before) :] for name in names})
+        return record.with_signals(**{name: whole[name][n_before:] for name in names})
     complete = structure
     structure, values = without_vanished_effects(complete, record_values(complete, values, record))
     held = record_input(structure, record)
@@ -110,6 +110,32 @@ def simulate(
     outputs = simulate_outputs(structure, held, p, initial_state, record.n_samples, accuracy)
     names = [signal.name for signal in structure.rig.outputs]
     return record.with_signals(**{name: outputs[:, i] for i, name in enumerate(names)})
+
+
+def _before(
+    structure: Structure, before: NDArray[np.float64] | Mapping[str, NDArray[np.float64]]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the samples of each input before the record, by its name."""
+    inputs = [signal.name for signal in structure.rig.inputs]
+    if not inputs:
+        raise InputError(
+            f"'before' holds samples of inputs; {structure.rig.name} has none. Give its initial state instead."
+        )
+    wanted = f"{structure.rig.name} has the inputs {', '.join(inputs)}"
+    if isinstance(before, Mapping):
+        if set(before) != set(inputs):
+            raise InputError(f"'before' holds {', '.join(before) or 'nothing'}; {wanted}.")
+        columns = [np.asarray(before[name], dtype=np.float64) for name in inputs]
+    else:
+        samples = np.asarray(before, dtype=np.float64)
+        columns = list((samples[:, None] if samples.ndim == 1 else samples).T)
+    shapes = {column.shape for column in columns}
+    if len(columns) != len(inputs) or len(shapes) != 1 or len(next(iter(shapes))) != 1:
+        raise InputError(
+            f"'before' has the shape {np.shape(before) if not isinstance(before, Mapping) else sorted(shapes)}; {wanted}: "
+            f"give (n_before, {len(inputs)}) samples, or as many of each by its name."
+        )
+    return dict(zip(inputs, columns, strict=True))
 
 
 def record_values(structure: Structure, values: Mapping[str, float], record: Record) -> dict[str, float]:
@@ -164,7 +190,7 @@ def simulate_outputs(
         If the motion leaves the range of numbers or the model is too stiff.
     """
     status, out, _ = kernel_of(structure).simulate_one(
-        held, p, _state_vector(structure, initial_state), LOCAL_PER_GLOBAL * accuracy, n_samples, taken
+        held, p, state_vector(structure, initial_state), LOCAL_PER_GLOBAL * accuracy, n_samples, taken
     )
     if status != 0:
         effects = ", ".join(structure.effect_names) or "no effect"
@@ -172,227 +198,6 @@ def simulate_outputs(
     return as_measured(structure, p[:, None], out[:, :, None], held)[:, :, 0]
 
 
-def simulate_sets(
-    structure: Structure,
-    held: HeldInput,
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    n_samples: int,
-    substeps: int | Substeps,
-) -> NDArray[np.float64]:
-    """Simulate many parameter sets side by side.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects.
-    held
-        Input between its samples.
-    p
-        Shape (n_parameters, n_sets).
-    initial_states
-        Shape (n_states, n_sets).
-    n_samples
-        Samples of the record.
-    substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`. Where something acts late within the rig, each set is
-        simulated accurately, one after the other, and they are not read.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
-    """
-    if structure.histories:
-        return _one_by_one(structure, held, p, initial_states, n_samples)
-    steps = Substeps.per_piece(
-        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
-    )
-    out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
-    return as_measured(structure, p, out, held)
-
-
-def _one_by_one(
-    structure: Structure,
-    held: HeldInput,
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    n_samples: int,
-) -> NDArray[np.float64]:
-    """Return the outputs of sets that each have a past of their own, shape (n_samples, n_outputs, n_sets)."""
-    sets = []
-    for own, state in zip(p.T, initial_states.T, strict=True):
-        status, out, _ = kernel_of(structure).simulate_one(
-            held, own, _state_vector(structure, state), LOCAL_PER_GLOBAL * DEFAULT_ACCURACY, n_samples
-        )
-        sets.append(out if status == 0 else np.full_like(out, np.nan))
-    return as_measured(structure, p, np.stack(sets, axis=2), held)
-
-
-def normal_equations(
-    structure: Structure,
-    records: Sequence[FittedRecord],
-    p: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the products of weighted residuals and differences that a step of least squares needs of some records.
-
-    Their outputs are never kept: for many records and sets these go through the memory for longer than they take to compute.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects that carry no tangents; no sensor is late, as what it shows is interpolated between samples afterwards.
-    records
-        What is fitted.
-    p
-        Shape (n_parameters, n_sets).
-    initial_states
-        Shape (n_records, n_states, n_sets).
-
-    Returns
-    -------
-    Shape (n_records, n_sets, n_sets), see `Kernel.normal_equations`.
-
-    Raises
-    ------
-    ValueError
-        If a sensor is late.
-    """
-    if structure.is_shifted or structure.histories:
-        raise ValueError("What a late sensor shows is known once all of a record is simulated.")
-    return kernel_of(structure).normal_equations(records, p, initial_states)
-
-
-def carries_tangents(structure: Structure) -> bool:
-    """Return True if the kernel of a structure carries derivatives along, False if it takes differences of sets."""
-    return kernel_of(structure).carries_tangents
-
-
-def differs_at_events(structure: Structure) -> bool:
-    """Return True where differences of sets have to be long: events and steps of each set lie elsewhere by a tolerance."""
-    if structure.is_shifted or structure.histories:
-        return True
-    return bool(freeze(structure).frictions) and not carries_tangents(structure)
-
-
-def tangent_equations(
-    structure: Structure,
-    records: Sequence[FittedRecord],
-    p: NDArray[np.float64],
-    dp: NDArray[np.float64],
-    initial_states: NDArray[np.float64],
-    initial_slopes: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the products of weighted residuals and their derivatives that a step of least squares needs of some records.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects, which carry tangents.
-    records
-        What is fitted.
-    p
-        Shape (n_parameters,).
-    dp
-        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
-    initial_states
-        Shape (n_records, n_states).
-    initial_slopes
-        Their derivatives, shape (n_states, n_directions); the same for all records.
-
-    Returns
-    -------
-    Shape (n_records, 1 + n_directions, 1 + n_directions), see `Kernel.tangent_equations`.
-    """
-    return kernel_of(structure).tangent_equations(records, p, dp, initial_states, initial_slopes)
-
-
-def simulate_tangents(
-    structure: Structure,
-    held: HeldInput,
-    p: NDArray[np.float64],
-    dp: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
-    initial_slope: NDArray[np.float64],
-    n_samples: int,
-    substeps: int | Substeps,
-) -> NDArray[np.float64]:
-    """Simulate one parameter set with its derivatives by any directions of parameters and initial states.
-
-    They are those of the equations, carried along with the motion: the reversal of a velocity under dry friction and the jump of
-    a held input that arrives late included. No step is chosen.
-
-    Parameters
-    ----------
-    structure
-        Rig and effects, which carry tangents.
-    held
-        Input between its samples.
-    p
-        Shape (n_parameters,).
-    dp
-        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
-    initial_state
-        Shape (n_states,).
-    initial_slope
-        Its derivatives, shape (n_states, n_directions).
-    n_samples
-        Samples of the record.
-    substeps
-        Runge-Kutta steps per piece of the input, see `choose_substeps`.
-
-    Returns
-    -------
-    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, and behind them their derivatives; NaN or infinity where the
-    simulation diverges.
-    """
-    steps = Substeps.per_piece(
-        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
-    )
-    return kernel_of(structure).simulate_tangents(held, p, dp, initial_state, initial_slope, steps, n_samples)
-
-
-def choose_substeps(
-    structure: Structure,
-    held: HeldInput,
-    p: NDArray[np.float64],
-    initial_state: NDArray[np.float64],
-    n_samples: int,
-    accuracy: float,
-    most: int = _SUBSTEPS[-1],
-) -> Substeps:
-    """Return few substeps whose error against the accurate integrator is below `accuracy`, fewest where the motion is slow.
-
-    Kinks make the error fall with the square of the step; numbers that this rule excludes are not tried.
-
-    Raises
-    ------
-    SimulationError
-        If no number of substeps up to `most` reaches it, or the accurate integrator itself fails.
-    """
-    if structure.histories:
-        return Substeps(1)
-    taken = np.zeros(held.n_pieces, dtype=np.intc)
-    exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
-    size = np.std(exact, axis=0) + 1e-300
-    state = np.asarray(initial_state, dtype=np.float64)[:, None]
-    least = 1.0
-    for substeps in (number for number in _SUBSTEPS if number <= most):
-        if substeps < least:
-            continue
-        steps = Substeps(substeps, taken)
-        fast = simulate_sets(structure, held, p[:, None], state, n_samples, steps)[:, :, 0]
-        with np.errstate(over="ignore", invalid="ignore"):
-            error = float(np.max(np.sqrt(np.mean((fast - exact) ** 2, axis=0)) / size))
-        if error <= accuracy:
-            return steps
-        if np.isfinite(error):
-            least = _CAUTION * substeps * np.sqrt(error / accuracy)
-    raise SimulationError(
-        f"{most} substeps per sample do not reach a relative accuracy of {accuracy:g}; "
-        f"the model is too stiff for its sample time."
-    )
-
-
-def _state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
+def state_vector(structure: Structure, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the states that a kernel begins with."""
     return np.asarray(state, dtype=np.float64)[: max(1, len(structure.states))]

@@ -1,0 +1,249 @@
+"""Simulate many parameter sets of a structure for a fit: side by side, or one with its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import SimulationError
+from rigsight.simulate.input_hold import HeldInput
+from rigsight.simulate.kernel import FittedRecord
+from rigsight.simulate.kernel_cache import kernel_of
+from rigsight.simulate.kinks import freeze
+from rigsight.simulate.sensor_delay import as_measured
+from rigsight.simulate.simulation import (
+    DEFAULT_ACCURACY,
+    LOCAL_PER_GLOBAL,
+    simulate_outputs,
+    state_vector,
+)
+from rigsight.simulate.structure import Structure
+from rigsight.simulate.substeps import Substeps
+
+_CAUTION = 0.6
+"""Share of the predicted number of substeps that is tried first."""
+_SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+
+
+def simulate_sets(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+    n_samples: int,
+    substeps: int | Substeps,
+) -> NDArray[np.float64]:
+    """Simulate many parameter sets side by side.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    held
+        Input between its samples.
+    p
+        Shape (n_parameters, n_sets).
+    initial_states
+        Shape (n_states, n_sets).
+    n_samples
+        Samples of the record.
+    substeps
+        Runge-Kutta steps per piece of the input, see `choose_substeps`. Where something acts late within the rig, each set is
+        simulated accurately, one after the other, and they are not read.
+
+    Returns
+    -------
+    Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
+    """
+    if structure.histories:
+        return _one_by_one(structure, held, p, initial_states, n_samples)
+    steps = Substeps.per_piece(
+        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
+    )
+    out = kernel_of(structure).simulate_lanes(held, p, initial_states, steps, n_samples)
+    return as_measured(structure, p, out, held)
+
+
+def _one_by_one(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+    n_samples: int,
+) -> NDArray[np.float64]:
+    """Return the outputs of sets that each have a past of their own, shape (n_samples, n_outputs, n_sets)."""
+    sets = []
+    for own, state in zip(p.T, initial_states.T, strict=True):
+        status, out, _ = kernel_of(structure).simulate_one(
+            held, own, state_vector(structure, state), LOCAL_PER_GLOBAL * DEFAULT_ACCURACY, n_samples
+        )
+        sets.append(out if status == 0 else np.full_like(out, np.nan))
+    return as_measured(structure, p, np.stack(sets, axis=2), held)
+
+
+def normal_equations(
+    structure: Structure,
+    records: Sequence[FittedRecord],
+    p: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the products of weighted residuals and differences that a step of least squares needs of some records.
+
+    Their outputs are never kept: for many records and sets these go through the memory for longer than they take to compute.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects that carry no tangents; no sensor is late, as what it shows is interpolated between samples afterwards.
+    records
+        What is fitted.
+    p
+        Shape (n_parameters, n_sets).
+    initial_states
+        Shape (n_records, n_states, n_sets).
+
+    Returns
+    -------
+    Shape (n_records, n_sets, n_sets), see `Kernel.normal_equations`.
+
+    Raises
+    ------
+    ValueError
+        If a sensor is late.
+    """
+    if structure.is_shifted or structure.histories:
+        raise ValueError("What a late sensor shows is known once all of a record is simulated.")
+    return kernel_of(structure).normal_equations(records, p, initial_states)
+
+
+def carries_tangents(structure: Structure) -> bool:
+    """Return True if the kernel of a structure carries derivatives along, False if it takes differences of sets."""
+    return kernel_of(structure).carries_tangents
+
+
+def differs_at_events(structure: Structure) -> bool:
+    """Return True where differences of sets have to be long: events and steps of each set lie elsewhere by a tolerance."""
+    if structure.is_shifted or structure.histories:
+        return True
+    return bool(freeze(structure).frictions) and not carries_tangents(structure)
+
+
+def tangent_equations(
+    structure: Structure,
+    records: Sequence[FittedRecord],
+    p: NDArray[np.float64],
+    dp: NDArray[np.float64],
+    initial_states: NDArray[np.float64],
+    initial_slopes: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the products of weighted residuals and their derivatives that a step of least squares needs of some records.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects, which carry tangents.
+    records
+        What is fitted.
+    p
+        Shape (n_parameters,).
+    dp
+        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
+    initial_states
+        Shape (n_records, n_states).
+    initial_slopes
+        Their derivatives, shape (n_states, n_directions); the same for all records.
+
+    Returns
+    -------
+    Shape (n_records, 1 + n_directions, 1 + n_directions), see `Kernel.tangent_equations`.
+    """
+    return kernel_of(structure).tangent_equations(records, p, dp, initial_states, initial_slopes)
+
+
+def simulate_tangents(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    dp: NDArray[np.float64],
+    initial_state: NDArray[np.float64],
+    initial_slope: NDArray[np.float64],
+    n_samples: int,
+    substeps: int | Substeps,
+) -> NDArray[np.float64]:
+    """Simulate one parameter set with its derivatives by any directions of parameters and initial states.
+
+    They are those of the equations, carried along with the motion: the reversal of a velocity under dry friction and the jump of
+    a held input that arrives late included. No step is chosen.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects, which carry tangents.
+    held
+        Input between its samples.
+    p
+        Shape (n_parameters,).
+    dp
+        Derivatives of the parameters by each direction, shape (n_parameters, n_directions).
+    initial_state
+        Shape (n_states,).
+    initial_slope
+        Its derivatives, shape (n_states, n_directions).
+    n_samples
+        Samples of the record.
+    substeps
+        Runge-Kutta steps per piece of the input, see `choose_substeps`.
+
+    Returns
+    -------
+    Shape (n_samples, n_outputs, 1 + n_directions): the outputs, and behind them their derivatives; NaN or infinity where the
+    simulation diverges.
+    """
+    steps = Substeps.per_piece(
+        substeps if isinstance(substeps, Substeps) else Substeps(substeps), held.n_pieces
+    )
+    return kernel_of(structure).simulate_tangents(held, p, dp, initial_state, initial_slope, steps, n_samples)
+
+
+def choose_substeps(
+    structure: Structure,
+    held: HeldInput,
+    p: NDArray[np.float64],
+    initial_state: NDArray[np.float64],
+    n_samples: int,
+    accuracy: float,
+    most: int = _SUBSTEPS[-1],
+) -> Substeps:
+    """Return few substeps whose error against the accurate integrator is below `accuracy`, fewest where the motion is slow.
+
+    Kinks make the error fall with the square of the step; numbers that this rule excludes are not tried.
+
+    Raises
+    ------
+    SimulationError
+        If no number of substeps up to `most` reaches it, or the accurate integrator itself fails.
+    """
+    if structure.histories:
+        return Substeps(1)
+    taken = np.zeros(held.n_pieces, dtype=np.intc)
+    exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
+    size = np.std(exact, axis=0) + 1e-300
+    state = np.asarray(initial_state, dtype=np.float64)[:, None]
+    least = 1.0
+    for substeps in (number for number in _SUBSTEPS if number <= most):
+        if substeps < least:
+            continue
+        steps = Substeps(substeps, taken)
+        fast = simulate_sets(structure, held, p[:, None], state, n_samples, steps)[:, :, 0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            error = float(np.max(np.sqrt(np.mean((fast - exact) ** 2, axis=0)) / size))
+        if error <= accuracy:
+            return steps
+        if np.isfinite(error):
+            least = _CAUTION * substeps * np.sqrt(error / accuracy)
+    raise SimulationError(
+        f"{most} substeps per sample do not reach a relative accuracy of {accuracy:g}; "
+        f"the model is too stiff for its sample time."
+    )
