@@ -72,6 +72,23 @@ def test_an_arm_with_two_inputs_goes_round(tmp_path: Path) -> None:
         assert np.max(np.abs(found[:, column] - record[name])) < 1e-9
 
 
+def test_a_road_that_prescribes_a_motion_goes_round(tmp_path: Path) -> None:
+    values = {"m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 10.0}
+    record = simulated("quarter_car", values, {"road": 0.02 * np.sin(6.0 * T) ** 3}, m_b=250.0)
+    write_record(tmp_path / "a.csv", record, ("road", "travel", "body"))
+    (tmp_path / "model.json").write_text(json_text(make_model("quarter_car", values).to_json()), "utf-8")
+    out = tmp_path / "out.csv"
+    run_simulate(tmp_path / "model.json", tmp_path / "a.csv", out, constants={"m_b": 250.0})
+    assert out.read_text().startswith("t,road,travel,body\n")
+    found = np.loadtxt(out, delimiter=",", skiprows=1)
+    assert np.max(np.abs(found[:, 3] - record["body"])) < 1e-9 * np.ptp(record["body"])
+    np.savetxt(
+        tmp_path / "b.csv", np.column_stack([T, record["body"]]), delimiter=",", header="t,body", comments=""
+    )
+    with pytest.raises(InputError, match="no column 'road'"):
+        run_simulate(tmp_path / "model.json", tmp_path / "b.csv", out)
+
+
 def test_a_model_carries_its_rig() -> None:
     own = rig_of_text(rig_file_text("servo").replace('name = "servo"', 'name = "elbow"'))
     made = make_model(own, {"J": 0.02, "k_v": 3.0, "d": 0.2})
