@@ -166,7 +166,9 @@ class _Path:
                 self._drive(drives[name])
             else:
                 self._sensor(sensors[name], {}, [])
-        return tuple(self._bound(expression) for expression in expressions)
+        bound = tuple(self._bound(expression) for expression in expressions)
+        tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
+        return tuple(map(tree.flattened, bound))
 
     def _inputs(self) -> tuple[sp.Symbol, ...]:
         mechanism, found = self._rig.mechanism, []
