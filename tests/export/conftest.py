@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from rigsight.effects import CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.excitation import linear_sweep
 from rigsight.records import Hold, Record
-from rigsight.rigs import RIGS, Rig, read_rig_file
+from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose, record_input, simulate
 from rigsight.simulate.kinks import freeze
 from rigsight.simulate.model import Model
@@ -144,11 +143,6 @@ PLANS: dict[str, _Plan] = {effect.name: _Plan("running_gear", (effect.name,)) fo
 """Every effect of the catalogue on the running gear, and what the rigs, places, holds and starts add."""
 
 
-def rig_named(name: str) -> Rig:
-    file = Path(__file__).parents[1] / "rigs" / "files" / f"{name}.toml"
-    return RIGS[name] if name in RIGS else read_rig_file(file)
-
-
 def _at_its_place(name: str) -> Effect:
     kind, _, place = name.partition("@")
     return placed(effect_named(kind), place) if place else effect_named(kind)
@@ -175,7 +169,7 @@ def fed(structure: Structure, record: Record) -> tuple[NDArray[np.float64], ...]
 @cache
 def made_case(name: str) -> Case:
     plan = PLANS[name]
-    structure = compose(rig_named(plan.rig), [_at_its_place(effect) for effect in plan.effects])
+    structure = compose(RIGS[plan.rig], [_at_its_place(effect) for effect in plan.effects])
     known: dict[str, float] = dict(RIG_VALUES[plan.rig])
     for effect in structure.effects:
         own = EFFECT_VALUES[kind_of(effect.name)]

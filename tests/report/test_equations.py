@@ -5,7 +5,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
-from pathlib import Path
 from xml.dom import minidom
 
 import pytest
@@ -16,7 +15,7 @@ from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.effects.symbols import v, x
 from rigsight.report.equations import equation_groups, equations_of, known_effects
 from rigsight.report.wording import effect_label, sentence_case
-from rigsight.rigs import RIGS, read_rig_file
+from rigsight.rigs import RIGS
 
 
 def groups(diagnosis: Diagnosis, rig: str, effects: Sequence[Effect]) -> dict[str, list[str]]:
@@ -102,12 +101,10 @@ def test_effects_are_chained_along_the_signal_path_whatever_their_order(diagnosi
 
 
 def shown_of(rig: str, *effects: str) -> dict[str, list[str]]:
-    file = Path(__file__).parents[1] / "rigs" / "files" / f"{rig}.toml"
-    own = RIGS[rig] if rig in RIGS else read_rig_file(file)
     chosen = [
         placed(effect_named(kind), place) for kind, _, place in (name.partition("@") for name in effects)
     ]
-    return {g.title: [spoken(equation) for equation in g.equations] for g in equations_of(own, chosen)}
+    return {g.title: [spoken(equation) for equation in g.equations] for g in equations_of(RIGS[rig], chosen)}
 
 
 def test_each_coordinate_has_a_line_and_an_effect_acts_where_it_is() -> None:
