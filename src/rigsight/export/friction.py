@@ -27,7 +27,7 @@ def slope_symbol(index: int) -> sp.Symbol:
 
 
 def slip_rate(exported: Exported) -> sp.Expr:
-    """Return the time derivative of the velocity that dry friction can hold, of states, inputs and the states' rates; 0 without."""
+    """Return the time derivative of the velocity that dry friction can hold, by the rates of the states; 0 without friction."""
     mode = friction_mode(exported)
     if mode is None:
         return sp.S.Zero

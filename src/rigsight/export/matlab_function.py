@@ -305,7 +305,8 @@ def _body(target: str, expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol,
 
 
 def _pieces(exported: Exported, inputs: list[str]) -> str:
-    lines, functions = [], {}
+    lines: list[str] = []
+    functions: dict[str, str] = {}
     for i, source in enumerate(exported.sources):
         kind = exported.hold if source.rate is None else "cubic"
         call = (

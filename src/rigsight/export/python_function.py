@@ -215,7 +215,8 @@ def _slopes(exported: Exported) -> dict[sp.Symbol, str]:
 
 
 def _pieces(exported: Exported, inputs: list[str]) -> str:
-    lines, functions = [], {}
+    lines: list[str] = []
+    functions: dict[str, str] = {}
     for source in exported.sources:
         if source.rate is None:
             lines.append(_PIECES[exported.hold].format(name=source.value.name))

@@ -79,6 +79,7 @@ def variation_sweep(
     dt = 2.0 * math.pi / (_SAMPLES_PER_PERIOD * stop)
     duration = math.log(stop / start) / (_GROWTH * slowest)
     t = dt * np.arange(round(duration / dt) + 1, dtype=np.float64)
+    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
     units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
     record = Record(
         name=f"sweep of {amplitude:g} {units[pair.source]}",
@@ -92,7 +93,8 @@ def variation_sweep(
         units=units,
         kind="sweep",
         amplitude=amplitude,
-        hold=model.hold,
+        # A motion that is prescribed is smooth between its samples, whatever holds an input.
+        hold="band_limited" if pair.source in prescribing else model.hold,
     )
     return record, SpectralRatio(pair.source, pair.response, np.geomspace(*band, _N_FREQUENCIES))
 
