@@ -24,8 +24,8 @@ MODELICA = _words(
     redeclare replaceable return stream then time true type when while within"""
 )
 _OF_TEMPLATES = _words(
-    """input_value input_rate input_curvature friction_sign sign_of rates switches outputs limits modes state math np control numbers
-    given max min abs sign pi eps delay"""
+    """input_value input_rate input_curvature friction_sign sign_of rates switches outputs limits modes state math np control
+    numbers given max min abs sign pi eps delay"""
 )
 _C_MACROS = _words(
     """BUFSIZ EOF EXIT_FAILURE EXIT_SUCCESS EXPORTED FILENAME_MAX FOPEN_MAX FP_INFINITE FP_NAN FP_NORMAL FP_SUBNORMAL FP_ZERO
