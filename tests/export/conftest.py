@@ -133,6 +133,17 @@ PLANS: dict[str, _Plan] = {effect.name: _Plan("running_gear", (effect.name,)) fo
         values={"quadratic_damping@motor_bearing.c_2": 1e-3, "quadratic_damping@load_bearing.c_2": 2e-3, "T_m": 0.02},
     ),
     "friction at a motor": _Plan("drive_train", ("coulomb_friction@motor_bearing",), values={"T_c": 0.01}),
+    "friction at a load": _Plan("drive_train", ("coulomb_friction@load_bearing",), values={"T_c": 0.02}),
+    "friction in a shaft": _Plan(
+        "drive_train", ("stribeck_friction@shaft",), values={"T_c": 0.01, "T_s": 0.02, "w_s": 0.1}, hold="zoh"
+    ),
+    "friction at two joints": _Plan(
+        "drive_train", ("coulomb_friction@motor_bearing", "coulomb_friction@load_bearing"),
+        values={"coulomb_friction@motor_bearing.T_c": 0.01, "coulomb_friction@load_bearing.T_c": 0.02},
+    ),
+    "friction between a wheel and a body": _Plan(
+        "quarter_car", ("coulomb_friction@suspension",), values={"T_c": 300.0}, amplitude=0.02
+    ),
     "a saturated control law": _Plan("servo", amplitude=1.5),
     "a control law behind lags": _Plan("servo", ("sensor_lag@angle", "actuator_lag@motor"), first=0.4, amplitude=0.5),
     "a mass matrix of coordinates": _Plan("two_link_arm", ("input_dead_zone@elbow_motor",), first=0.1, amplitude=0.3),

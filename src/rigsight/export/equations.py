@@ -127,7 +127,7 @@ class Exported:
     @property
     def frictions(self) -> tuple[int, ...]:
         """Indices of the modes that are signs of velocities which dry friction can hold at zero."""
-        return () if self.frozen.friction_mode is None else (self.frozen.friction_mode,)
+        return tuple(friction.mode for friction in self.frozen.frictions)
 
     @property
     def limits(self) -> dict[int, sp.Expr]:

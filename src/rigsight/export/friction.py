@@ -13,6 +13,11 @@ def friction_mode(exported: Exported) -> int | None:
     return exported.frictions[0] if exported.frictions else None
 
 
+def friction_sign(exported: Exported) -> sp.Symbol:
+    """Return the symbol of this velocity's sign in outputs; while the friction sticks it stands for the share that holds."""
+    return exported.frozen.friction_sign(0)
+
+
 def held_velocity(exported: Exported) -> int | None:
     """Return the index of the state that this velocity is; None where it is made of several."""
     mode = friction_mode(exported)

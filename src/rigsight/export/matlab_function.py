@@ -10,7 +10,7 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import Balance
-from rigsight.export.friction import friction_mode, held_velocity, slip_rate, slope_symbol
+from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.precomputed import equations_of
 from rigsight.export.python_function import min_steps
 from rigsight.simulate.printing.matlab import MATLAB
@@ -139,6 +139,12 @@ stroke = one - other;
 g = switches(m.p, value, rate, curvature, time, m.x, m.s);
 share = g({friction}) / slip_rate(m, piece, begin, tau, m.x, stroke);
 m.x = m.x - share * stroke;"""
+_FRICTION_SIGN = """friction_sign = m.s({friction});
+if ~m.moving
+  [forward, backward] = leaves(m, piece, begin, tau, m.x);
+  friction_sign = min(max((backward + forward) / (backward - forward), -1), 1);
+end
+"""
 _KEEP_HELD = """  if ~m.moving
     found({friction}) = m.s({friction});
   end
@@ -244,7 +250,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         "MIN_STEPS": min_steps(exported),
         "RATES": _body("r", equations.rates, {**names, **modes}),
         "SWITCHES": _body("g", equations.switches, {**names, **modes}),
-        "OUTPUTS": _body("y", equations.outputs, names),
+        "OUTPUTS": _body("y", equations.outputs, {**names, friction_sign(exported): "friction_sign"}),
         "PIECES": _pieces(exported, inputs),
         "WITHOUT_MODES": "" if frozen.modes else "  m.x = x_new;\n  return\n",
         **friction,
@@ -277,6 +283,7 @@ def _friction(exported: Exported) -> dict[str, str]:
     """Return what belongs to the sticking of dry friction, by mark; empty texts without it."""
     mode, velocity = friction_mode(exported), held_velocity(exported)
     texts = {
+        "FRICTION_SIGN": _FRICTION_SIGN,
         "KEEP_HELD": _KEEP_HELD,
         "HOLD_AT_REST": _HOLD_AT_REST,
         "HELD_SLOPE": _HELD_SLOPE,

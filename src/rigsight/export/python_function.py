@@ -10,7 +10,7 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text, indented
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import Balance
-from rigsight.export.friction import friction_mode, held_velocity, slip_rate, slope_symbol
+from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
 from rigsight.export.precomputed import equations_of
 from rigsight.simulate.printing.python import PYTHON
@@ -144,7 +144,9 @@ def python_function(exported: Exported, source: str) -> str:
         ),
         "RATES": _returned(unpack, list(equations.rates), every),
         "SWITCHES": _returned(unpack, list(equations.switches), every),
-        "OUTPUTS": _returned(unpack, list(equations.outputs), names),
+        "OUTPUTS": _returned(
+            unpack, list(equations.outputs), {**names, friction_sign(exported): "friction_sign"}
+        ),
         "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **_slopes(exported)}),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
