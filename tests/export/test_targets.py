@@ -35,7 +35,7 @@ def test_friction_that_sticks_at_several_joints_is_refused_where_the_file_integr
     with pytest.raises(
         InputError, match=r"'coulomb_friction@.*cannot be exported to .*Targets with it: .*c, fmu"
     ):
-        export_model(case_named("friction at two joints").model, target, source="model.json")
+        export_model(case_named("friction at two joints").model, target, source="model.json", name="rig")
 
 
 def test_an_effect_that_has_vanished_is_left_out(case_named):
