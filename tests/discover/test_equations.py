@@ -37,7 +37,7 @@ def test_sliders_are_printed_with_their_limits() -> None:
 
 def test_a_state_without_limits_has_none_printed() -> None:
     text, latex = equations(compose(AXIS, [effect_named("bouc_wen_hysteresis")]), {"n": 1.0, "A": 1.0})
-    assert text[1] == "z' = -beta z |x'| - gamma x' |z| + x'"
+    assert text[1] == "z' = x' - beta z |x'| - gamma x' |z|"
     assert not any("within" in line for line in text)
     assert not any(r"\leq" in line for line in latex)
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.effects import CATALOGUE, effect_named
+from rigsight.effects import CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.excitation import linear_sweep
 from rigsight.records import Hold, Record
 from rigsight.rigs import RIGS
-from rigsight.simulate import compose, record_input, simulate
+from rigsight.simulate import Structure, compose, record_input, simulate
 from rigsight.simulate.kinks import freeze
 from rigsight.simulate.model import Model
 
@@ -27,6 +27,15 @@ RIG_VALUES: Mapping[str, Mapping[str, float]] = {
     },
     "axis": {"gain": 1.0, "m": 1.0, "d": 0.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0},
     "element": {"d": 2.0, "k": 100.0, "force_off": 0.3},
+    "drive_train": {
+        "k_t": 0.05, "J_m": 1e-3, "J_l": 3e-3, "k_s": 2.0, "d_s": 2e-3, "d_m": 4e-3, "d_l": 4e-3, "k_l": 1.0,
+    },
+    "servo": {"m": 1.0, "l": 0.15, "k_p": 2.0, "J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.05},
+    "two_link_arm": {
+        "l_1": 0.3, "g": 9.81, "I_1": 0.05, "I_2": 0.02, "m_2": 0.6, "s_1": 0.12, "s_2": 0.08, "d_1": 0.05, "d_2": 0.02,
+    },
+    "quarter_car": {"m_b": 300.0, "m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 100.0},
+    "cart_pendulum": {"g": 9.81, "m_c": 0.8, "m_p": 0.3, "s": 0.08, "I_p": 0.03, "k_u": 2.0, "d_c": 3.0, "d_p": 0.01},
 }  # fmt: skip
 EFFECT_VALUES: Mapping[str, Mapping[str, float]] = {
     "bouc_wen_hysteresis": {"A": 1.0, "a": 0.48, "beta": 736.0, "gamma": -716.0, "n": 1.0},
@@ -116,37 +125,83 @@ PLANS: dict[str, _Plan] = {effect.name: _Plan("running_gear", (effect.name,)) fo
     "element": _Plan("element", amplitude=0.01),
     "element with hysteresis": _Plan("element", ("bouc_wen_hysteresis",), amplitude=0.01),
     "element with sliders": _Plan("element", ("iwan_hysteresis", "coulomb_friction"), amplitude=0.01),
+    "two masses": _Plan("drive_train"),
+    "two masses held constant": _Plan("drive_train", ("cubic_stiffness@shaft",), hold="zoh", values={"k_3": 50.0}),
+    "play in a shaft": _Plan("drive_train", ("backlash@shaft", "input_dead_zone@motor"), values={"g": 0.01}),
+    "one effect twice": _Plan(
+        "drive_train", ("quadratic_damping@motor_bearing", "quadratic_damping@load_bearing", "sensor_lag@load_angle"),
+        values={"quadratic_damping@motor_bearing.c_2": 1e-3, "quadratic_damping@load_bearing.c_2": 2e-3, "T_m": 0.02},
+    ),
+    "friction at a motor": _Plan("drive_train", ("coulomb_friction@motor_bearing",), values={"T_c": 0.01}),
+    "friction at a load": _Plan("drive_train", ("coulomb_friction@load_bearing",), values={"T_c": 0.02}),
+    "friction in a shaft": _Plan(
+        "drive_train", ("stribeck_friction@shaft",), values={"T_c": 0.01, "T_s": 0.02, "w_s": 0.1}, hold="zoh"
+    ),
+    "friction at two joints": _Plan(
+        "drive_train", ("coulomb_friction@motor_bearing", "coulomb_friction@load_bearing"),
+        values={"coulomb_friction@motor_bearing.T_c": 0.01, "coulomb_friction@load_bearing.T_c": 0.02},
+    ),
+    "friction between a wheel and a body": _Plan(
+        "quarter_car", ("coulomb_friction@suspension",), values={"T_c": 300.0}, amplitude=0.02
+    ),
+    "a saturated control law": _Plan("servo", amplitude=1.5),
+    "a control law behind lags": _Plan("servo", ("sensor_lag@angle", "actuator_lag@motor"), first=0.4, amplitude=0.5),
+    "a mass matrix of coordinates": _Plan("two_link_arm", ("input_dead_zone@elbow_motor",), first=0.1, amplitude=0.3),
+    "an arm held constant": _Plan("two_link_arm", ("quadratic_damping@elbow",), values={"c_2": 0.05}, hold="zoh"),
+    "a prescribed road": _Plan("quarter_car", ("cubic_stiffness@suspension",), values={"k_3": 4e6}, amplitude=0.02),
+    "a coupled pendulum": _Plan("cart_pendulum", amplitude=3.0),
 }  # fmt: skip
-"""Every effect of the catalogue on the running gear, and what the rigs, holds and starts add."""
+"""Every effect of the catalogue on the running gear, and what the rigs, places, holds and starts add."""
+
+
+def _at_its_place(name: str) -> Effect:
+    kind, _, place = name.partition("@")
+    return placed(effect_named(kind), place) if place else effect_named(kind)
+
+
+def fed(structure: Structure, record: Record) -> tuple[NDArray[np.float64], ...]:
+    """Return what an export is fed: inputs, and the rates of those that prescribe a motion."""
+    coefficients = record_input(structure, record).coefficients.reshape(record.n_samples, -1, 4)[1:]
+    prescribing = {coordinate.prescribed_by for coordinate in structure.rig.mechanism.prescribed}
+    columns: list[NDArray[np.float64]] = []
+    for i, source in enumerate(structure.rig.inputs):
+        if source.name not in prescribing:
+            columns.append(record[source.name])
+            continue
+        pieces = coefficients[:, i]
+        end = pieces[-1]
+        columns += [
+            np.append(pieces[:, 0], np.polyval(end[::-1], DT)),
+            np.append(pieces[:, 1], end[1] + DT * (2.0 * end[2] + 3.0 * DT * end[3])),
+        ]
+    return tuple(columns)
 
 
 @cache
 def made_case(name: str) -> Case:
     plan = PLANS[name]
-    structure = compose(RIGS[plan.rig], [effect_named(effect) for effect in plan.effects])
+    structure = compose(RIGS[plan.rig], [_at_its_place(effect) for effect in plan.effects])
     known: dict[str, float] = dict(RIG_VALUES[plan.rig])
     for effect in structure.effects:
-        own = EFFECT_VALUES[effect.name]
+        own = EFFECT_VALUES[kind_of(effect.name)]
         known |= {structure.parameter_name(effect, key): value for key, value in own.items()}
     known |= plan.values or {}
     model = Model(structure, {key: known[key] for key in structure.names}, plan.hold)
     t = DT * np.arange(N_SAMPLES)
-    signal = plan.first + plan.amplitude * linear_sweep(t, 1.0, 3.0, 40.0)
-    source = structure.rig.inputs[0]
+    sources = structure.rig.inputs
+    signals = {
+        source.name: plan.first + plan.amplitude * linear_sweep(t, 1.0, 3.0 + 2.0 * i, 40.0)
+        for i, source in enumerate(sources)
+    }
     record = Record(
-        name=name, dt=DT, signals={source.name: signal}, units={source.name: source.unit}, hold=plan.hold
+        name=name,
+        dt=DT,
+        signals=signals,
+        units={source.name: source.unit for source in sources},
+        hold=plan.hold,
     )
-    held = record_input(structure, record)
-    inputs = (signal,)
-    if not structure.rig.is_driven:
-        pieces = held.coefficients[1:]
-        end = pieces[-1]
-        inputs = (
-            np.append(pieces[:, 0], np.polyval(end[::-1], DT)),
-            np.append(pieces[:, 1], end[1] + DT * (2.0 * end[2] + 3.0 * DT * end[3])),
-        )
     return Case(
-        name, model, t, inputs,
+        name, model, t, fed(structure, record),
         reference=simulate(structure, model.values, record, accuracy=1e-9),
         as_told=simulate(structure, model.values, record),
         smooth=not freeze(structure).modes,

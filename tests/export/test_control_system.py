@@ -6,6 +6,7 @@ import control
 import numpy as np
 import pytest
 
+from rigsight.effects import kind_of
 from rigsight.export import export_model
 
 REFUSED = {"coulomb_friction", "stribeck_friction", "input_delay", "sensor_delay"}
@@ -20,13 +21,13 @@ def system_of(case):
 
 
 def test_it_gives_the_outputs_of_the_engine(case):
-    if REFUSED.intersection(case.model.structure.effect_names):
+    if REFUSED.intersection(map(kind_of, case.model.structure.effect_names)):
         pytest.skip("friction and delays are refused, which test_targets.py tests")
-    if case.model.hold == "zoh" or case.inputs[0][0] != 0.0 or not case.model.structure.rig.is_driven:
+    if case.model.hold == "zoh" or case.inputs[0][0] != 0.0 or case.model.structure.rig.mechanism.prescribed:
         pytest.skip("python-control interpolates linearly and starts at rest without input")
     system, rest = system_of(case)
     response = control.input_output_response(
-        system, case.t, case.inputs[0], rest,
+        system, case.t, np.array(case.inputs), rest,
         solve_ivp_kwargs={"method": "DOP853", "rtol": 1e-10, "atol": 1e-14, "max_step": case.t[1] / 4},
     )  # fmt: skip
     simulated = dict(zip(case.outputs, response.outputs.reshape(len(case.outputs), -1), strict=True))
@@ -47,6 +48,13 @@ def test_it_can_be_linearized(case_named):
     poles = system.linearize(np.array(rest), [0.0]).poles()
     values = case.model.values
     assert np.prod(poles).real == pytest.approx(values["k"] / values["m"], rel=1e-4)
+
+
+def test_inputs_and_outputs_of_a_larger_rig_have_their_names(case_named):
+    system, _ = system_of(case_named("a mass matrix of coordinates"))
+    assert system.input_labels == ["tau_1", "tau_2"]
+    assert system.output_labels == ["angle_1", "angle_2"]
+    assert system.state_labels == ["q_1", "q_2", "d_q_1", "d_q_2"]
 
 
 def test_a_prescribed_motion_has_two_inputs(case_named):

@@ -12,6 +12,8 @@ import pytest
 
 from rigsight.export import export_model
 
+SEVERAL = "friction at two joints"
+
 
 def module_of(text: str) -> dict[str, Any]:
     space: dict[str, Any] = {}
@@ -24,6 +26,8 @@ def exported(case, **options) -> dict[str, Any]:
 
 
 def test_it_gives_the_outputs_of_the_engine(case):
+    if case.name == SEVERAL:
+        pytest.skip("several frictions are refused, which test_targets.py tests")
     simulated = exported(case)["simulate"](case.t, *case.inputs)
     assert tuple(simulated) == case.outputs
     assert max(case.errors(simulated).values()) <= 1e-6

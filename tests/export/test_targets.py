@@ -28,6 +28,16 @@ def test_every_effect_is_written_or_refused_by_name(name: str, target: str, case
         assert export_model(model, target, source="model.json", name="rig")
 
 
+@pytest.mark.parametrize("target", ["python", "matlab", "control", "modelica"])
+def test_friction_that_sticks_at_several_joints_is_refused_where_the_file_integrates_by_itself(
+    target: str, case_named
+):
+    with pytest.raises(
+        InputError, match=r"'coulomb_friction@.*cannot be exported to .*Targets with it: .*c, fmu"
+    ):
+        export_model(case_named("friction at two joints").model, target, source="model.json", name="rig")
+
+
 def test_an_effect_that_has_vanished_is_left_out(case_named):
     model = case_named("coulomb_friction").model
     without = replace(model, values={**model.values, "T_c": 0.0})

@@ -11,9 +11,9 @@ import pytest
 import sympy as sp
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.effects.symbols import v, x
-from rigsight.report.equations import equation_groups, known_effects
+from rigsight.report.equations import equation_groups, equations_of, known_effects
 from rigsight.report.wording import effect_label, sentence_case
 from rigsight.rigs import RIGS
 
@@ -98,6 +98,40 @@ def test_effects_are_chained_along_the_signal_path_whatever_their_order(diagnosi
     assert "k c x spring, free play" in loop[0], "the hysteresis sees what the play leaves"
     assert "x ˙ spring, free play" in loop[1]
     assert "u input saturation" in first["Running gear"][0]
+
+
+def shown_of(rig: str, *effects: str) -> dict[str, list[str]]:
+    chosen = [
+        placed(effect_named(kind), place) for kind, _, place in (name.partition("@") for name in effects)
+    ]
+    return {g.title: [spoken(equation) for equation in g.equations] for g in equations_of(RIGS[rig], chosen)}
+
+
+def test_each_coordinate_has_a_line_and_an_effect_acts_where_it_is() -> None:
+    found = shown_of("drive_train", "coulomb_friction@load_bearing")
+    motor, load, *sensors = found["Drive train"]
+    assert motor == "J m φ ¨ m = k t u − d s ( φ ˙ m − φ ˙ l ) − k s ( φ m − φ l ) − d m φ ˙ m"
+    assert load.startswith("J l φ ¨ l = d s")
+    assert load.endswith("− k l φ l − T Coulomb friction at load_bearing")
+    assert sensors == ["motor angle = φ m", "load angle = φ l"]
+    assert found["Coulomb friction at load_bearing"] == [
+        "T Coulomb friction at load_bearing = T c sign ( φ ˙ l )"
+    ]
+
+
+def test_masses_that_depend_on_the_coordinates_stand_before_their_accelerations() -> None:
+    first, second, *_ = shown_of("two_link_arm")["Two link arm"]
+    assert first.startswith(
+        "( I 1 + I 2 + l 1 2 m 2 + 2 l 1 s 2 cos ( q 2 ) ) q ¨ 1 + ( I 2 + l 1 s 2 cos ( q 2 ) ) q ¨ 2 = τ 1 − d 1 q ˙ 1"
+    )
+    assert second.startswith("( I 2 + l 1 s 2 cos ( q 2 ) ) q ¨ 1 + I 2 q ¨ 2 = τ 2 − d 2 q ˙ 2")
+
+
+def test_a_control_law_has_a_line_and_reads_its_sensor_behind_the_effects() -> None:
+    found = shown_of("servo", "sensor_lag@angle", "input_saturation@motor")
+    assert "motor = clip ( k p ( goal − angle sensor lag ) , -1 , 1 )" in found["Servo"]
+    assert found["Servo"][0].startswith("( J + l 2 m ) q ¨ = k v motor input saturation")
+    assert found["Input saturation at motor"] == ["motor input saturation = clip ( motor , − u max , u max )"]
 
 
 def test_a_user_s_own_effect_shows_its_declared_torque(diagnosis: Diagnosis) -> None:

@@ -46,6 +46,14 @@ def vary(
         float | None,
         typer.Option(metavar="OMEGA", show_default="6 times the natural frequency", help="Its end [rad/s]."),
     ] = None,
+    source: Annotated[
+        str | None,
+        typer.Option("--input", metavar="NAME", show_default="the first", help="Input to sweep."),
+    ] = None,
+    response: Annotated[
+        str | None,
+        typer.Option("--output", metavar="NAME", show_default="the first", help="Sensor that answers."),
+    ] = None,
     out: ResultsFolder = Path("vary"),
     json: Json = False,
     quiet: Quiet = False,
@@ -70,6 +78,8 @@ def vary(
             steps=steps,
             amplitude=amplitude,
             band=band,
+            source=source,
+            response=response,
             listener=listener,
         )
     if json:

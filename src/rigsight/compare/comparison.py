@@ -26,6 +26,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.record_response import Method
 from rigsight.metrics import rms
 from rigsight.records import Record
+from rigsight.records.plausibility import is_constant
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
@@ -267,7 +268,7 @@ def compare_on_record(
     step = None
     if record.kind == "step":
         try:
-            step = step_window(record, yardstick.rig.inputs[0].name, yardstick.step_seconds)
+            step = step_window(record, _stepping(record, yardstick.rig), yardstick.step_seconds)
         except InputError as error:
             notes.append(str(error))
     trials = [_trial(c, record, windows, yardstick, paths, measured, step) for c in competitors]
@@ -285,6 +286,18 @@ def compare_on_record(
         failures=tuple(failure for trial in trials for failure in trial.failures),
         notes=(*notes, *(note for trial in trials for note in trial.notes)),
     )
+
+
+def _stepping(record: Record, rig: Rig) -> str:
+    """Return the input that steps first; the first of all where none moves."""
+    first = {
+        signal.name: int(np.argmax(np.abs(np.diff(record[signal.name])) > 0.0))
+        for signal in rig.inputs
+        if not is_constant(record[signal.name])
+    }
+    if not rig.inputs:
+        raise InputError(f"Record '{record.name}': the rig has no input, so there is no step.")
+    return min(first, key=first.__getitem__, default=rig.inputs[0].name)
 
 
 @dataclass(eq=False)

@@ -8,13 +8,14 @@ small magnitude as much as a large one.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.frequency import FrequencyResponse
+from rigsight.frequency import FrequencyResponse, responses_of_inputs
 from rigsight.frequency.signal_pair import among
 from rigsight.identify.record_response import Method, record_response
 from rigsight.identify.transfer_form import Order
@@ -24,10 +25,12 @@ from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold
 from rigsight.rigs import Rig
 
-_CUTS = {"psi": 80.0, "y": 30.0}
-"""Where the thesis cuts u -> psi and psi -> y (sections 4.3 and 4.5) [rad/s], by response."""
+_CUTS = (80.0, 30.0)
+"""Where the thesis cuts the response of the motion to the input, and of what follows it to the motion (4.3 and 4.5) [rad/s]."""
 _LEAST_CLEARNESS = 10.0
 """Power over variance (10 dB) from which a measured line is compared; a fit asks for more, an error has its floor beside it."""
+_POLES: Mapping[Method, int] = {"local_rational": 2, "local_polynomial": 0}
+"""Degree of the denominator that a local model of several inputs has."""
 _PER_NEPER = 20.0 / math.log(10.0)
 
 
@@ -44,7 +47,9 @@ class SignalPath:
     upper_cut
         Angular frequency beyond which lines are not compared [rad/s].
     is_commanded
-        True if the source is the input of the rig, whose hold the record knows; False if it was measured.
+        True if the source is an input of the rig, whose hold the record knows; False if it was measured.
+    inputs
+        All inputs of a rig with several motions, of which any may move in a record; empty where one source says it all.
     """
 
     source: str
@@ -52,6 +57,7 @@ class SignalPath:
     order: Order
     upper_cut: float
     is_commanded: bool
+    inputs: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -84,13 +90,21 @@ class ResponseError:
 def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
     """Return the paths of a rig: input to first output, and that to each output behind it.
 
-    The cuts are those of the thesis on a running gear, none on other rigs.
+    On a rig of several motions they are each input to each sensor. The cuts are those of the thesis where a state follows the motion, none on other rigs.
     """
-    cuts = _CUTS if rig.downstream else {}
+    if not rig.has_one_motion:
+        prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
+        inputs = tuple(signal.name for signal in rig.inputs)
+        return tuple(
+            SignalPath(source, signal.name, "pt2", math.inf, source not in prescribing, inputs)
+            for source in inputs
+            for signal in rig.outputs
+        )
+    cut, cut_behind = (math.inf, math.inf) if rig.follower is None else _CUTS
     source, first, *behind = (rig.inputs[0].name, *(signal.name for signal in rig.outputs))
     return (
-        SignalPath(source, first, "pt2", cuts.get(first, math.inf), rig.is_driven),
-        *(SignalPath(first, name, "pt1", cuts.get(name, math.inf), False) for name in behind),
+        SignalPath(source, first, "pt2", cut, rig.is_driven),
+        *(SignalPath(first, name, "pt1", cut_behind, False) for name in behind),
     )
 
 
@@ -112,6 +126,8 @@ def measured_responses(
     problems: list[str] = []
     if record.kind == "step":
         return found, problems
+    if any(path.inputs for path in paths):
+        return _of_inputs(record, paths, method)
     for path in paths:
         if path.response not in record:
             continue
@@ -128,6 +144,23 @@ def measured_responses(
             band = (band[0], min(band[1], float(first.omega[-1])))
         try:
             found[path.name] = _response(record, path, method, _LEAST_CLEARNESS).band(*band)
+        except InputError as error:
+            problems.append(f"{path.name}: {error}")
+    return found, problems
+
+
+def _of_inputs(
+    record: Record, paths: tuple[SignalPath, ...], method: Method
+) -> tuple[dict[str, FrequencyResponse], list[str]]:
+    """Return the responses to each input that moves in a record; the others say nothing here."""
+    found: dict[str, FrequencyResponse] = {}
+    problems: list[str] = []
+    moving = [path for path in paths if path.response in record and not is_constant(record[path.source])]
+    if not moving:
+        problems.append("no input moves in this record; without excitation there is no frequency response.")
+    for path in moving:
+        try:
+            found[path.name] = _response(record, path, method, _LEAST_CLEARNESS)
         except InputError as error:
             problems.append(f"{path.name}: {error}")
     return found, problems
@@ -154,6 +187,11 @@ def _response(
     least_clearness: float,
     wanted: NDArray[np.float64] | None = None,
 ) -> FrequencyResponse:
+    moving = [name for name in path.inputs if not is_constant(record[name])]
+    if len(moving) > 1:
+        return _among_others(record, path, moving, method)
+    if path.inputs:
+        record = replace(record, signals={name: record[name] for name in (path.source, path.response)})
     # A measured source is smooth between its samples, whatever the input does.
     hold: Hold = record.hold if path.is_commanded else "band_limited"
     return record_response(
@@ -167,6 +205,22 @@ def _response(
         with_coherence=False,
         wanted=wanted,
     ).response
+
+
+def _among_others(
+    record: Record, path: SignalPath, moving: Sequence[str], method: Method
+) -> FrequencyResponse:
+    """Return the response to one of several inputs that move at once, of a local model that holds all of them."""
+    if method not in _POLES:
+        raise InputError(
+            f"'{method}' knows one input at a time, and {' and '.join(moving)} move at once; use local_rational."
+        )
+    smooth = () if path.is_commanded else (path.source,)
+    told = responses_of_inputs([record], moving, [path.response], poles=_POLES[method], smooth=smooth)
+    key = (path.source, path.response)
+    if key not in told.found:
+        raise InputError(told.problems[key])
+    return told.found[key]
 
 
 def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) -> ResponseError:

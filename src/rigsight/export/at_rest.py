@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rigsight.export.equations import Exported
-from rigsight.simulate import rest_state
-from rigsight.simulate.input_hold import hold_input
+from rigsight.simulate import Structure, rest_state
+from rigsight.simulate.input_hold import HeldInput, hold_input, together
 
 
 def state_at_rest(exported: Exported) -> tuple[float, ...]:
@@ -24,6 +24,16 @@ def state_at_rest(exported: Exported) -> tuple[float, ...]:
     """
     if exported.rest is None:
         return tuple(0.0 for _ in exported.states)
-    held = hold_input(np.zeros(2), 1.0, "foh")
-    rest = rest_state(exported.structure, np.array(exported.values), held)
+    rest = rest_state(exported.structure, np.array(exported.values), no_input(exported.structure))
     return tuple(float(value) for value in rest)
+
+
+def no_input(structure: Structure) -> HeldInput:
+    """Return inputs that are zero, of one piece.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    """
+    return together([hold_input(np.zeros(2), 1.0, "foh")] * max(1, len(structure.rig.inputs)))

@@ -9,11 +9,13 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
-from rigsight.simulate.kernel_equations import KernelEquations
+from rigsight.export.equilibrium import Balance
+from rigsight.simulate.kernel_equations import FUNCTIONS, KernelEquations
 from rigsight.simulate.kernel_source import accurate_integrator
 from rigsight.simulate.printing.c import C
 from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL
+from rigsight.simulate.structure import input_symbols
 
 HISTORY = 4096
 """Samples that a delay may last; more cost memory in every instance."""
@@ -22,7 +24,11 @@ _SPARE = 8
 _SAME_STEP = {False: "1e-9", True: "1e-6"}
 """By which part two sample times may differ and be one: without and with a delay, which needs them to be."""
 
-_REST = """/* The input from `first` to `last` in a straight line, and then on. */
+_REST = """static piece constant(double value) {{
+    return standing(&value);
+}}
+
+/* The input from `first` to `last` in a straight line, and then on. */
 static piece linear(double first, double last, double dt) {{
     piece c = constant(first);
     c.c[0][1] = (last - first) / dt;
@@ -60,8 +66,9 @@ static int settled(const parameters *p, double *x, double last, double length) {
 }}
 
 /* The static equilibrium at the first input, reached slowly from rest without memory. */
-static void rest(const parameters *given, double first, double *x) {{
+static void rest(const parameters *given, const double *u, double *x) {{
     const parameters *p = given;
+    const double first = u[0];
     double stiffness, inertia, length;
 {values}
     if (stiffness > 0.0) {{
@@ -75,18 +82,23 @@ static void rest(const parameters *given, double first, double *x) {{
 """
 _REST_CALL = """    parameters numbers;
     if (p) numbers = *p; else {name}_defaults(&numbers);
-    rest(&numbers, u[0], x);
+    rest(&numbers, u, x);
 """
-_PIECES = {
-    "zoh": "    (void)next; (void)dt;\n    return constant(u[0]);",
-    "foh": "    return linear(u[0], next[0], dt);",
+_HELD = {
+    "zoh": "    c.c[{i}][0] = u[{at}];",
+    "foh": "    c.c[{i}][0] = u[{at}];\n    c.c[{i}][1] = (next[{at}] - u[{at}]) / dt;",
 }
-_MOTION_PIECE = """    const double rise = next[0] - u[0], first = u[1] * dt, last = next[1] * dt;
-    piece c = constant(u[0]);
-    c.c[0][1] = u[1];
-    c.c[0][2] = (3.0 * rise - 2.0 * first - last) / (dt * dt);
-    c.c[0][3] = (first + last - 2.0 * rise) / (dt * dt * dt);
-    return c;"""
+_CUBIC = "    cubic(c.c[{i}], u + {at}, next + {at}, dt);"
+_CUBICS = """/* A motion between values and rates at both ends. */
+static void cubic(double *c, const double *u, const double *next, double dt) {
+    const double rise = next[0] - u[0], first = u[1] * dt, last = next[1] * dt;
+    c[0] = u[0];
+    c[1] = u[1];
+    c[2] = (3.0 * rise - 2.0 * first - last) / (dt * dt);
+    c[3] = (first + last - 2.0 * rise) / (dt * dt * dt);
+}
+
+"""
 _PROMPT = """    c.begin = m->t;
 {read_signs}    status = integrate(&own, &c, 0.0, dt);
 """
@@ -96,17 +108,17 @@ _DELAYED = """    {{
         long back;
         if (late / dt > {upper}_HISTORY - 2) return {upper}_HISTORY_TOO_SHORT;
         back = (long)whole;
-        memcpy(m->pieces[m->sample % {upper}_HISTORY], c.c[0], sizeof c.c[0]);
+        memcpy(m->pieces[m->sample % {upper}_HISTORY], c.c, sizeof c.c);
         status = OK;
         if (fraction > 0.0) {{
-            piece early = constant(m->first);
-            if (m->sample > back) memcpy(early.c[0], m->pieces[(m->sample - back - 1) % {upper}_HISTORY], sizeof early.c[0]);
+            piece early = standing(m->first);
+            if (m->sample > back) memcpy(early.c, m->pieces[(m->sample - back - 1) % {upper}_HISTORY], sizeof early.c);
             early.begin = m->t - (dt - split);
             own.fresh = 0;
             status = integrate(&own, &early, dt - split, dt);
         }}
-        if (m->sample < back) c = constant(m->first);
-        else memcpy(c.c[0], m->pieces[(m->sample - back) % {upper}_HISTORY], sizeof c.c[0]);
+        if (m->sample < back) c = standing(m->first);
+        else memcpy(c.c, m->pieces[(m->sample - back) % {upper}_HISTORY], sizeof c.c);
         c.begin = m->t + split;
         if (fraction > 0.0) own.fresh = 0;
 {read_signs}        if (status == OK) status = integrate(&own, &c, 0.0, dt - split);
@@ -155,13 +167,18 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     name
         What every name that others see begins with.
     """
-    structure, rest, upper = exported.structure, exported.rest, name.upper()
+    structure, upper = exported.structure, name.upper()
     equations = KernelEquations(structure)
     delayed, late = structure.delay is not None, structure.measured_late is not None
     read_signs = "    read_signs(&own, &c, 0.0);\n" if exported.hold == "zoh" else ""
     names = _parameter_names(exported)
     inputs = ["t", *(quantity.name for quantity in exported.inputs)]
     outs = [quantity.name for quantity in exported.outputs]
+    room = max(1, len(exported.inputs))
+    kernel = "\n".join(
+        [equations.text("const parameters *p", list(names.values())), *map(template, ACCURATE)]
+    )
+    rest = _rest(exported, names)
     fragments = {
         "HEADER": "\n".join(
             f" * {line}".rstrip() for line in header_lines(exported, source, with_parameters=False)
@@ -176,6 +193,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         "COUNT_STATES": len(exported.states),
         "COUNT_ROOM": max(1, len(exported.states)),
         "N_INPUTS": len(exported.inputs),
+        "ROOM_INPUTS": room,
         "N_OUTPUTS": len(outs),
         "ACCURACY": repr(DEFAULT_ACCURACY),
         "LOCAL_PER_GLOBAL": repr(LOCAL_PER_GLOBAL),
@@ -184,20 +202,25 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         "PARAMETER_MEMBERS": "\n".join(
             f"    double {q.name};  /* [{q.unit}] {q.description} */" for q in exported.parameters
         ),
-        "HISTORY_MEMBERS": (f"    double first, pieces[{upper}_HISTORY][4];\n" if delayed else "")
+        "HISTORY_MEMBERS": (
+            f"    double first[{room}], pieces[{upper}_HISTORY][{len(exported.sources)}][4];\n"
+            if delayed
+            else ""
+        )
         + (f"    double origin[2], readings[{upper}_HISTORY][2];\n" if late else ""),
-        "KERNEL": "\n".join(
-            [equations.text("const parameters *p", list(names.values())), accurate_integrator(equations)]
-        ),
-        "REST": "" if rest is None else _rest(exported, names),
-        "REST_CALL": "    (void)p; (void)u;\n" if rest is None else _REST_CALL.format(name=name),
+        "KERNEL": kernel,
+        "FUNCTIONS": _missing_functions(kernel, rest),
+        "STANDING": "\n".join(f"    c.c[{i}][0] = u[{at}];" for i, at in enumerate(_places(exported))),
+        "REST": rest,
+        "REST_CALL": _REST_CALL.format(name=name) if rest else "    (void)p; (void)u;\n",
         "DEFAULTS": "\n".join(
             f"    p->{q.name} = {value!r};"
             for q, value in zip(exported.parameters, exported.values, strict=True)
         ),
-        "REMEMBER_FIRST": ("    m->first = u[0];\n" if delayed else "")
+        "REMEMBER_FIRST": ("    memcpy(m->first, u, sizeof m->first);\n" if delayed else "")
         + ("    remember(m);\n    memcpy(m->origin, m->readings[0], sizeof m->origin);\n" if late else ""),
-        "PIECE": _MOTION_PIECE if rest is None else _PIECES[exported.hold],
+        "CUBIC": _CUBICS if exported.follows_motion else "",
+        "PIECE": _piece(exported),
         "SAME_STEP": _SAME_STEP[delayed or late],
         "STEP_CHANGED": _CONSTANT_STEP.format(upper=upper) if delayed or late else "",
         "ADVANCE": (_LATE_HISTORY.format(upper=upper) if late else "")
@@ -206,7 +229,11 @@ def c_source(exported: Exported, source: str, name: str) -> str:
             if delayed
             else _PROMPT.format(read_signs=read_signs)
         ),
-        "RATE_AT_SAMPLE": "m->u[1]" if rest is None else "0.0",
+        "RATES_AT_SAMPLE": "".join(
+            f"    c.c[{i}][1] = m->u[{at + 1}];\n"
+            for i, (at, source) in enumerate(zip(_places(exported), exported.sources, strict=True))
+            if source.rate is not None
+        ),
         "REMEMBER": _REMEMBER.format(upper=upper, late=C.expression(structure.measured_late, names))
         if late
         else "",
@@ -234,9 +261,34 @@ def _memory(exported: Exported, equations: KernelEquations) -> int:
     return 5 * states + modes + 2 * watched + constants + inputs + 2 * frictions + _SPARE
 
 
+def _places(exported: Exported) -> list[int]:
+    """Return where in a row of inputs each of the rig's begins: behind a prescribed motion stands its rate."""
+    counts = [len(source.quantities) for source in exported.sources]
+    return [sum(counts[:i]) for i in range(len(counts))]
+
+
+def _piece(exported: Exported) -> str:
+    lines = [
+        (_HELD[exported.hold] if source.rate is None else _CUBIC).format(i=i, at=at)
+        for i, (at, source) in enumerate(zip(_places(exported), exported.sources, strict=True))
+    ]
+    unread = [name for name in ("next", "dt") if not any(name in line for line in lines)]
+    return "\n".join([*(f"    (void){name};" for name in unread), *lines])
+
+
+def _missing_functions(kernel: str, rest: str) -> str:
+    """Return the functions that the equilibrium calls and the kernel has not written."""
+    lacking = [text for name, text in FUNCTIONS.items() if f"{name}(" in rest and text not in kernel]
+    return "".join(f"{text}\n" for text in lacking)
+
+
 def _rest(exported: Exported, names: Mapping[sp.Symbol, str]) -> str:
+    """Return the functions that find the equilibrium at the first inputs; nothing for a model without a state of its own."""
     rest = exported.rest
-    assert rest is not None
+    if isinstance(rest, Balance):
+        return _balance(exported, rest, names)
+    if rest is None:
+        return ""
     wanted = {"x[0]": rest.displacement, "inertia": rest.inertia, "stiffness": rest.stiffness}
     return _REST.format(
         intervals=INTERVALS,
@@ -247,4 +299,30 @@ def _rest(exported: Exported, names: Mapping[sp.Symbol, str]) -> str:
         values="\n".join(f"    {line}" for line in C.statements(list(wanted), list(wanted.values()), names)),
         damping=rest.damping,
         silenced="".join(f"        quiet.{name} = 0.0;\n" for name in rest.silenced),
+    )
+
+
+def _balance(exported: Exported, rest: Balance, parameters: Mapping[sp.Symbol, str]) -> str:
+    states = exported.structure.states
+    names = {
+        **parameters,
+        **{symbol: f"x[{i}]" for i, symbol in enumerate(states)},
+        **{input_symbols(i)[0]: f"u[{at}]" for i, at in enumerate(_places(exported))},
+    }
+    targets = [f"r[{i}]" for i in range(len(rest.residuals))]
+    targets += [f"s[{i}]" for i in range(len(rest.unknown) ** 2)]
+    expressions = [*rest.residuals, *(slope for row in rest.slopes for slope in row)]
+    starts = C.statements([f"x[{i}]" for i in rest.start], list(rest.start.values()), names)
+    unread = " ".join(f"(void){name};" for name in ("p", "u", "x"))
+    text = files("rigsight.export").joinpath("templates/equilibrium.c.txt").read_text("utf-8")
+    return filled(
+        text,
+        {
+            "UNBALANCED": "\n".join(
+                f"    {line}" for line in [unread, *C.statements(targets, expressions, names)]
+            ),
+            "START": "\n".join(f"    {line}" for line in starts),
+            "UNKNOWN": ", ".join(map(str, rest.unknown)),
+            "N_UNKNOWN": len(rest.unknown),
+        },
     )

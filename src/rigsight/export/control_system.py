@@ -48,9 +48,7 @@ def control_system(exported: Exported, source: str, name: str) -> str:
             "PARAMETERS": indented(parameter_entries(exported)),
             "REST": sequence([repr(value) for value in state_at_rest(exported)]),
             "UNPACK_PARAMETERS": unpack,
-            "UNPACK_INPUT": "input_value, input_rate = given"
-            if len(inputs) > 1
-            else "(input_value,) = given",
+            "UNPACK_INPUT": _unpacked_input(exported),
             "RATES": _array(exported, [equation.limited_rate for equation in structure.equations]),
             "OUTPUTS": _array(exported, list(structure.outputs)),
             "INPUTS": ", ".join(map(repr, inputs)),
@@ -59,6 +57,16 @@ def control_system(exported: Exported, source: str, name: str) -> str:
             "NAME": repr(name),
         },
     )
+
+
+def _unpacked_input(exported: Exported) -> str:
+    """Return the statement that sorts what is given into inputs and rates of prescribed motions."""
+    places = iter(range(len(exported.inputs)))
+    values, rates = [], []
+    for source in exported.sources:
+        values.append(f"given[{next(places)}]")
+        rates.append("0.0" if source.rate is None else f"given[{next(places)}]")
+    return f"input_value, input_rate = ({sequence(values)}), ({sequence(rates)})"
 
 
 def _array(exported: Exported, expressions: list[sp.Expr]) -> str:

@@ -7,18 +7,29 @@ from typing import Any
 
 from rigsight.export.equations import Exported
 from rigsight.simulate.input_hold import Hold
-from rigsight.simulate.printing.text import text
+from rigsight.simulate.printing.names import rate_symbol
+from rigsight.simulate.printing.shown import shown_equations
+from rigsight.simulate.printing.text import text, text_equation
 
 HOLDS: dict[Hold, str] = {
-    "zoh": "the input is constant from each sample to the next",
-    "foh": "the input is linear between samples",
+    "zoh": "constant from each sample to the next",
+    "foh": "linear between samples",
 }
-MOTION_HOLD = "the motion is the cubic through values and rates at both ends of a sample time"
+MOTION_HOLD = "the cubic through values and rates at both ends of a sample time"
 
 
 def hold_text(exported: Exported) -> str:
-    """Return how the input behaves between its samples, as a clause."""
-    return MOTION_HOLD if exported.rest is None else HOLDS[exported.hold]
+    """Return how the inputs behave between their samples, as a clause."""
+    held = [source.value.name for source in exported.sources if source.rate is None]
+    moved = [source.value.name for source in exported.sources if source.rate is not None]
+    if not exported.sources:
+        return "there is no input"
+    if not moved:
+        return f"the {'input is' if len(held) == 1 else 'inputs are'} {HOLDS[exported.hold]}"
+    if not held:
+        return f"the {'motion is' if len(moved) == 1 else 'motions are'} {MOTION_HOLD}"
+    verb = "is" if len(held) == 1 else "are"
+    return f"{', '.join(held)} {verb} {HOLDS[exported.hold]}, {', '.join(moved)} {MOTION_HOLD}"
 
 
 def made_by(source: str) -> str:
@@ -29,6 +40,8 @@ def made_by(source: str) -> str:
 def equation_lines(exported: Exported) -> list[str]:
     """Return the equations in plain text, one a line, in the names of the export."""
     structure, names = exported.structure, exported.names()
+    if not structure.rig.has_one_motion:
+        return [*_as_shown(exported), *_held_lines(exported)]
     lines = []
     if structure.delay is not None:
         name = exported.inputs[0].name
@@ -43,9 +56,22 @@ def equation_lines(exported: Exported) -> list[str]:
         if i == 0 and structure.measured_late is not None:
             line += f", read {text(structure.measured_late, names)} late"
         lines.append(line)
-    if exported.frozen.friction_mode is not None:
-        lines.append(f"dry friction holds {exported.states[_velocity(exported)].name} at zero while it can")
-    return lines
+    return [*lines, *_held_lines(exported)]
+
+
+def _as_shown(exported: Exported) -> list[str]:
+    """Return the equations as people are shown them: solved for the accelerations nobody would read them."""
+    shown, own = shown_equations(exported.structure), exported.names()
+    names = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()} | own
+    for state in exported.structure.states:
+        names[rate_symbol(state)] = f"{own[state]}'"
+    return [text_equation(equation, names) for equation in shown.equations]
+
+
+def _held_lines(exported: Exported) -> list[str]:
+    names = exported.names()
+    slips = (exported.frozen.switches[mode] for mode in exported.frictions)
+    return [f"dry friction holds {text(slip, names)} at zero while it can" for slip in slips]
 
 
 def signal_lines(exported: Exported) -> list[str]:
@@ -89,9 +115,3 @@ def filled(template: str, fragments: dict[str, Any]) -> str:
 def indented(lines: list[str], level: int = 1) -> str:
     """Return lines as one text, four blanks deeper for each level."""
     return "\n".join("    " * level + line if line else "" for line in lines)
-
-
-def _velocity(exported: Exported) -> int:
-    index = exported.structure.velocity_index
-    assert index is not None
-    return index

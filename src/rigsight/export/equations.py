@@ -10,14 +10,17 @@ import sympy as sp
 
 from rigsight.effects import Place
 from rigsight.errors import InputError
+from rigsight.export.equilibrium import Balance, balance
 from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
+from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
+from rigsight.simulate.signal_path import state_symbol
+from rigsight.simulate.structure import TIME, Structure, input_symbols
 from rigsight.units import unit_text
 
 
@@ -32,8 +35,29 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Source:
+    """An input of the rig as an export is fed with it.
+
+    Attributes
+    ----------
+    value
+        Its samples.
+    rate
+        Samples of its rate, where it prescribes a motion; else None.
+    """
+
+    value: Quantity
+    rate: Quantity | None
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is fed, in order."""
+        return (self.value,) if self.rate is None else (self.value, self.rate)
+
+
+@dataclass(frozen=True)
 class Rest:
-    """What the static equilibrium at the first input is found with; expressions of parameters.
+    """What the static equilibrium of one mass at the first input is found with; expressions of parameters.
 
     Attributes
     ----------
@@ -68,10 +92,10 @@ class Exported:
         Longest internal step [s] of a fixed-step integrator.
     parameters, values
         The parameters and their numbers.
-    states, inputs, outputs
-        The signals; a prescribed motion has its rate as second input.
+    states, sources, outputs
+        The signals.
     rest
-        How the equilibrium is found; None where the motion is prescribed.
+        How the equilibrium is found; None for an element, which has no motion of its own.
     """
 
     structure: Structure
@@ -81,9 +105,29 @@ class Exported:
     parameters: tuple[Quantity, ...]
     values: tuple[float, ...]
     states: tuple[Quantity, ...]
-    inputs: tuple[Quantity, ...]
+    sources: tuple[Source, ...]
     outputs: tuple[Quantity, ...]
-    rest: Rest | None
+    rest: Rest | Balance | None
+
+    @property
+    def inputs(self) -> tuple[Quantity, ...]:
+        """What is fed, in order; behind a prescribed motion its rate."""
+        return tuple(quantity for source in self.sources for quantity in source.quantities)
+
+    @property
+    def is_held(self) -> bool:
+        """True if an input has a hold; False where all of them prescribe motions, or there is none."""
+        return any(source.rate is None for source in self.sources)
+
+    @property
+    def follows_motion(self) -> bool:
+        """True if an input prescribes a motion."""
+        return any(source.rate is not None for source in self.sources)
+
+    @property
+    def frictions(self) -> tuple[int, ...]:
+        """Indices of the modes that are signs of velocities which dry friction can hold at zero."""
+        return tuple(friction.mode for friction in self.frozen.frictions)
 
     @property
     def limits(self) -> dict[int, sp.Expr]:
@@ -99,9 +143,9 @@ class Exported:
     def names(self) -> dict[sp.Symbol, str]:
         """Return the name of every symbol in the equations but the modes."""
         structure = self.structure
-        signals = {INPUT: self.inputs[0].name, TIME: "time"}
-        if len(self.inputs) > 1:
-            signals[INPUT_RATE] = self.inputs[1].name
+        signals = {TIME: "time"}
+        for index, source in enumerate(self.sources):
+            signals |= dict(zip(input_symbols(index), (q.name for q in source.quantities), strict=False))
         parameters = zip(structure.parameter_symbols, self.parameters, strict=True)
         states = zip(structure.states, self.states, strict=True)
         return {**signals, **{symbol: quantity.name for symbol, quantity in (*parameters, *states)}}
@@ -143,18 +187,11 @@ def exported(model: Model, hold: Hold, step: float) -> Exported:
     structure, values = without_vanished_effects(model.structure, model.values)
     _check_delays(structure)
     names = _Names()
-    inputs = [names.quantity(s.name, s.name, s.unit, s.description) for s in structure.rig.inputs]
-    if not structure.rig.is_driven:
-        source, time = structure.rig.inputs[0], structure.rig.units["time"]
-        rate = f"{source.name}_rate"
-        inputs.append(names.quantity(rate, rate, f"{source.unit}/{time}", f"rate of {source.name}"))
+    sources = _sources(structure.rig, names)
     shown = _Names()
     outputs = [shown.quantity(s.name, s.name, s.unit, s.description) for s in structure.rig.outputs]
-    units = {**structure.rig.units, "drive": structure.rig.units["force"]}
-    parameters = tuple(
-        names.quantity(p.name, p.name, p.unit or unit_text(p.dimension, units), p.description)
-        for p in structure.parameters
-    )
+    parameters = tuple(names.quantity(p.name, p.name, p.unit, p.description) for p in structure.parameters)
+    units = _state_units(structure)
     return Exported(
         structure=structure,
         frozen=freeze(structure),
@@ -163,16 +200,42 @@ def exported(model: Model, hold: Hold, step: float) -> Exported:
         parameters=parameters,
         values=tuple(float(value) for value in parameter_vector(structure, values)),
         states=tuple(
-            names.quantity(e.symbol.name, e.symbol.name, unit_text(e.dimension, units), "state")
+            names.quantity(e.symbol.name, e.symbol.name, units[e.symbol], "state")
             for e in structure.equations
         ),
-        inputs=tuple(inputs),
+        sources=sources,
         outputs=tuple(outputs),
         rest=_rest(structure, {p.source: p.name for p in parameters}),
     )
 
 
-def _rest(structure: Structure, names: dict[str, str]) -> Rest | None:
+def _sources(rig: Rig, names: _Names) -> tuple[Source, ...]:
+    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
+    found = []
+    for signal in rig.inputs:
+        value, rate = names.quantity(signal.name, signal.name, signal.unit, signal.description), None
+        if signal.name in prescribing:
+            wished = f"{signal.name}_rate"
+            rate = names.quantity(wished, wished, f"{signal.unit}/s", f"rate of {signal.name}")
+        found.append(Source(value, rate))
+    return tuple(found)
+
+
+def _state_units(structure: Structure) -> dict[sp.Symbol, str]:
+    rig = structure.rig
+    units = {state.symbol: state.unit for state in rig.mechanism.states}
+    for coordinate in rig.mechanism.coordinates:
+        units |= {coordinate.symbol: coordinate.unit, coordinate.rate: f"{coordinate.unit}/s"}
+    for effect in structure.effects:
+        at = rig.units_at(rig.acts_at(effect))
+        of_place = {**at, "drive": at["force"]}
+        units |= {state_symbol(effect, s.symbol): unit_text(s.dimension, of_place) for s in effect.states}
+    return units
+
+
+def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
+    if not structure.rig.has_one_motion:
+        return balance(structure)
     motion = structure.rig.motion
     if motion.inertia is None:
         return None

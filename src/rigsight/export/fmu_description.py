@@ -28,7 +28,7 @@ class _Variable:
 
 def interpolates(exported: Exported) -> bool:
     """Return True if derivatives of the inputs are of use within a communication step."""
-    return exported.rest is None or exported.hold == "foh"
+    return bool(exported.sources) and (exported.follows_motion or exported.hold == "foh")
 
 
 def needs_constant_step(exported: Exported) -> bool:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from rigsight.export.at_rest import no_input
 from rigsight.rigs import evaluated
-from rigsight.simulate import parameter_vector
+from rigsight.simulate import parameter_vector, rest_state
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 OSCILLATION = 0.03
 """Step times the angular frequency of the fastest oscillation: Runge-Kutta then errs by less than 1e-6 over its decay."""
@@ -44,15 +45,13 @@ def internal_step(model: Model) -> float:
     p = parameter_vector(structure, values)
     frozen = freeze(structure)
     bound = dict(zip(structure.parameter_symbols, p, strict=True))
+    inputs = _input_symbols(structure)
     rates = sp.lambdify(
-        [INPUT, INPUT_RATE, TIME, structure.states, frozen.modes],
+        [inputs, TIME, structure.states, frozen.modes],
         [rate.xreplace(bound) for rate in frozen.rates],
         modules=[{"absolute": abs}, "math"],
     )
-    rest = np.zeros(len(structure.states))
-    if structure.rig.is_driven:
-        known = dict(zip(structure.names, p, strict=True))
-        rest[0] = evaluated(structure.rig.motion.rest, known)
+    rest, still = _rest(structure, p), np.zeros(len(inputs))
     step = LONGEST
     for modes in _sides(frozen):
         jacobian = np.zeros((rest.size, rest.size))
@@ -60,21 +59,35 @@ def internal_step(model: Model) -> float:
             ahead, behind = rest.copy(), rest.copy()
             ahead[i] += _NUDGE
             behind[i] -= _NUDGE
-            rise = np.array(rates(0.0, 0.0, 0.0, ahead, modes)) - rates(0.0, 0.0, 0.0, behind, modes)
+            rise = np.array(rates(still, 0.0, ahead, modes)) - rates(still, 0.0, behind, modes)
             jacobian[:, i] = rise / (2.0 * _NUDGE)
         step = min(step, _of_eigenvalues(jacobian))
-    return _rounded(step if is_linear(frozen, structure.states) else CAUTION * step)
+    return _rounded(step if is_linear(frozen, structure) else CAUTION * step)
 
 
-def is_linear(frozen: FrozenStructure, states: Iterable[sp.Symbol]) -> bool:
-    """Return True if the rates have neither kinks nor products of states and input."""
-    moving = {*states, INPUT, INPUT_RATE}
+def is_linear(frozen: FrozenStructure, structure: Structure) -> bool:
+    """Return True if the rates have neither kinks nor products of states and inputs."""
+    moving = {*structure.states, *_input_symbols(structure)}
     return not frozen.modes and all(
         sp.diff(rate, a, b) == 0
         for rate in frozen.rates
         for a in moving & rate.free_symbols
         for b in moving & rate.free_symbols
     )
+
+
+def _input_symbols(structure: Structure) -> list[sp.Symbol]:
+    return [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)]
+
+
+def _rest(structure: Structure, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the states about which time scales are read: at rest without input."""
+    rest = np.zeros(len(structure.states))
+    if not structure.rig.has_one_motion:
+        return rest_state(structure, p, no_input(structure))
+    if structure.rig.is_driven:
+        rest[0] = evaluated(structure.rig.motion.rest, dict(zip(structure.names, p, strict=True)))
+    return rest
 
 
 def _sides(frozen: FrozenStructure) -> Iterator[NDArray[np.float64]]:

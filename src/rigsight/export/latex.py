@@ -6,7 +6,7 @@ import re
 
 from rigsight.export.description import made_by
 from rigsight.export.equations import Exported
-from rigsight.simulate.printing.latex import latex_equation, latex_name, latex_text
+from rigsight.simulate.printing.latex import LatexPrinter, latex_equation, latex_name, latex_text
 from rigsight.simulate.printing.shown import ShownEquations, shown_equations
 
 _THIN = r"\,"
@@ -46,10 +46,12 @@ def latex(exported: Exported, source: str) -> str:
 
 def _equations(exported: Exported, shown: ShownEquations) -> list[str]:
     lines = [" &= ".join(latex_equation(equation, shown.names)) for equation in shown.equations]
-    if exported.frozen.friction_mode is not None:
-        velocity = exported.structure.states[exported.structure.velocity_index or 0]
-        lines.append(rf"{latex_name(shown.names[velocity])} &= 0 \text{{ while dry friction holds}}")
-    return lines
+    printer = LatexPrinter(shown.names)
+    slips = (exported.frozen.switches[mode] for mode in exported.frictions)
+    return [
+        *lines,
+        *(rf"{printer.expression(slip)} &= 0 \text{{ while dry friction holds}}" for slip in slips),
+    ]
 
 
 def _number(value: float) -> str:

@@ -18,7 +18,8 @@ class Equations:
     Attributes
     ----------
     rates, switches, outputs
-        Expressions of states, inputs, modes, parameters and `constants`.
+        Expressions of states, inputs, modes, parameters and `constants`; an output that shows what dry friction holds with reads
+        the friction's sign, or its multiplier while it sticks.
     constants
         Symbol -> the expression of parameters that it stands for.
     """
@@ -49,7 +50,9 @@ def equations_of(exported: Exported) -> Equations:
             return found.setdefault(expression, sp.Symbol(f"{PREFIX}{len(found)}", real=True))
         return expression.func(*map(walk, expression.args))
 
-    groups = (exported.frozen.rates, exported.frozen.switches, exported.structure.computed_outputs)
+    signs = exported.frozen.friction_signs(exported.structure)
+    shown = tuple(output.xreplace(signs) for output in exported.structure.computed_outputs)
+    groups = (exported.frozen.rates, exported.frozen.switches, shown)
     rates, switches, outputs = (tuple(map(walk, group)) for group in groups)
     return Equations(rates, switches, outputs, {symbol: expression for expression, symbol in found.items()})
 

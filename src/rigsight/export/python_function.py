@@ -9,10 +9,12 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text, indented
 from rigsight.export.equations import Exported
+from rigsight.export.equilibrium import Balance
+from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
 from rigsight.export.precomputed import equations_of
 from rigsight.simulate.printing.python import PYTHON
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+from rigsight.simulate.structure import TIME, input_symbols
 
 MIN_STEPS = 4
 """Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
@@ -20,26 +22,33 @@ MIN_STEPS_PRESCRIBED = 32
 """The same where the motion is prescribed: the model has no time scale of its own that says more."""
 
 _PIECES = {
-    "zoh": "return [(value, 0.0, 0.0, 0.0) for value in samples]",
-    "foh": (
-        "slopes = [(b - a) / dt for a, b in zip(samples, samples[1:])] + [0.0]\n"
-        "    return [(value, slope, 0.0, 0.0) for value, slope in zip(samples, slopes)]"
-    ),
+    "zoh": "_steps({name})",
+    "foh": "_lines({name}, dt)",
 }
-_MOTION_PIECES = '''def _pieces(dt, {inputs}):
-    """Return the motion between samples as cubics (c0, c1, c2, c3) of the time since each sample [s]."""
-    x = np.append(np.asarray({value}, dtype=float), 0.0)
-    v = np.append(np.asarray({rate}, dtype=float), 0.0)
+_CUBIC = "_cubics({value}, {rate}, dt)"
+_HOLDS = {
+    "zoh": """def _steps(samples):
+    return [(float(value), 0.0, 0.0, 0.0) for value in samples]""",
+    "foh": """def _lines(samples, dt):
+    samples = [float(value) for value in samples]
+    slopes = [(b - a) / dt for a, b in zip(samples, samples[1:])] + [0.0]
+    return [(value, slope, 0.0, 0.0) for value, slope in zip(samples, slopes)]""",
+}
+_CUBICS = """def _cubics(values, rates, dt):
+    x, v = np.append(np.asarray(values, dtype=float), 0.0), np.append(np.asarray(rates, dtype=float), 0.0)
     rise, first, last = np.diff(x), v[:-1] * dt, v[1:] * dt
     c2 = (3.0 * rise - 2.0 * first - last) / dt**2
     c3 = (first + last - 2.0 * rise) / dt**3
-    return list(zip(x[:-1].tolist(), v[:-1].tolist(), c2.tolist(), c3.tolist()))'''
-_DRIVE_PIECES = '''def _pieces(dt, {inputs}):
-    """Return the input between samples as cubics (c0, c1, c2, c3) of the time since each sample [s]."""
-    samples = [float(value) for value in {inputs}]
-    {pieces}'''
-_REST = '''def _rest(numbers, first):
+    return list(zip(x[:-1].tolist(), v[:-1].tolist(), c2.tolist(), c3.tolist()))"""
+_ALL_PIECES = '''def _pieces(n, dt{inputs}):
+    """Return the inputs between samples, each as a cubic (c0, c1, c2, c3) of the time since the sample [s]."""
+    {body}
+
+
+{functions}'''
+_REST = '''def _rest(numbers, given):
     """Return the static equilibrium at the first input, reached slowly from rest without memory."""
+    first = given[0]
 {unpack}
     state = [0.0] * N_STATES
 {values}
@@ -58,7 +67,7 @@ _REST = '''def _rest(numbers, first):
 
 def _settled(numbers, state, last, length):
     """Return the states after a ramp of the input from zero, and waits until nothing moves."""
-    piece, duration = (0.0, last / length, 0.0, 0.0), length
+    piece, duration = [(0.0, last / length, 0.0, 0.0)], length
     for wait in range(7):
         motion = _Motion(numbers, state)
         motion.read_signs(piece, 0.0, 0.0)
@@ -70,24 +79,24 @@ def _settled(numbers, state, last, length):
         still = all(
             abs(new - old) <= 1e-9 * abs(new)
             for i, (new, old) in enumerate(zip(motion.x, state))
-            if i != VELOCITY
+            if i != {velocity}
         )
         state = motion.x
         if still:
             break
-        piece, duration = (last, 0.0, 0.0, 0.0), length * 2.0**wait
-    state[VELOCITY] = 0.0
+        piece, duration = [(last, 0.0, 0.0, 0.0)], length * 2.0**wait
+    state[{velocity}] = 0.0
     return state'''
-_NO_REST = '''def _rest(numbers, first):
+_NO_REST = '''def _rest(numbers, given):
     """Return the states without memory."""
     return [0.0] * N_STATES'''
 
 
 def min_steps(exported: Exported) -> int:
     """Return how many internal steps a sample has at least: 1 where the equations are linear."""
-    if not exported.states or is_linear(exported.frozen, exported.structure.states):
+    if not exported.states or is_linear(exported.frozen, exported.structure):
         return 1
-    return MIN_STEPS_PRESCRIBED if exported.rest is None else MIN_STEPS
+    return MIN_STEPS_PRESCRIBED if exported.follows_motion else MIN_STEPS
 
 
 def python_function(exported: Exported, source: str) -> str:
@@ -115,13 +124,14 @@ def python_function(exported: Exported, source: str) -> str:
         "STATES": sequence([repr(state.name) for state in exported.states]),
         "STEP": repr(exported.step),
         "MIN_STEPS": min_steps(exported),
-        "FRICTION": repr(frozen.friction_mode),
-        "VELOCITY": repr(structure.velocity_index),
+        "FRICTION": repr(friction_mode(exported)),
+        "VELOCITY": repr(held_velocity(exported)),
         "N_STATES": len(exported.states),
         "N_MODES": len(frozen.modes),
         "DEPENDENT_MODES": sequence([str(i) for i in frozen.dependent_modes]),
         "LIMITED": sequence([str(i) for i in exported.limits]),
-        "INPUTS": ", ".join(inputs),
+        "ARGUMENTS": "".join(f"{name}, " for name in inputs),
+        "MORE_INPUTS": "".join(f", {name}" for name in inputs),
         "HOLD_TEXT": hold_text(exported),
         "N_OUTPUTS": len(structure.computed_outputs),
         "UNPACK_PARAMETERS": indented(
@@ -134,7 +144,10 @@ def python_function(exported: Exported, source: str) -> str:
         ),
         "RATES": _returned(unpack, list(equations.rates), every),
         "SWITCHES": _returned(unpack, list(equations.switches), every),
-        "OUTPUTS": _returned(unpack, list(equations.outputs), names),
+        "OUTPUTS": _returned(
+            unpack, list(equations.outputs), {**names, friction_sign(exported): "friction_sign"}
+        ),
+        "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **_slopes(exported)}),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
         "SENSOR_DELAY": _number(exported, structure.measured_late, "None"),
@@ -151,8 +164,12 @@ def python_function(exported: Exported, source: str) -> str:
 
 
 def code_names(exported: Exported) -> dict[sp.Symbol, str]:
-    """Return the names of the symbols inside generated functions, where the input has a name of its own."""
-    return {**exported.names(), INPUT: "input_value", INPUT_RATE: "input_rate", TIME: "time"}
+    """Return the names of the symbols inside generated functions, where inputs are elements of arrays."""
+    names = {**exported.names(), TIME: "time"}
+    for index in range(len(exported.sources)):
+        arrays = ("input_value", "input_rate", "input_curvature")
+        names |= {s: f"{a}[{index}]" for s, a in zip(input_symbols(index), arrays, strict=True)}
+    return names
 
 
 def parameter_entries(exported: Exported) -> list[str]:
@@ -190,17 +207,36 @@ def _number(exported: Exported, expression: sp.Expr | None, without: str) -> str
     return indented([*lines, f"return {PYTHON.expression(expression, exported.names())}"])
 
 
+def _returned_one(unpack: list[str], expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
+    lines = PYTHON.statements(["result"], [expression], names)
+    return indented([*unpack, *lines, "return result"], 2)
+
+
+def _slopes(exported: Exported) -> dict[sp.Symbol, str]:
+    return {slope_symbol(i): f"slopes[{i}]" for i in range(len(exported.states))}
+
+
 def _pieces(exported: Exported, inputs: list[str]) -> str:
-    joined = ", ".join(inputs)
-    if exported.rest is None:
-        return _MOTION_PIECES.format(inputs=joined, value=inputs[0], rate=inputs[1])
-    return _DRIVE_PIECES.format(inputs=joined, pieces=_PIECES[exported.hold])
+    lines: list[str] = []
+    functions: dict[str, str] = {}
+    for source in exported.sources:
+        if source.rate is None:
+            lines.append(_PIECES[exported.hold].format(name=source.value.name))
+            functions[exported.hold] = _HOLDS[exported.hold]
+        else:
+            lines.append(_CUBIC.format(value=source.value.name, rate=source.rate.name))
+            functions["cubic"] = _CUBICS
+    body = f"return list(zip({', '.join(lines)}))" if lines else "return [()] * n"
+    more = "".join(f", {name}" for name in inputs)
+    return _ALL_PIECES.format(inputs=more, body=body, functions="\n\n\n".join(functions.values())).rstrip()
 
 
 def _rest(exported: Exported) -> str:
     rest = exported.rest
     if rest is None:
         return _NO_REST
+    if isinstance(rest, Balance):
+        return _balance(exported, rest)
     wanted = {"state[0]": rest.displacement, "inertia": rest.inertia, "stiffness": rest.stiffness}
     names = exported.names()
     used = sorted({names[s] for expression in wanted.values() for s in expression.free_symbols})
@@ -208,5 +244,28 @@ def _rest(exported: Exported) -> str:
         unpack=indented([f'{name} = numbers["{name}"]' for name in used]),
         values=indented(PYTHON.statements(list(wanted), list(wanted.values()), names)),
         damping=rest.damping,
+        velocity=exported.structure.velocity_index,
         silenced="".join(f', "{name}": 0.0' for name in rest.silenced),
+    )
+
+
+def _balance(exported: Exported, rest: Balance) -> str:
+    names = code_names(exported)
+    numbers = unpacked_parameters(exported)
+    n = len(rest.unknown)
+    targets = [f"r{i}" for i in range(n)] + [f"s{i}" for i in range(n * n)]
+    lines = PYTHON.statements(
+        targets, [*rest.residuals, *(slope for row in rest.slopes for slope in row)], names
+    )
+    rows = ", ".join(f"[{', '.join(targets[n * (i + 1) : n * (i + 2)])}]" for i in range(n))
+    result = f"return np.array([{', '.join(targets[:n])}]), np.array([{rows}])"
+    starts = PYTHON.statements([f"x[{i}]" for i in rest.start], list(rest.start.values()), names)
+    text = files("rigsight.export").joinpath("templates/equilibrium.py.txt").read_text("utf-8")
+    return filled(
+        text,
+        {
+            "UNBALANCED": indented([*numbers, *unpacked_states(exported), *lines, result]),
+            "START": indented([*(numbers if starts else ()), *starts]),
+            "UNKNOWN": ", ".join(map(str, rest.unknown)),
+        },
     )

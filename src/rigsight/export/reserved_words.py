@@ -24,18 +24,17 @@ MODELICA = _words(
     redeclare replaceable return stream then time true type when while within"""
 )
 _OF_TEMPLATES = _words(
-    """input_value input_rate friction_sign sign_of rates switches outputs limits modes state math np control numbers given
-    max min abs sign pi eps delay"""
+    """input_value input_rate input_curvature friction_sign sign_of rates switches outputs limits modes state math np control
+    numbers given max min abs sign pi eps delay"""
 )
 _C_MACROS = _words(
     """BUFSIZ EOF EXIT_FAILURE EXIT_SUCCESS EXPORTED FILENAME_MAX FOPEN_MAX FP_INFINITE FP_NAN FP_NORMAL FP_SUBNORMAL FP_ZERO
     HUGE_VAL HUGE_VALF HUGE_VALL INFINITY L_tmpnam MATH_ERREXCEPT MATH_ERRNO NAN NULL RAND_MAX SEEK_CUR SEEK_END SEEK_SET
     TMP_MAX bool linux math_errhandling stderr stdin stdout unix
     DEPENDENT_MODES HAS_DELAY HAS_LIMITS MAX_STEPS MOST_DEFECT OFTEN RARE ROLLED SHORTEST_DEFECT N_COMPUTED N_DEPENDENT
-    N_IN N_INPUTS N_MODES N_OUT N_PARAMETERS
-    N_SLOPES N_STATES N_VALUES N_WATCHED ROUNDING SIZE_CONSTANTS SIZE_INPUTS SIZE_MODES SIZE_STATES SIZE_WATCHED VELOCITY
-    AGREED FRICTION_IS_SHOWN FRICTION_MODES FRICTION_VELOCITIES GENERATIONS INDEPENDENT MOST_REPEATS NOISE N_DEGREES
-    N_FRICTIONS N_LATE PROBE SIZE_FRICTIONS"""
+    N_IN N_INPUTS N_MODES N_OUT N_PARAMETERS N_SLOPES N_STATES N_UNKNOWN N_VALUES N_WATCHED ROUNDING SIZE_CONSTANTS
+    SIZE_INPUTS SIZE_MODES SIZE_STATES SIZE_WATCHED VELOCITY AGREED FRICTION_IS_SHOWN FRICTION_MODES FRICTION_VELOCITIES
+    GENERATIONS INDEPENDENT MOST_REPEATS NOISE N_DEGREES N_FRICTIONS N_LATE PROBE SIZE_FRICTIONS"""
 )
 RESERVED = C | _C_MACROS | MATLAB | MODELICA | _OF_TEMPLATES | frozenset(keyword.kwlist)
 """A name inside an export is none of these, so that it is the same in all of them."""

@@ -23,11 +23,14 @@ from rigsight.export.reserved_words import MATLAB, MODELICA
 from rigsight.simulate import Structure
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
+from rigsight.simulate.structure import input_symbols
 
 _FMUS: dict[str, Version] = {"fmu": 2, "fmu3": 3}
 STICKING = "the sticking of dry friction"
 DELAY = "a delay"
 SENSOR_DELAY = "a late sensor"
+STICKING_TOGETHER = "dry friction that sticks at several joints"
+ACCELERATION = "the acceleration of a prescribed motion"
 _SHORTEST = 1e-9
 _RESERVED = {"matlab": MATLAB, "modelica": MODELICA}
 
@@ -67,18 +70,21 @@ TARGETS: dict[str, Target] = {
     for target in (
         Target(
             "python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s),
-            fixed_step=True, named=False,
+            lacks=frozenset({STICKING_TOGETHER}), fixed_step=True, named=False,
         ),
         Target(
             "control", ".py", "a python-control NonlinearIOSystem", control_system,
-            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY}), steps=False, named=False,
+            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY, ACCELERATION}), steps=False, named=False,
         ),
         Target("c", ".c", "one C99 file without dependencies", c_source),
         Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu),
         Target("fmu3", ".fmu", "an FMU: FMI 3.0, co-simulation", partial(fmu, version=3)),
-        Target("matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function, fixed_step=True),
+        Target(
+            "matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function,
+            lacks=frozenset({STICKING_TOGETHER}), fixed_step=True,
+        ),
         Target("latex", ".tex", "equations and numbers for a document", lambda e, s, _: latex(e, s), steps=False, named=False),
-        Target("modelica", ".mo", "a Modelica model", modelica, lacks=frozenset({STICKING}), steps=False),
+        Target("modelica", ".mo", "a Modelica model", modelica, lacks=frozenset({STICKING, ACCELERATION}), steps=False),
     )
 }  # fmt: skip
 """In the order in which they are shown."""
@@ -135,12 +141,17 @@ def export_model(
 
 
 def unsaid(content: Exported) -> dict[str, str]:
-    """Return what of a model not every target can say, with the effect that it comes from."""
+    """Return what of a model not every target can say, with the effect, or the rig, that it comes from."""
     structure: Structure = content.structure
     found = {}
-    if content.frozen.friction_mode is not None:
+    if content.frictions:
         dry = [e.name for e in structure.effects if e.torque is not None and e.torque.has(sp.sign)]
-        found[STICKING] = (dry or list(structure.effect_names))[0]
+        found[STICKING] = (dry or [structure.rig.name])[0]
+        if len(content.frictions) > 1:
+            found[STICKING_TOGETHER] = "' and '".join(dry) or structure.rig.name
+    curvatures = {input_symbols(i)[2] for i in range(len(content.sources))}
+    if any(rate.free_symbols & curvatures for rate in content.frozen.rates):
+        found[ACCELERATION] = structure.rig.name
     for effect in structure.effects:
         if effect.delay is not None:
             found[DELAY] = effect.name
@@ -162,7 +173,9 @@ def _hold(target: Target, model: Model, wished: Hold | None) -> Hold:
     hold = model.hold if wished is None else wished
     if wished is not None:
         check_option("--hold", wished, ("foh", "zoh"))
-    if not model.structure.rig.is_driven or not target.steps:
+    mechanism = model.structure.rig.mechanism
+    prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
+    if set(mechanism.inputs) <= prescribing or not target.steps:
         return "foh"
     if hold == "band_limited":
         raise InputError(

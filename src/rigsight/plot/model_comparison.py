@@ -38,6 +38,10 @@ _COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9", "#0
 """Okabe and Ito's palette, its yellow darkened for white paper."""
 _MOST_TICKS = 5
 _LEGEND_COLUMNS = 4
+_MOST_COLUMNS = 3
+"""Panels side by side that a page can show."""
+_GAP = 0.9
+"""Height of the empty row between two lines of panels, where a magnitude has 3."""
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.2, 1, 1.2)))
 
 
@@ -128,8 +132,11 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
         Line style by model, see `model_styles`.
     """
     figure, axes = _responses_grid(2, len(panels), len(styles), 5.2)
-    for column, panel in enumerate(panels):
-        top, bottom = axes[:, column]
+    for place, panel in enumerate(panels):
+        row, column = divmod(place, axes.shape[1])
+        top, bottom = axes[2 * row : 2 * row + 2, column]
+        top.sharex(bottom)
+        top.tick_params(labelbottom=False)
         measured = thinned(panel.measured)
         reach = None if measured.variance is None else TWO_SIDED * np.sqrt(0.5 * measured.variance)
         phase = np.degrees(measured.phase)
@@ -160,18 +167,31 @@ def model_responses(panels: Sequence[ResponsesPanel], styles: Mapping[str, Mappi
         for ax in (top, bottom):
             ax.grid()
             ax.set_axisbelow(True)
-    _legend(figure, list(axes[0]))
+    _legend(figure, list(axes.flat))
     return figure
 
 
-def _responses_grid(rows: int, columns: int, n_models: int, height: float) -> tuple[Figure, NDArray[Any]]:
-    """Return a figure of this height [inch] and, below a legend of these models, its axes, the upper row taller."""
+def _responses_grid(rows: int, panels: int, n_models: int, height: float) -> tuple[Figure, NDArray[Any]]:
+    """Return a figure, this high [inch] for each line of panels, and below a legend of these models its axes.
+
+    Each panel has its rows below each other, the upper one taller; panels that find no room begin a line of their own.
+    """
     legend_rows = -(-(n_models + 1) // _LEGEND_COLUMNS)
+    lines = -(-panels // _MOST_COLUMNS)
+    columns = -(-panels // lines)
     width = 4.6 * columns + (1.4 if columns == 1 else 0.0)
-    figure = new_figure(width, height + 0.2 * legend_rows, layout=None)
-    axes = figure.subplots(rows, columns, squeeze=False, sharex="col", height_ratios=[3, 2][:rows])
+    figure = new_figure(width, height * lines + 0.2 * legend_rows, layout=None)
+    # Between two lines there is an empty row, for the labels of one and the titles of the next.
+    heights = [*[3.0, 2.0][:rows], _GAP]
+    axes = figure.subplots(
+        (rows + 1) * lines - 1, columns, squeeze=False, height_ratios=(heights * lines)[:-1]
+    )
     set_margins(figure, 0.78, 0.1, 0.48, 0.35 + 0.2 * legend_rows, between=(0.85, 0.15))
-    return figure, axes
+    kept = [i for i in range(axes.shape[0]) if i % (rows + 1) < rows]
+    for i in range(axes.shape[0]):
+        for j in range(columns):
+            axes[i, j].set_visible(i in kept and i // (rows + 1) * columns + j < panels)
+    return figure, axes[kept]
 
 
 @in_style
@@ -186,7 +206,7 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
         Line style by model, see `model_styles`.
     """
     figure, axes = _responses_grid(1, len(panels), len(styles), 3.4)
-    for ax, panel in zip(axes[0], panels, strict=True):
+    for ax, panel in zip(axes.flat, panels, strict=False):
         factor, unit = shown_in(panel.unit, panel.measured)
         ax.plot(panel.t, factor * panel.measured, color=MEASURED, linewidth=3.0, alpha=0.55, label="measured")
         for name, samples in panel.simulated.items():
@@ -200,7 +220,7 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
         ax.set_ylabel(f"change of {panel.title} [{unit}]")
         ax.grid()
         ax.set_axisbelow(True)
-    _legend(figure, list(axes[0]))
+    _legend(figure, list(axes.flat))
     return figure
 
 

@@ -15,6 +15,7 @@ from rigsight.effects.symbols import positive_part
 class Kind(StrEnum):
     """What a named value of the equations is."""
 
+    SIGNAL = "signal"
     DRIVE = "drive"
     DEFLECTION = "deflection"
     DEFLECTION_RATE = "deflection_rate"
@@ -32,7 +33,7 @@ class late(sp.Function):  # type: ignore[misc]  # noqa: N801
 
 @dataclass(frozen=True)
 class Definition:
-    """A named value: what an effect makes of the signal that reaches it.
+    """A named value: what an effect makes of the signal that reaches it, or what the rig calls by a name of its own.
 
     Attributes
     ----------
@@ -46,6 +47,8 @@ class Definition:
         Name of the effect that it belongs to; None for the rig.
     rate_of
         Symbol of the definition whose time derivative this is, if it is one: people see a dot instead of an equation.
+    name
+        The rig's own name of it: a signal, a drive that is told by a control law, a sensor that one reads. None for an effect's.
     """
 
     symbol: sp.Symbol
@@ -53,6 +56,7 @@ class Definition:
     kind: Kind
     owner: str | None
     rate_of: sp.Symbol | None = None
+    name: str | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from rigsight.simulate.printing.c import C_LANES, C, limited
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 # Each is written where it is called: some compilers warn of those that are not.
-_FUNCTIONS = {
+FUNCTIONS = {
     "sign_of": "static inline double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }",
     "positive": "static inline double positive(double value) { return value > 0.0 ? value : 0.0; }",
     "within": (
@@ -144,7 +144,7 @@ class KernelEquations:
         }
         texts = {key: str(value) for key, value in fragments.items()}
         bodies = "\n".join(texts.values())
-        called = [text for name, text in _FUNCTIONS.items() if f"{name}(" in bodies]
+        called = [text for name, text in FUNCTIONS.items() if f"{name}(" in bodies]
         return filled(template("equations.c.txt"), {"FUNCTIONS": "\n".join(called), **texts})
 
     def lane_fragments(self) -> dict[str, str]:

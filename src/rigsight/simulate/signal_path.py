@@ -92,8 +92,6 @@ class _Binder:
             moved = (coordinate.symbol, coordinate.rate, acceleration(coordinate))
             own |= dict(zip(moved, inputs[str(coordinate.prescribed_by)], strict=True))
         self._own = own
-        for symbol, expression in mechanism.signals.items():
-            own[symbol] = self.rig(expression)
 
     def rig(self, expression: sp.Expr) -> sp.Expr:
         """Bind an expression of the rig's declaration."""
@@ -123,7 +121,8 @@ class _Path:
         self._effects = effects
         self._definitions: list[Definition] = []
         self._values: dict[sp.Symbol, sp.Expr] = {}
-        """What drives, sensors and joint forces are, by the symbols under which others read them."""
+        """What signals, drives and sensors are, by the symbols under which others read them."""
+        self._read = _read_by_laws(rig)
 
     def tree(self) -> EquationTree:
         """Walk the path."""
@@ -167,7 +166,9 @@ class _Path:
                 self._drive(drives[name])
             else:
                 self._sensor(sensors[name], {}, [])
-        return tuple(self._bound(expression) for expression in expressions)
+        bound = tuple(self._bound(expression) for expression in expressions)
+        tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
+        return tuple(map(tree.flattened, bound))
 
     def _inputs(self) -> tuple[sp.Symbol, ...]:
         mechanism, found = self._rig.mechanism, []
@@ -206,14 +207,25 @@ class _Path:
 
     def _bound(self, expression: sp.Expr) -> sp.Expr:
         """Bind an expression of the rig, drives and sensors as they are behind their effects."""
+        for symbol, signal in self._rig.mechanism.signals.items():
+            if symbol in expression.free_symbols and symbol not in self._values:
+                self._values[symbol] = self._name(Kind.SIGNAL, symbol.name, self._bound(signal))
         return self._binder.rig(expression).xreplace(self._values)
+
+    def _name(self, kind: Kind, name: str, expression: sp.Expr) -> sp.Symbol:
+        """Return a symbol for what the rig calls by a name; what is one symbol already keeps it."""
+        if expression.is_Symbol:
+            return expression
+        symbol = sp.Symbol(f"{name}:{kind.value}", real=True)
+        self._definitions.append(Definition(symbol, expression, kind, None, name=name))
+        return symbol
 
     def _at(self, place: str, *kinds: Place) -> list[Effect]:
         return [e for e in self._effects if e.place in kinds and self._rig.acts_at(e) == place]
 
     def _drive(self, drive: Drive) -> list[FirstOrderState]:
         """Chain the actuator effects: what is static or a lag may as well act on what is late already."""
-        source, lags = self._bound(drive.signal), []
+        source, lags = self._name(Kind.DRIVE, drive.name, self._bound(drive.signal)), []
         effects = self._at(drive.name, Place.ACTUATOR)
         for effect in effects:
             if effect.delay is not None:
@@ -339,6 +351,8 @@ class _Path:
             if effect.measured_late is not None:
                 delay = self._binder.effect(effect, effect.measured_late, self._of_motion())
                 reading = self._define(Kind.READING, effect, late(reading, delay))
+        if reading_symbol(sensor.name) in self._read:
+            reading = self._name(Kind.READING, sensor.name, reading)
         self._values[reading_symbol(sensor.name)] = reading
         return (reading,)
 
@@ -361,6 +375,15 @@ class _Path:
             )
             for s in effect.states
         ]
+
+
+def _read_by_laws(rig: Rig) -> frozenset[sp.Symbol]:
+    """Return the symbols of sensors that control laws, signals, states or other sensors read."""
+    mechanism = rig.mechanism
+    laws = [drive.signal for drive in mechanism.drives] + [drive.force for drive in mechanism.drives]
+    laws += [*mechanism.signals.values(), *(state.rate for state in mechanism.states)]
+    laws += [*(joint.force for joint in mechanism.joints), *(sensor.reads for sensor in mechanism.sensors)]
+    return frozenset().union(*(law.free_symbols for law in laws))
 
 
 def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:

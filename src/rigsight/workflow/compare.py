@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 
 from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
 from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.drift import can_drift
 from rigsight.diagnose.windows import cut, window_length
 from rigsight.errors import InputError, check_option
 from rigsight.identify.record_response import METHODS, Method
@@ -23,7 +24,6 @@ from rigsight.workflow.compare_files import comparison_csv, comparison_json
 from rigsight.workflow.diagnose import versions
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.model_file import MODEL_FILE, named_model
-from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
@@ -74,7 +74,6 @@ def run_compare(
     if out is not None:
         check_writable(Path(out))
     read = read_campaign(campaign)
-    check_takes("compare", read.rig, read.records)
     competitors = named_competitors(models, read)
     comparison = compare_campaign(read, competitors, method, step_seconds, jobs, listener)
     if out is not None:
@@ -108,13 +107,17 @@ def compare_campaign(
         If the method is unknown, the step window is no positive number, or no model can be simulated on any record.
     """
     _check_wishes(competitors, method, step_seconds)
-    check_takes("compare", campaign.rig, campaign.records)
+    if method == "thesis" and not campaign.rig.has_one_motion:
+        raise InputError(
+            f"The thesis's method was written for one motion, and the rig '{campaign.rig.name}' has several, several inputs or "
+            "feedback; use --method local_rational."
+        )
     chosen = cast("Method", method)
     rig = campaign.rig
     structures = {c.model.structure.effect_names: c.model.structure for c in competitors}
     prepare_kernels(list(structures.values()), n_jobs, listener)
     # One model without a spring, and all are run in windows: the same yardstick for everyone.
-    drifts = any(c.model.values.get("k", math.inf) == 0.0 for c in competitors) and rig.is_driven
+    drifts = any(can_drift(rig, c.model.values) for c in competitors)
     floors = tuple(
         Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound)
         for floor in noise_floors(rig, campaign.records, drifts)
@@ -209,7 +212,13 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
     InputError
         If it is of another rig.
     """
-    if model.structure.rig.name != campaign.rig.name:
+    own, rig = model.structure.rig, campaign.rig
+    if own.name == rig.name and own.mechanism != rig.mechanism:
+        raise InputError(
+            f"Model '{name}' is of a rig '{own.name}' with other equations than that of {campaign.called}: only models of that rig "
+            "can be compared. Leave it out, or make it anew with this rig file."
+        )
+    if own.name != rig.name:
         raise InputError(
             f"Model '{name}' is of the rig '{model.structure.rig.name}', the records of {campaign.called} are of the rig "
             f"'{campaign.rig.name}': only models of that rig can be compared. Leave it out."

@@ -11,7 +11,6 @@ from rigsight.export import TARGETS, export_model
 from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
 from rigsight.workflow.model_file import read_model
-from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.results import check_target, write_together
 
 
@@ -59,7 +58,6 @@ def run_export(
     """
     chosen = TARGETS[check_option("Target", target, TARGETS)]
     read = read_model(model, own_effects, own_rigs)
-    check_takes("export", read.structure.rig)
     file = Path(f"{read.structure.rig.name}{chosen.suffix}" if out is None else out)
     check_target(file)
     if file.suffix != chosen.suffix:

@@ -8,7 +8,7 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 
-ONE_MOTION_ONLY = frozenset({"compare", "discover", "export", "identify", "vary"})
+ONE_MOTION_ONLY = frozenset({"discover", "identify"})
 """Commands written for rigs of one motion; a command that takes every rig is taken out here."""
 BUILT_IN_ONLY = frozenset({"discover", "identify"})
 """Commands that know the parameters of built-in rigs by their names; one that does not is taken out here."""

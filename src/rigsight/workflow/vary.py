@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,34 +11,22 @@ from typing import Any
 import numpy as np
 
 from rigsight.errors import InputError, SimulationError, check_in_range, check_option
-from rigsight.excitation import log_sweep
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.hysteresis import SpectralRatio, break_frequency, fitted_break_frequency, peak
 from rigsight.parameters import Parameter
 from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
-from rigsight.rigs import evaluated
-from rigsight.simulate import parameter_vector, rest_state, simulate
-from rigsight.simulate.input_hold import hold_input
+from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
 from rigsight.workflow.kernels import prepare_kernels
 from rigsight.workflow.model_file import named_model
-from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
+from rigsight.workflow.variation_sweep import MARGIN, Pair, variation_sweep
 
 VARY_FILE = "vary.json"
 VARYING = "Sweeping"
 SCHEMA_VERSION = 1
-_BAND = (1.0 / 12.0, 6.0)
-"""Ends of the band over the natural frequency at the amplitude of the sweep."""
-_MARGIN = (0.5, 1.6)
-"""Factors by which the sweep reaches beyond the band."""
-_GROWTH = math.log(640.0 / 1e-3) / 150.0 / 12.0
-"""Rate of the thesis's sweep (section 4.2) per radian of the identified natural frequency, e-folds per radian."""
-_SAMPLES_PER_PERIOD = 10.0
-"""At the end of the sweep."""
-_N_FREQUENCIES = 96
 _MOST_STEPS = 50
 
 
@@ -85,6 +72,8 @@ def run_vary(
     steps: int = 5,
     amplitude: float = 1.0,
     band: tuple[float, float] | None = None,
+    source: str | None = None,
+    response: str | None = None,
     listener: Listener = silent,
 ) -> tuple[Variation, ...]:
     """Sweep a model with several values of each parameter, all others as they are.
@@ -104,7 +93,10 @@ def run_vary(
     amplitude
         Amplitude of the sweep, in the unit of the input.
     band
-        Angular frequencies [rad/s]; default is about the natural frequency at this amplitude.
+        Angular frequencies [rad/s]; default is about the natural frequency at this amplitude, on a rig of several motions about
+        all of its natural frequencies.
+    source, response
+        Names of the input that is swept, the others at rest, and of the sensor that answers; default is the first of each.
     listener
         Told of every finished sweep.
 
@@ -116,12 +108,16 @@ def run_vary(
     if out is not None:
         check_writable(Path(out))
     read = named_model(model)
-    check_takes("vary", read.structure.rig)
-    if not read.structure.rig.is_driven:
+    rig = read.structure.rig
+    if not rig.is_driven or not rig.inputs:
+        why = "prescribes the motion" if rig.inputs else "has no input"
         raise InputError(
-            f"'vary' sweeps a rig whose input moves a mass, and {model} is of the rig '{read.structure.rig.name}', which "
-            "prescribes the motion. Use a model of a driven rig."
+            f"'vary' sweeps a rig whose input moves a mass, and {model} is of the rig '{rig.name}', which {why}."
         )
+    pair = Pair(
+        _signal("--input", source, [signal.name for signal in rig.inputs]),
+        _signal("--output", response, [signal.name for signal in rig.outputs]),
+    )
     check_in_range("The number of values (--steps)", steps, 2, _MOST_STEPS)
     check_in_range("The amplitude (--amplitude)", amplitude, np.nextafter(0.0, 1.0), 1e12)
     chosen = [_named(read, name) for name in dict.fromkeys(parameters)]
@@ -130,7 +126,7 @@ def run_vary(
     if len(chosen) > 1 and (low is not None or high is not None):
         raise InputError("--from and --to belong to one parameter: name one, or leave them out.")
     tries = [_values(p, read.values[p.name], low, high, steps) for p in chosen]
-    excitation, ratio = _sweep(read, amplitude, band)
+    excitation, ratio = variation_sweep(read, pair, amplitude, band)
     prepare_kernels([read.structure], 1, listener)
     stage = Stage(VARYING, sum(len(values) for values in tries), listener)
     variations = []
@@ -176,6 +172,10 @@ def _plain(value: float) -> str:
     return f"{value:.4g}"
 
 
+def _signal(option: str, wished: str | None, known: Sequence[str]) -> str:
+    return known[0] if wished is None else check_option(option, wished, known)
+
+
 def _named(model: Model, name: str) -> Parameter:
     known = {p.name: p for p in model.structure.parameters}
     parameter = known[check_option("The parameter (--parameter)", name, known)]
@@ -207,57 +207,6 @@ def _values(
     return [float(value) for value in values]
 
 
-def _sweep(model: Model, amplitude: float, band: tuple[float, float] | None) -> tuple[Record, SpectralRatio]:
-    rig = model.structure.rig
-    if band is None:
-        natural = _natural_frequency(model, amplitude)
-        band = (_BAND[0] * natural, _BAND[1] * natural)
-    if not 0.0 < band[0] < band[1] < math.inf:
-        raise InputError(
-            f"The band needs 0 < lowest < highest, got {band[0]:g} and {band[1]:g} rad/s (--lowest, --highest)."
-        )
-    start, stop = _MARGIN[0] * band[0], _MARGIN[1] * band[1]
-    dt = 2.0 * math.pi / (_SAMPLES_PER_PERIOD * stop)
-    duration = math.log(stop / start) / (
-        _GROWTH * math.sqrt(band[0] * band[1]) / math.sqrt(_BAND[0] * _BAND[1])
-    )
-    t = dt * np.arange(round(duration / dt) + 1, dtype=np.float64)
-    source, response = rig.inputs[0], rig.outputs[0]
-    record = Record(
-        name=f"sweep of {amplitude:g} {source.unit}",
-        dt=dt,
-        signals={source.name: log_sweep(t, amplitude, start, stop)},
-        units={source.name: source.unit, response.name: response.unit},
-        kind="sweep",
-        amplitude=amplitude,
-        hold=model.hold,
-    )
-    return record, SpectralRatio(source.name, response.name, np.geomspace(*band, _N_FREQUENCIES))
-
-
-def _natural_frequency(model: Model, amplitude: float) -> float:
-    """Return the natural frequency [rad/s] with the stiffness that holds a constant input of this amplitude.
-
-    A hysteretic spring is much stiffer for small motion than where the resonance of a sweep lies.
-    """
-    motion = model.structure.rig.motion
-    drive, stiffness, inertia, rest = (
-        evaluated(part, model.values)
-        for part in (motion.drive_gain, motion.stiffness, motion.inertia, motion.rest)
-    )
-    if stiffness <= 0.0:
-        raise InputError(
-            "The model has no spring and so no natural frequency: give the band with --lowest and --highest [rad/s]."
-        )
-    held = hold_input(np.full(3, amplitude), 1.0, "zoh")
-    with contextlib.suppress(SimulationError):
-        state = rest_state(model.structure, parameter_vector(model.structure, model.values), held)
-        secant = drive * amplitude / (float(state[0]) - rest)
-        if 0.0 < secant < math.inf:
-            stiffness = secant
-    return math.sqrt(stiffness / inertia)
-
-
 def _variant(
     model: Model, parameter: Parameter, value: float, excitation: Record, ratio: SpectralRatio
 ) -> Variant:
@@ -265,7 +214,9 @@ def _variant(
         simulated = simulate(model.structure, {**model.values, parameter.name: value}, excitation)
     except SimulationError as error:
         return Variant(value, None, {}, str(error))
-    response = ratio(simulated)
+    output = simulated[ratio.response]
+    # Where a rig rests is no answer to the sweep.
+    response = ratio(simulated.with_signals(**{ratio.response: output - output[0]}))
     top = peak(response)
     notes = [] if top.is_resonance else ["The magnitude has no peak inside the band."]
     features: dict[str, float | None] = {
@@ -295,7 +246,8 @@ def _write(
     amplitude: float,
 ) -> None:
     rig = model.structure.rig
-    source, response = rig.inputs[0], rig.outputs[0]
+    source = next(signal for signal in rig.inputs if signal.name == ratio.source)
+    response = next(signal for signal in rig.outputs if signal.name == ratio.response)
     contents: dict[str, str | bytes] = {}
     pictures = {}
     for variation in variations:
@@ -322,8 +274,8 @@ def _write(
             "amplitude": amplitude,
             "duration": excitation.duration,
             "dt": excitation.dt,
-            "omega_start": _MARGIN[0] * float(ratio.omega[0]),
-            "omega_stop": _MARGIN[1] * float(ratio.omega[-1]),
+            "omega_start": MARGIN[0] * float(ratio.omega[0]),
+            "omega_stop": MARGIN[1] * float(ratio.omega[-1]),
         },
         "omega": [float(omega) for omega in ratio.omega],
         "parameters": [

@@ -18,7 +18,7 @@ import sympy as sp
 from rigsight.simulate import Structure
 from rigsight.simulate.kinks import freeze
 from rigsight.simulate.printing.python import PYTHON
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+from rigsight.simulate.structure import TIME, input_symbols
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,17 @@ def simulated_instant() -> Callable[..., Instant]:
 def _simulated_instant(
     structure: Structure,
     numbers: Mapping[sp.Symbol, float],
-    source: Callable[[float], float],
-    source_rate: Callable[[float], float],
+    source: Callable[[int, float, int], float],
     time: float,
 ) -> Instant:
-    """Return what is simulated for numbers of states and parameters, and an input as a function of time."""
+    """Return what is simulated for numbers of states and parameters, and inputs as functions of index, time and derivative."""
     frozen = freeze(structure)
     known: dict[sp.Symbol, float] = dict(numbers)
     late = 0.0 if structure.delay is None else _values([structure.delay], known)[0]
-    known |= {INPUT: source(time - late), INPUT_RATE: source_rate(time - late), TIME: time}
+    known[TIME] = time
+    for index in range(len(structure.rig.inputs)):
+        for derivative, symbol in enumerate(input_symbols(index)):
+            known[symbol] = source(index, time - late, derivative)
     for mode, switch in zip(frozen.modes, frozen.switches, strict=True):
         known[mode] = 1.0 if _values([switch], known)[0] >= 0.0 else -1.0
     rates = _values(frozen.rates, known)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.effects import CATALOGUE, effect_named
+from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.rigs import RIGS
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.equation_tree import late
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.kernel_cache import kernel_of
-from rigsight.simulate.printing.names import output_symbol, rate_symbol
+from rigsight.simulate.printing.names import declared_name, output_symbol, rate_symbol
 from rigsight.simulate.printing.shown import ShownEquation, shown_equations
-from rigsight.simulate.structure import INPUT, TIME
+from rigsight.simulate.structure import TIME, input_symbols
 
 _TOGETHER = (
     ("backlash", "bouc_wen_hysteresis"),
@@ -33,12 +33,44 @@ _TOGETHER = (
     ("creep_saturation", "conicity_variation"),
 )
 ONE_MOTION = [name for name, rig in RIGS.items() if rig.has_one_motion]
+_LARGER = ("drive_train", "servo", "cart_pendulum", "two_link_arm", "quarter_car")
+_TOGETHER_AT_PLACES = (
+    ("drive_train", "backlash@shaft", "coulomb_friction@load_bearing", "coulomb_friction@motor_bearing"),
+    ("drive_train", "bouc_wen_hysteresis@shaft", "input_saturation@motor", "sensor_lag@load_angle", "sensor_lag@motor_angle"),
+    ("servo", "sensor_lag@angle", "input_saturation@motor", "actuator_lag@motor", "stribeck_friction@gearbox"),
+    ("two_link_arm", "input_dead_zone@shoulder_motor", "input_dead_zone@elbow_motor", "cubic_stiffness@elbow"),
+    ("quarter_car", "cubic_stiffness@tire", "cubic_stiffness@suspension", "quadratic_damping@suspension"),
+)  # fmt: skip
 CASES = [
     (rig, names)
     for rig in ONE_MOTION
     for names in ((), *((effect.name,) for effect in CATALOGUE), *_TOGETHER)
     if all(RIGS[rig].offers(effect_named(name)) for name in names)
 ]
+
+
+def composed(rig: str, names: Sequence[str]) -> Structure:
+    """A rig with effects, each at its place where one is named."""
+    parts = [name.partition("@") for name in names]
+    chosen = [placed(effect_named(kind), place) if place else effect_named(kind) for kind, _, place in parts]
+    return compose(RIGS[rig], chosen)
+
+
+def is_a_delay(effect: Effect) -> bool:
+    return effect.delay is not None or effect.measured_late is not None
+
+
+AT_PLACES = [
+    *((rig, ()) for rig in _LARGER),
+    *((rig, (f"{effect.name}@{place}",))
+      for rig in _LARGER
+      for effect in CATALOGUE
+      for place in RIGS[rig].places(effect.place)
+      if RIGS[rig].offers(placed(effect, place)) and not is_a_delay(effect)),
+    *((rig, names) for rig, *names in _TOGETHER_AT_PLACES),
+]  # fmt: skip
+"""Every effect at every place; a delay on these rigs is refused by the simulation itself."""
+KERNELS = [*CASES, *(case for case in AT_PLACES if len(case[1]) != 1)]
 _INSTANTS = 12
 _MOMENT = 1e-6
 """Step of the compiled kernel [s]; the rates here change by about their size in a second."""
@@ -50,8 +82,8 @@ class Reader:
     def __init__(self, structure: Structure, rng: np.random.Generator) -> None:
         shown = shown_equations(structure)
         self._names = shown.names
-        self._equations = {e.left: e for e in shown.equations if isinstance(e.left, sp.Symbol)}
-        self._masses = [e for e in shown.equations if not isinstance(e.left, sp.Symbol)]
+        self._equations = {e.left: e for e in shown.equations if not e.inertia}
+        self._motion = [e for e in shown.equations if e.inertia]
         self._states = set(structure.states)
         self.now = float(rng.uniform(0.0, 5.0))
         self.numbers = {symbol: float(rng.uniform(0.3, 0.9)) for symbol in structure.parameter_symbols}
@@ -60,7 +92,9 @@ class Reader:
             # At both ends of its range, where no rounding puts it inside again, and well inside.
             place = rng.choice([-1.0 - 1e-9, 1.0 + 1e-9, rng.uniform(-0.9, 0.9)])
             self.numbers[state] = place * self.value(half_width, self.now)
-        self._amplitude, self._frequency = rng.normal(), rng.uniform(0.5, 2.0)
+        self._inputs = [
+            (input_symbols(i), rng.normal(), rng.uniform(0.5, 2.0)) for i in range(len(structure.rig.inputs))
+        ]
 
     def rest_at_ends(self) -> None:
         """Put what is beyond an end of its range, by no more than rounding, exactly there."""
@@ -70,11 +104,12 @@ class Reader:
                 end = self.value(half_width, self.now)
                 self.numbers[state] = min(max(self.numbers[state], -end), end)
 
-    def source(self, time: float) -> float:
-        return float(self._amplitude * math.sin(self._frequency * time))
-
-    def source_rate(self, time: float) -> float:
-        return float(self._amplitude * self._frequency * math.cos(self._frequency * time))
+    def source(self, index: int, time: float, derivative: int = 0) -> float:
+        """Return an input, or a derivative of it: waves of different periods."""
+        _, amplitude, frequency = self._inputs[index]
+        return float(
+            amplitude * frequency**derivative * math.sin(frequency * time + 0.5 * math.pi * derivative)
+        )
 
     def value(self, expression: sp.Expr, time: float) -> float:
         """Evaluate an expression at a time."""
@@ -89,10 +124,17 @@ class Reader:
         if state in self._dotted:
             return self._symbol(self._dotted[state], self.now)
         symbol = rate_symbol(state)
-        for equation in self._masses:
-            mass = sp.diff(equation.left, symbol)
-            if mass != 0:
-                return self._sum(equation, self.now) / self.value(mass, self.now)
+        accelerations = list(dict.fromkeys(rate for e in self._motion for _, rate in e.inertia))
+        if symbol in accelerations:
+            masses = [
+                [
+                    self.value({r: m for m, r in e.inertia}.get(rate, sp.Integer(0)), self.now)
+                    for rate in accelerations
+                ]
+                for e in self._motion
+            ]
+            forces = [self._sum(equation, self.now) for equation in self._motion]
+            return float(np.linalg.solve(masses, forces)[accelerations.index(symbol)])
         equation = self._equations[symbol]
         rate = self._sum(equation, self.now)
         if equation.limit is not None:
@@ -106,8 +148,9 @@ class Reader:
         symbol = output_symbol(name)
         if symbol in self._equations:
             return self._symbol(symbol, time)
-        (state,) = (s for s in self._states if self._names[s].plain == name)
-        return self._symbol(state, time)
+        # What the rig has under the column's name already.
+        (column,) = (s for s in (*self._states, *self._equations) if self._names[s] == declared_name(name))
+        return self._symbol(column, time)
 
     @property
     def _dotted(self) -> dict[sp.Symbol, sp.Symbol]:
@@ -127,8 +170,9 @@ class Reader:
             # What a state was at another time is not known: where it is asked for, a delay stands in the wrong place.
             assert symbol not in self._states or time == pytest.approx(self.now)
             return self.numbers[symbol]
-        if symbol == INPUT:
-            return self.source(time)
+        for index, (derivatives, *_) in enumerate(self._inputs):
+            if symbol == derivatives[0]:
+                return self.source(index, time)
         if symbol == TIME:
             return time
         (below,) = (s for s, name in self._names.items() if name.dotted() == self._names[symbol])
@@ -138,8 +182,9 @@ class Reader:
         """Return what a dot above a symbol means: its time derivative, along those of what it is made of."""
         if symbol in self._states:
             return self.rate(symbol)
-        if symbol == INPUT:
-            return self.source_rate(time)
+        for index, (derivatives, *_) in enumerate(self._inputs):
+            if symbol in derivatives[:2]:
+                return self.source(index, time, derivatives.index(symbol) + 1)
         if symbol not in self._equations:
             return 0.0
         expression = sp.Add(*self._equations[symbol].terms)
@@ -155,7 +200,8 @@ class Reader:
 
 @cache
 def _function(expression: sp.Expr, symbols: tuple[sp.Symbol, ...]):
-    known = [{"positive_part": lambda value: np.maximum(value, 0.0)}, "numpy"]
+    limits = {"min": np.minimum, "max": np.maximum, "clip": np.clip}
+    known = [{"positive_part": lambda value: np.maximum(value, 0.0), **limits}, "numpy"]
     return sp.lambdify(list(symbols), expression, known)
 
 
@@ -164,13 +210,17 @@ def _number(expression: sp.Expr, known: dict[sp.Symbol, float]) -> float:
     return float(_function(expression, symbols)(*(known[s] for s in symbols)))
 
 
-@pytest.mark.parametrize(("rig", "names"), CASES, ids=["+".join([rig, *names]) for rig, names in CASES])
+def _ids(cases: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
+    return ["+".join([rig, *names]) for rig, names in cases]
+
+
+@pytest.mark.parametrize(("rig", "names"), [*CASES, *AT_PLACES], ids=_ids([*CASES, *AT_PLACES]))
 def test_what_is_shown_is_what_is_simulated(simulated_instant, rig: str, names: Sequence[str]) -> None:
-    structure = compose(RIGS[rig], [effect_named(name) for name in names])
+    structure = composed(rig, names)
     rng = np.random.default_rng(5)
     for _ in range(_INSTANTS):
         reader = Reader(structure, rng)
-        instant = simulated_instant(structure, reader.numbers, reader.source, reader.source_rate, reader.now)
+        instant = simulated_instant(structure, reader.numbers, reader.source, reader.now)
         for state in structure.states:
             assert reader.rate(state) == pytest.approx(instant.rates[state], rel=1e-9, abs=1e-12), state
         for i, (name, value) in enumerate(instant.outputs.items()):
@@ -178,21 +228,30 @@ def test_what_is_shown_is_what_is_simulated(simulated_instant, rig: str, names: 
             assert reader.output(name, read_at) == pytest.approx(value, rel=1e-9, abs=1e-12), name
 
 
-@pytest.mark.parametrize(("rig", "names"), CASES, ids=["+".join([rig, *names]) for rig, names in CASES])
+@pytest.mark.parametrize(("rig", "names"), KERNELS, ids=_ids(KERNELS))
 def test_the_compiled_kernel_moves_as_shown(rig: str, names: Sequence[str]) -> None:
     """Over a step so short that nothing but the rates at its start matters."""
-    structure = compose(RIGS[rig], [effect_named(name) for name in names])
+    structure = composed(rig, names)
     kernel = kernel_of(structure)
+    prescribed = {coordinate.prescribed_by for coordinate in structure.rig.mechanism.prescribed}
+    follows = [signal.name in prescribed for signal in structure.rig.inputs]
     rng = np.random.default_rng(6)
     for _ in range(3):
         reader = Reader(structure, rng)
         reader.rest_at_ends()
-        value, rate = reader.source(reader.now), reader.source_rate(reader.now)
-        if structure.rig.is_driven:
-            # So that it does not matter when a delayed input was sent.
-            rate = 0.0
-            reader.source = lambda _, value=value: value
-        held = HeldInput(np.tile([value, rate, 0.0, 0.0], (2, 1)), _MOMENT, 1, continuous=True)
+        waves, now = reader.source, reader.now
+
+        def held_still(index: int, time: float, derivative: int = 0, waves=waves, now=now) -> float:
+            """Between the samples of a moment: along its slope where a motion follows it, else constant, whenever it was sent."""
+            if derivative > 1 or (derivative == 1 and not follows[index]):
+                return 0.0
+            start = waves(index, now, derivative)
+            return start + (time - now) * waves(index, now, 1) * (follows[index] and derivative == 0)
+
+        reader.source = held_still
+        pieces = [[held_still(i, now), held_still(i, now, 1), 0.0, 0.0] for i in range(len(follows))]
+        coefficients = np.array([pieces, pieces]) if len(follows) > 1 else np.array([pieces[0], pieces[0]])
+        held = HeldInput(coefficients, _MOMENT, 1, continuous=True)
         p = np.array([reader.numbers[symbol] for symbol in structure.parameter_symbols])
         start = np.array([reader.numbers[state] for state in structure.states])
         status, out, end = kernel.simulate_one(held, p, start, 1e-10, 2)
@@ -209,11 +268,20 @@ def test_the_compiled_kernel_moves_as_shown(rig: str, names: Sequence[str]) -> N
 def test_no_two_symbols_of_an_equation_have_the_same_name(rig: str) -> None:
     offered = [effect for effect in CATALOGUE if RIGS[rig].offers(effect)]
     for pair in combinations(offered, 2):
-        shown = shown_equations(compose(RIGS[rig], pair))
-        used = {
-            symbol
-            for equation in shown.equations
-            for expression in (equation.left, *equation.terms, *(equation.limit or ()))
-            for symbol in expression.free_symbols
-        }
-        assert len({shown.names[symbol] for symbol in used}) == len(used), [effect.name for effect in pair]
+        assert_names_differ(compose(RIGS[rig], pair))
+
+
+@pytest.mark.parametrize(("rig", "names"), AT_PLACES, ids=_ids(AT_PLACES))
+def test_no_two_symbols_of_a_larger_rig_have_the_same_name(rig: str, names: Sequence[str]) -> None:
+    assert_names_differ(composed(rig, names))
+
+
+def assert_names_differ(structure: Structure) -> None:
+    shown = shown_equations(structure)
+    used = {
+        symbol
+        for equation in shown.equations
+        for expression in (equation.left, *equation.terms, *(equation.limit or ()))
+        for symbol in expression.free_symbols
+    }
+    assert len({shown.names[symbol] for symbol in used}) == len(used), structure.effect_names

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 
 import sympy as sp
 from sympy.printing.latex import LatexPrinter as SympyLatexPrinter
+from sympy.printing.precedence import PRECEDENCE
 
 from rigsight.simulate.printing.names import GREEK, ShownName, named
+from rigsight.simulate.printing.reading_order import ReadingOrder
 from rigsight.simulate.printing.shown import ShownEquation
 
 _DIGITS = 6
@@ -50,7 +52,7 @@ def latex_text(text: str, *, math: bool = False) -> str:
     return re.sub(special, r"\\\1", text.replace("\\", "/")).replace("\\^", r"\^{}")
 
 
-class LatexPrinter(SympyLatexPrinter):  # type: ignore[misc]
+class LatexPrinter(ReadingOrder, SympyLatexPrinter):  # type: ignore[misc]
     """sympy's LaTeX with the names that people read.
 
     Parameters
@@ -74,6 +76,10 @@ class LatexPrinter(SympyLatexPrinter):  # type: ignore[misc]
     def _print_late(self, expression: sp.Expr) -> str:
         signal, delay = map(self._print, expression.args)
         return rf"{signal}\left(t - {delay}\right)"
+
+    def _print_moved(self, expression: sp.Expr) -> str:
+        mass, rate = expression.args
+        return f"{self.parenthesize(mass, PRECEDENCE['Mul'], strict=True)} {self._print(rate)}"
 
 
 def _below(word: str) -> str:

@@ -7,8 +7,10 @@ from typing import Any
 
 import sympy as sp
 from sympy.printing.mathml import MathMLPresentationPrinter
+from sympy.printing.precedence import PRECEDENCE
 
 from rigsight.simulate.printing.names import ShownName, named
+from rigsight.simulate.printing.reading_order import ReadingOrder
 from rigsight.simulate.printing.shown import ShownEquation
 
 _TIMES = '<mo lspace="0.14em" rspace="0.14em">&InvisibleTimes;</mo>'
@@ -32,7 +34,7 @@ def mathml_equation(equation: ShownEquation, names: Mapping[sp.Symbol, ShownName
     return f'<math display="block"><mrow>{left}<mo>=</mo>{right}</mrow></math>'
 
 
-class MathMLPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
+class MathMLPrinter(ReadingOrder, MathMLPresentationPrinter):  # type: ignore[misc]
     """sympy's MathML with the names that people read.
 
     Parameters
@@ -72,6 +74,13 @@ class MathMLPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
         open_, close = self._text("mo", "("), self._text("mo", ")")
         return self._element(
             "mrow", signal, open_, self._text("mi", "t"), self._text("mo", "-"), delay, close
+        )
+
+    def _print_moved(self, expression: sp.Expr) -> Any:
+        mass, rate = expression.args
+        times = self._text("mo", "&InvisibleTimes;")
+        return self._element(
+            "mrow", self.parenthesize(mass, PRECEDENCE["Mul"], strict=True), times, self._print(rate)
         )
 
     def _print_Float(self, e: sp.Float) -> Any:  # noqa: N802

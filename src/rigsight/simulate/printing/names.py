@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from rigsight.effects import kind_of
+from rigsight.rigs import Rig
 from rigsight.simulate.equation_tree import Kind
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME, Structure
+from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 GREEK = frozenset({
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "rho", "sigma",
@@ -62,8 +64,8 @@ def named(expression: sp.Expr, names: Mapping[sp.Symbol, ShownName]) -> sp.Expr:
 
 
 def in_words(name: str) -> str:
-    """Return an effect's name as words."""
-    return name.replace("_", " ")
+    """Return an effect's name as words: ``"coulomb friction at load bearing"``."""
+    return name.replace("_", " ").replace("@", " at ")
 
 
 def declared_name(name: str) -> ShownName:
@@ -91,41 +93,79 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
 
     Notes
     -----
-    Where two effects, or an effect and the rig, call something the same, those of effects carry their effect's name below.
+    Where two effects, or an effect and the rig, call something the same, those of effects carry their effect's name below. A
+    prescribed motion bears the name of the input that it follows.
     """
     rig, tree = structure.rig, structure.tree
-    source = declared_name(rig.inputs[0].name)
-    moving = declared_name((rig.outputs if rig.is_driven else rig.inputs)[0].name)
-    names = {TIME: ShownName("t"), INPUT: source}
-    if not rig.is_driven:
-        names[INPUT_RATE] = moving.dotted()
+    names = {TIME: ShownName("t"), **_input_names(rig)}
     for coordinate, velocity in zip(tree.motion.coordinates, tree.motion.velocities, strict=True):
-        names |= {
-            coordinate: moving,
-            velocity: moving.dotted(),
-            rate_symbol(velocity): moving.dotted().dotted(),
-        }
-    parameters = zip(structure.parameter_symbols, structure.names, strict=True)
-    states = ((state.symbol, state.symbol.name) for state in tree.states)
-    names |= _told_apart([*parameters, *states], names.values(), label)
+        own = declared_name(coordinate.name)
+        names |= {coordinate: own, velocity: own.dotted(), rate_symbol(velocity): own.dotted().dotted()}
+    names |= _told_apart(_owned(structure), names.values(), label)
     for state, rate in kinematic_states(structure).items():
         names[rate] = names[state].dotted()
     for state in tree.states:
         names[rate_symbol(state.symbol)] = names[state.symbol].dotted()
+    signals = _signal_names(structure)
     for definition in tree.definitions:
-        owner = () if definition.owner is None else (label(definition.owner),)
         if definition.rate_of is not None:
             names[definition.symbol] = names[definition.rate_of].dotted()
+        elif definition.owner is None:
+            names[definition.symbol] = _free(declared_name(str(definition.name)), names)
         elif definition.kind in _LETTERS:
             letter, *words = _LETTERS[definition.kind]
-            names[definition.symbol] = ShownName(letter, (*words, *owner))
+            names[definition.symbol] = ShownName(letter, (*words, label(definition.owner)))
         else:
-            before = source if definition.kind is Kind.DRIVE else moving
-            names[definition.symbol] = ShownName(before.letter, (*before.below, *owner))
+            # The place is that of the signal; it is said where two effects change signals of one name.
+            before, kind = signals[definition.owner], label(kind_of(definition.owner))
+            short = before.beside(kind)
+            names[definition.symbol] = (
+                before.beside(label(definition.owner)) if short in names.values() else short
+            )
     for output in tree.outputs:
-        name = declared_name(output.name)
-        names[output_symbol(output.name)] = name.beside("measured") if name in names.values() else name
+        names[output_symbol(output.name)] = _free(declared_name(output.name), names)
     return names
+
+
+def _input_names(rig: Rig) -> dict[sp.Symbol, ShownName]:
+    """Return the names of the inputs, and of the rates of those that prescribe a motion."""
+    names = {}
+    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
+    for index, source in enumerate(rig.mechanism.inputs):
+        value, rate, curvature = input_symbols(index)
+        names[value] = declared_name(source)
+        if source in prescribing:
+            names |= {rate: names[value].dotted(), curvature: names[value].dotted().dotted()}
+    return names
+
+
+def _owned(structure: Structure) -> list[tuple[sp.Symbol, str, str | None]]:
+    """Return parameters and states beside the motion: symbol, own name, and the effect that it belongs to."""
+    of_effects = {
+        structure.parameter_name(effect, parameter.name): (parameter.name, effect.name)
+        for effect in structure.effects
+        for parameter in effect.parameters
+    }
+    parameters = zip(structure.parameter_symbols, structure.names, strict=True)
+    owned = [(symbol, *of_effects.get(name, (name, None))) for symbol, name in parameters]
+    return owned + [(s.symbol, s.symbol.name.rpartition(".")[2], s.owner) for s in structure.tree.states]
+
+
+def _signal_names(structure: Structure) -> dict[str, ShownName]:
+    """Return, by effect, the name of the drive's or the sensor's signal that it changes."""
+    mechanism = structure.rig.mechanism
+    shown = {sensor.name: sensor.name for sensor in mechanism.sensors}
+    for drive in mechanism.drives:
+        # A drive that is told one signal is shown by it: u, and what an effect makes of u.
+        one = drive.signal.is_Symbol and drive.signal.name.isidentifier()
+        shown[drive.name] = drive.signal.name if one else drive.name
+    places = {effect.name: structure.rig.acts_at(effect) for effect in structure.effects}
+    return {effect: declared_name(shown[place]) for effect, place in places.items() if place in shown}
+
+
+def _free(name: ShownName, names: Mapping[sp.Symbol, ShownName]) -> ShownName:
+    """Return a name for what is measured: the coordinate of the same name may be another number."""
+    return name.beside("measured") if name in names.values() else name
 
 
 def output_symbol(name: str) -> sp.Symbol:
@@ -150,13 +190,13 @@ def kinematic_states(structure: Structure) -> dict[sp.Symbol, sp.Symbol]:
 
 
 def _told_apart(
-    sources: list[tuple[sp.Symbol, str]], taken: Iterable[ShownName], label: Callable[[str], str]
+    sources: list[tuple[sp.Symbol, str, str | None]], taken: Iterable[ShownName], label: Callable[[str], str]
 ) -> dict[sp.Symbol, ShownName]:
-    own = {symbol: declared_name(source.rpartition(".")[2]) for symbol, source in sources}
+    own = {symbol: declared_name(name) for symbol, name, _ in sources}
     every = [*taken, *own.values()]
     return {
-        symbol: own[symbol].beside(label(source.rpartition(".")[0]))
-        if "." in source and every.count(own[symbol]) > 1
+        symbol: own[symbol].beside(label(owner))
+        if owner is not None and every.count(own[symbol]) > 1
         else own[symbol]
-        for symbol, source in sources
+        for symbol, _, owner in sources
     }

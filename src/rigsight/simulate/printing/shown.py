@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from rigsight.simulate.equation_tree import late
+from rigsight.simulate.printing.limits import with_limits
 from rigsight.simulate.printing.names import (
     ShownName,
+    declared_name,
     in_words,
     kinematic_states,
     output_symbol,
@@ -17,6 +19,12 @@ from rigsight.simulate.printing.names import (
     shown_names,
 )
 from rigsight.simulate.structure import Structure
+
+
+class moved(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """A mass and the acceleration it is multiplied by, in this order."""
+
+    is_real = True
 
 
 @dataclass(frozen=True)
@@ -33,25 +41,22 @@ class ShownEquation:
         What it is, in the order of reading.
     limit
         A state and the half-width of the range that it cannot leave: it rests at the end it is driven against.
+    inertia
+        The masses with their accelerations that `left` is the sum of, in the order of reading.
     """
 
     owner: str | None
     left: sp.Expr
     terms: tuple[sp.Expr, ...]
     limit: tuple[sp.Symbol, sp.Expr] | None = None
+    inertia: tuple[tuple[sp.Expr, sp.Symbol], ...] = ()
 
     @property
     def signed_terms(self) -> tuple[tuple[str, sp.Expr], ...]:
         """The terms, each with what joins it to the one before: ``+``, ``-``, or nothing at the head."""
         if len(self.terms) == 1:
             return (("", self.terms[0]),)
-        parts = [part for term in self.terms for part in sp.Add.make_args(term)]
-        signed: list[tuple[str, sp.Expr]] = []
-        for part in parts:
-            negative = part.as_coeff_Mul()[0].is_negative
-            plus = "+" if signed else ""
-            signed.append(("-", -part) if negative else (plus, part))
-        return tuple(signed)
+        return _signed(part for term in self.terms for part in sp.Add.make_args(term))
 
     def written(
         self, expression: Callable[[sp.Expr], str], joined: Mapping[str, str], within: str
@@ -67,11 +72,29 @@ class ShownEquation:
         within
             How it writes that a state stays within a half-width, with a ``%s`` for each of the two.
         """
-        right = "".join(joined[sign] + expression(term) for sign, term in self.signed_terms)
+
+        def summed(signed: Iterable[tuple[str, sp.Expr]]) -> str:
+            return "".join(joined[sign] + expression(term) for sign, term in signed)
+
+        signs = _signed(mass for mass, _ in self.inertia)
+        left = [
+            (sign, mass * rate if mass.is_Atom else moved(mass, rate))
+            for (sign, mass), (_, rate) in zip(signs, self.inertia, strict=True)
+        ]
+        right = summed(self.signed_terms)
         if self.limit is not None:
             state, half_width = self.limit
             right += within % (expression(state), expression(half_width))
-        return expression(self.left), right
+        return summed(left) if left else expression(self.left), right
+
+
+def _signed(parts: Iterable[sp.Expr]) -> tuple[tuple[str, sp.Expr], ...]:
+    signed: list[tuple[str, sp.Expr]] = []
+    for part in parts:
+        negative = part.as_coeff_Mul()[0].is_negative
+        plus = "+" if signed else ""
+        signed.append(("-", -part) if negative else (plus, part))
+    return tuple(signed)
 
 
 @dataclass(frozen=True)
@@ -111,7 +134,8 @@ def shown_equations(structure: Structure, label: Callable[[str], str] = in_words
     effects = [
         ShownEquation(d.owner, d.symbol, (d.expression,)) for d in tree.definitions if d.rate_of is None
     ]
-    every = [*_motion(structure), *effects, *_states(structure), *_outputs(structure)]
+    every = [*_motion(structure), *effects, *_states(structure), *_outputs(structure, names)]
+    every = [replace(e, terms=tuple(map(with_limits, e.terms))) for e in every]
     owners = dict.fromkeys([None, *(equation.owner for equation in every)])
     return ShownEquations(names, tuple(e for owner in owners for e in every if e.owner == owner))
 
@@ -134,27 +158,34 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
             value = late(*tree.lateness(definition.symbol))
         values[definition.symbol] = value.xreplace(values)
 
+    names = shown_names(structure)
+
     def flat(expression: sp.Expr) -> sp.Expr:
         return expression.xreplace(values).xreplace(numbers)
 
-    every = [*_motion(structure), *_states(structure), *_outputs(structure)]
+    every = [*_motion(structure), *_states(structure), *_outputs(structure, names)]
     flattened = (
         replace(
             equation,
             left=flat(equation.left),
+            inertia=tuple((flat(mass), rate) for mass, rate in equation.inertia),
             terms=tuple(term for term in map(flat, equation.terms) if term != 0) or (sp.Integer(0),),
             limit=None if equation.limit is None else (equation.limit[0], flat(equation.limit[1])),
         )
         for equation in every
     )
-    return ShownEquations(shown_names(structure), tuple(flattened))
+    return ShownEquations(names, tuple(flattened))
 
 
 def _motion(structure: Structure) -> list[ShownEquation]:
     motion = structure.tree.motion
-    accelerations = sp.Matrix([rate_symbol(velocity) for velocity in motion.velocities])
-    inertial = motion.mass * accelerations if motion.velocities else ()
-    return [ShownEquation(None, left, terms) for left, terms in zip(inertial, motion.terms, strict=True)]
+    accelerations = [rate_symbol(velocity) for velocity in motion.velocities]
+    equations = []
+    for row, terms in zip(motion.mass.tolist() if accelerations else (), motion.terms, strict=True):
+        inertia = tuple((mass, rate) for mass, rate in zip(row, accelerations, strict=True) if mass != 0)
+        left = sp.Add(*(mass * rate for mass, rate in inertia))
+        equations.append(ShownEquation(None, left, terms or (sp.S.Zero,), inertia=inertia))
+    return equations
 
 
 def _states(structure: Structure) -> list[ShownEquation]:
@@ -171,11 +202,10 @@ def _states(structure: Structure) -> list[ShownEquation]:
     ]
 
 
-def _outputs(structure: Structure) -> list[ShownEquation]:
-    # A state that is recorded as it is bears the column's name already.
-    states = structure.states
+def _outputs(structure: Structure, names: Mapping[sp.Symbol, ShownName]) -> list[ShownEquation]:
+    """Return what is recorded, but for what bears the column's name already."""
     return [
         ShownEquation(None, output_symbol(output.name), output.terms)
         for output in structure.tree.outputs
-        if sp.Add(*output.terms) not in states
+        if names.get(sp.Add(*output.terms)) != declared_name(output.name)
     ]

@@ -8,6 +8,7 @@ import sympy as sp
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
+from rigsight.simulate.printing.reading_order import ReadingOrder
 from rigsight.simulate.printing.shown import ShownEquation
 
 _JOINED = {"": "", "+": " + ", "-": " - "}
@@ -27,7 +28,7 @@ class TextPrinter(StrPrinter):  # type: ignore[misc]
         return f"{float(expr):.6g}"
 
 
-class EquationPrinter(TextPrinter):
+class EquationPrinter(ReadingOrder, TextPrinter):
     """Text as equations are read: factors side by side, bars for absolute values."""
 
     def _print_Mul(self, expr: sp.Expr) -> str:  # noqa: N802
@@ -39,6 +40,10 @@ class EquationPrinter(TextPrinter):
     def _print_late(self, expression: sp.Expr) -> str:
         signal, delay = expression.args
         return f"{self._print(signal)}(t - {self.parenthesize(delay, PRECEDENCE['Mul'])})"
+
+    def _print_moved(self, expression: sp.Expr) -> str:
+        mass, rate = expression.args
+        return f"{self.parenthesize(mass, PRECEDENCE['Mul'], strict=True)} {self._print(rate)}"
 
 
 class TermPrinter(EquationPrinter):

@@ -1,0 +1,16 @@
+"""In which order do people read a sum? What is added first, then what is taken off: ``a - b``, never ``-b + a``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+
+class ReadingOrder:
+    """A printer of sympy whose sums begin with what is added."""
+
+    def _as_ordered_terms(self, expr: sp.Expr, order: str | None = None) -> list[sp.Expr]:
+        printer: Any = super()
+        terms: list[sp.Expr] = printer._as_ordered_terms(expr, order=order)
+        return sorted(terms, key=lambda term: bool(term.could_extract_minus_sign()))

@@ -1,0 +1,156 @@
+"""With which sweep is a model asked how it answers? A logarithmic one about its natural frequencies."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from rigsight.errors import InputError, SimulationError
+from rigsight.excitation import log_sweep
+from rigsight.identify.hysteresis import SpectralRatio
+from rigsight.records import Record
+from rigsight.rigs import evaluated
+from rigsight.simulate import parameter_vector, rest_state
+from rigsight.simulate.input_hold import hold_input, together
+from rigsight.simulate.model import Model
+from rigsight.simulate.structure import TIME, input_symbols
+
+MARGIN = (0.5, 1.6)
+"""Factors by which the sweep reaches beyond the band."""
+_BAND = (1.0 / 12.0, 6.0)
+"""Ends of the band over the natural frequency: the lowest and the highest of several, at the amplitude of the sweep."""
+_GROWTH = math.log(640.0 / 1e-3) / 150.0 / 12.0
+"""Rate of the thesis's sweep (section 4.2) per radian of the identified natural frequency, e-folds per radian."""
+_SAMPLES_PER_PERIOD = 10.0
+"""At the end of the sweep."""
+_N_FREQUENCIES = 96
+_OSCILLATES = 0.1
+"""Least share of the imaginary part of a pole that makes a natural frequency: a damping ratio below 0.995."""
+_NUDGE = 1e-6
+"""Step of the differences by which a model is linearized; most kinks are far from rest."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Names of an input and of the sensor that answers."""
+
+    source: str
+    response: str
+
+
+def variation_sweep(
+    model: Model, pair: Pair, amplitude: float, band: tuple[float, float] | None
+) -> tuple[Record, SpectralRatio]:
+    """Return the sweep, the other inputs at rest, and what reads the response.
+
+    Parameters
+    ----------
+    model
+        The model.
+    pair
+        What is swept and what answers.
+    amplitude
+        In the unit of the input.
+    band
+        Angular frequencies [rad/s]; None for those about the model's own.
+
+    Raises
+    ------
+    InputError
+        If the band is none, or the model has no natural frequency to put it about.
+    """
+    rig = model.structure.rig
+    slowest = None
+    if band is None:
+        naturals = _natural_frequencies(model, amplitude)
+        slowest = naturals[0]
+        band = (_BAND[0] * slowest, _BAND[1] * naturals[-1])
+    if not 0.0 < band[0] < band[1] < math.inf:
+        raise InputError(
+            f"The band needs 0 < lowest < highest, got {band[0]:g} and {band[1]:g} rad/s (--lowest, --highest)."
+        )
+    if slowest is None:
+        slowest = math.sqrt(band[0] * band[1]) / math.sqrt(_BAND[0] * _BAND[1])
+    start, stop = MARGIN[0] * band[0], MARGIN[1] * band[1]
+    dt = 2.0 * math.pi / (_SAMPLES_PER_PERIOD * stop)
+    duration = math.log(stop / start) / (_GROWTH * slowest)
+    t = dt * np.arange(round(duration / dt) + 1, dtype=np.float64)
+    prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}
+    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
+    record = Record(
+        name=f"sweep of {amplitude:g} {units[pair.source]}",
+        dt=dt,
+        signals={
+            signal.name: log_sweep(t, amplitude, start, stop)
+            if signal.name == pair.source
+            else np.zeros_like(t)
+            for signal in rig.inputs
+        },
+        units=units,
+        kind="sweep",
+        amplitude=amplitude,
+        # A motion that is prescribed is smooth between its samples, whatever holds an input.
+        hold="band_limited" if pair.source in prescribing else model.hold,
+    )
+    return record, SpectralRatio(pair.source, pair.response, np.geomspace(*band, _N_FREQUENCIES))
+
+
+def _natural_frequencies(model: Model, amplitude: float) -> list[float]:
+    """Return the natural frequencies of a model [rad/s], increasing."""
+    if model.structure.rig.has_one_motion:
+        return [_natural_frequency(model, amplitude)]
+    poles = _poles(model)
+    sizes = np.abs(poles)
+    found = sizes[np.abs(poles.imag) > _OSCILLATES * sizes]
+    if found.size == 0:
+        raise InputError(
+            "The model has no natural frequency about its equilibrium: give the band with --lowest and --highest [rad/s]."
+        )
+    return [float(size) for size in np.unique(found)]
+
+
+def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
+    """Return the eigenvalues of a model about its equilibrium without input."""
+    structure = model.structure
+    p = parameter_vector(structure, model.values)
+    n_inputs = len(structure.rig.inputs)
+    rest = rest_state(structure, p, together([hold_input(np.zeros(2), 1.0, "foh")] * n_inputs))
+    known = dict(zip(structure.parameter_symbols, p, strict=True))
+    known |= {symbol: 0.0 for i in range(n_inputs) for symbol in input_symbols(i)} | {TIME: 0.0}
+    functions = {"positive_part": lambda value: max(value, 0.0)}
+    rates = sp.lambdify(
+        [structure.states], [e.rate.xreplace(known) for e in structure.equations], [functions, "numpy"]
+    )
+    jacobian = np.empty((rest.size, rest.size))
+    for i in range(rest.size):
+        step = np.zeros(rest.size)
+        step[i] = _NUDGE
+        jacobian[:, i] = (np.array(rates(rest + step)) - np.array(rates(rest - step))) / (2.0 * _NUDGE)
+    return np.asarray(np.linalg.eigvals(jacobian), dtype=np.complex128)
+
+
+def _natural_frequency(model: Model, amplitude: float) -> float:
+    """Return the natural frequency [rad/s] with the stiffness that holds a constant input of this amplitude.
+
+    A hysteretic spring is much stiffer for small motion than where the resonance of a sweep lies.
+    """
+    motion = model.structure.rig.motion
+    drive, stiffness, inertia, rest = (
+        evaluated(part, model.values)
+        for part in (motion.drive_gain, motion.stiffness, motion.inertia, motion.rest)
+    )
+    if stiffness <= 0.0:
+        raise InputError(
+            "The model has no spring and so no natural frequency: give the band with --lowest and --highest [rad/s]."
+        )
+    held = hold_input(np.full(3, amplitude), 1.0, "zoh")
+    with contextlib.suppress(SimulationError):
+        state = rest_state(model.structure, parameter_vector(model.structure, model.values), held)
+        secant = drive * amplitude / (float(state[0]) - rest)
+        if 0.0 < secant < math.inf:
+            stiffness = secant
+    return math.sqrt(stiffness / inertia)
