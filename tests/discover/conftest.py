@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rigsight.discover import Task, known_terms
 from rigsight.records import Record
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, Rig, read_rig_file
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3
@@ -91,3 +92,18 @@ def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
 def sweep() -> Callable[[float, float], np.ndarray]:
     """Return a logarithmic sweep of an amplitude and a duration [s]."""
     return _sweep
+
+
+RIG_FILES = Path(__file__).parents[1] / "rigs" / "files"
+
+
+@pytest.fixture(scope="session")
+def drive_train() -> Rig:
+    """Return two masses with a shaft between, a sensor at each."""
+    return read_rig_file(RIG_FILES / "drive_train.toml")
+
+
+@pytest.fixture(scope="session")
+def two_link_arm() -> Rig:
+    """Return two links in the vertical plane with a motor at each joint."""
+    return read_rig_file(RIG_FILES / "two_link_arm.toml")
