@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rigsight.discover import Task, known_terms
 from rigsight.records import Record
-from rigsight.rigs import AXIS, Rig, read_rig_file
+from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3
@@ -94,16 +93,13 @@ def sweep() -> Callable[[float, float], np.ndarray]:
     return _sweep
 
 
-RIG_FILES = Path(__file__).parents[1] / "rigs" / "files"
-
-
 @pytest.fixture(scope="session")
 def drive_train() -> Rig:
     """Return two masses with a shaft between, a sensor at each."""
-    return read_rig_file(RIG_FILES / "drive_train.toml")
+    return RIGS["drive_train"]
 
 
 @pytest.fixture(scope="session")
 def two_link_arm() -> Rig:
     """Return two links in the vertical plane with a motor at each joint."""
-    return read_rig_file(RIG_FILES / "two_link_arm.toml")
+    return RIGS["two_link_arm"]

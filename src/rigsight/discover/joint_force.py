@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.followed_motion import FollowedMotion, within_reach
-from rigsight.discover.joint_law import LawTerm, RegressedLaw, force_along, regressed_laws
-from rigsight.discover.joint_motion import JointMotion, followed_again, joint_motions
+from rigsight.discover.joint_law import LawTerm, RegressedLaw, force_along, inclusion, regressed_laws
+from rigsight.discover.joint_motion import JointMotion, followed_again, joint_motions, noise_of
 from rigsight.errors import InputError, SimulationError
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -70,10 +70,13 @@ class JointLaw:
         The surest first; empty where no term describes the force.
     share
         Share of the force that they explain (as power).
+    inclusion
+        How often sparse regression takes each term when stretches of the records are drawn anew, by the name of the effect.
     """
 
     terms: tuple[LawTerm, ...]
     share: float
+    inclusion: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,14 +135,21 @@ class JointForce:
             "error_in_noise_floors": self.error_over_noise,
             "standard_error": {"value": self.standard_error, "unit": self.unit},
             "criterion": self.criterion,
-            "terms": [term.to_json() for term in self.law.terms],
+            "terms": [
+                {**term.to_json(), "inclusion_probability": self.law.inclusion.get(term.effect.name)}
+                for term in self.law.terms
+            ],
             "share_of_force": self.law.share,
             "sentence": self.sentence,
         }
 
 
 def missing_forces(
-    rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Mapping[str, float]
+    rig: Rig,
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    noise: Mapping[str, float],
+    rng: np.random.Generator | None = None,
 ) -> tuple[JointForce, ...]:
     """Return the force that would have to be missing at each joint; the joint at which it is likeliest to act comes first.
 
@@ -153,6 +163,8 @@ def missing_forces(
         Constants and re-identified parameters, by name.
     noise
         Noise floor of each output.
+    rng
+        Source of the ensemble behind the inclusion probabilities of the first joint's terms; None for none.
 
     Raises
     ------
@@ -161,7 +173,7 @@ def missing_forces(
     """
     if not records:
         raise InputError("A missing force is traced in records; there is none.")
-    floors = np.array([noise[signal.name] for signal in rig.outputs])
+    floors = noise_of(rig, noise)
     found = joint_motions(rig, records, values, noise)
     before = _free_run_square(rig, records, values, floors, found[0].followed)
     laws: dict[str, RegressedLaw] = {}
@@ -176,7 +188,17 @@ def missing_forces(
     n_measured = sum(
         int(np.count_nonzero(m.residual == m.residual)) for m in first.followed.linearized(records)
     )
-    forces = [_joint_force(rig, one, records, laws[one.joint.name], before, n_measured) for one in found]
+    included = (
+        {first.joint.name: inclusion(first, floors, _sizes(first), laws[first.joint.name], rng)}
+        if rng
+        else {}
+    )
+    forces = [
+        _joint_force(
+            rig, one, records, laws[one.joint.name], before, n_measured, included.get(one.joint.name, {})
+        )
+        for one in found
+    ]
     return tuple(sorted(forces, key=lambda force: force.criterion))
 
 
@@ -188,7 +210,7 @@ def _improved(
     laws: dict[str, RegressedLaw],
 ) -> tuple[tuple[JointMotion, ...], float]:
     """Regress the law of each joint, take over its parameters and follow the motion once more; return the largest change."""
-    floors = np.array([noise[signal.name] for signal in rig.outputs])
+    floors = noise_of(rig, noise)
     change = 0.0
     for one, law in zip(found, regressed_laws(found, floors, [_sizes(one) for one in found]), strict=True):
         changed = within_reach(one.followed, law.parameters)
@@ -266,6 +288,7 @@ def _joint_force(
     law: RegressedLaw,
     before: float,
     n_measured: int,
+    included: Mapping[str, float],
 ) -> JointForce:
     told = [
         sum((force_along(t, one, i, law.parameters) for t in law.terms), start=np.zeros(record.n_samples))
@@ -290,7 +313,7 @@ def _joint_force(
         share=max(0.0, 1.0 - one.left / before) if before > 0.0 else 0.0,
         error_over_noise=float(np.sqrt(one.left / n_measured)),
         standard_error=float(np.sqrt(np.mean(errors**2))),
-        law=JointLaw(law.terms, max(0.0, 1.0 - rest / whole) if law.terms and whole > 0.0 else 0.0),
+        law=JointLaw(law.terms, max(0.0, 1.0 - rest / whole) if law.terms and whole > 0.0 else 0.0, included),
         parameters={name: value for name, value in law.parameters.items() if name in own},
         criterion=law.criterion,
     )

@@ -25,7 +25,7 @@ from rigsight.discover.library import (
 )
 from rigsight.discover.monomials import LINEAR
 from rigsight.discover.motion import Motion
-from rigsight.discover.regression import alike, sparse_path
+from rigsight.discover.regression import alike, inclusion_probabilities, sparse_path
 from rigsight.discover.sensor_regression import SensorRegression, sensor_regressions
 from rigsight.effects import Effect, Place, placed
 from rigsight.effects.placed import kind_of
@@ -42,6 +42,8 @@ _SAME_STIFFNESS = 0.5
 """Relative difference within which a coefficient is the stiffness of the spring: play leaves it as it is."""
 _WORTH = 0.05
 """Share of the law's force (RMS) that each of its terms must have: what is smaller describes errors of the description."""
+_COMPETING = 6
+"""Terms that an ensemble draws for."""
 _LOOKED_AT = 2
 """Intensities of what remains unknown for which laws of several terms are looked for."""
 
@@ -101,11 +103,14 @@ class RegressedLaw:
         The rig's own, estimated with the law.
     criterion
         Bayesian information criterion; comparable between joints.
+    decade
+        Logarithm of the intensity of what remains unknown.
     """
 
     terms: tuple[LawTerm, ...]
     parameters: Mapping[str, float]
     criterion: float
+    decade: float
 
 
 def joint_effects(rig: Rig, joint: Joint) -> list[Effect]:
@@ -174,6 +179,41 @@ def regressed_laws(
         _best_law(of_joint, own, np.concatenate(course), one)
         for of_joint, own, course, one in zip(regressions, offered, signals, found, strict=True)
     ]
+
+
+def inclusion(
+    found: JointMotion,
+    noise: Floats,
+    scales: Mapping[str, float],
+    law: RegressedLaw,
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    """Return how often sparse regression takes terms when stretches of the records are drawn anew, by name of the effect.
+
+    Parameters
+    ----------
+    found, noise, scales
+        As for `regressed_laws`, of one joint.
+    law
+        Its law; the terms that explain most without it compete with its own.
+    rng
+        Source of the ensemble.
+    """
+    offered = _offered(found, scales)
+    signals = [
+        np.column_stack([part for s in offered for part in s.parts[i]]) for i in range(len(found.records))
+    ]
+    ((*regressions,),) = sensor_regressions([found.followed], found.records, noise, [signals])
+    regression = min(regressions, key=lambda one: abs(one.decade - law.decade))
+    library = _library(regression, offered, np.concatenate(signals), found)
+    own = {term.effect.name for term in law.terms}
+    shares = {c.name: regression.projected.explained(c.column[:, None])[1] for c in library.terms}
+    ranked = sorted(library.terms, key=lambda c: (c.name not in own, -shares[c.name]))[:_COMPETING]
+    if not ranked:
+        return {}
+    columns = np.column_stack([candidate.column for candidate in ranked])
+    taken = inclusion_probabilities(regression.projected, columns, rng)
+    return {candidate.name: float(share) for candidate, share in zip(ranked, taken, strict=True)}
 
 
 def _offered(found: JointMotion, scales: Mapping[str, float]) -> list[TermSignals]:
@@ -299,4 +339,5 @@ def _law(
         tuple(term for _, term in terms),
         parameters,
         regression.criterion(float(left @ left), n_numbers),
+        regression.decade,
     )

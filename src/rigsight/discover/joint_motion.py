@@ -24,6 +24,7 @@ from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig
 from rigsight.simulate import parameter_vector, record_input, rest_state
 from rigsight.simulate.linear_forms import slope
+from rigsight.simulate.simulation import record_values
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +65,11 @@ class JointMotion:
     left: float
 
 
+def noise_of(rig: Rig, noise: Mapping[str, float]) -> Floats:
+    """Return the noise floor of each output, shape (n_outputs,); one for a sensor that no record holds, which weighs nothing."""
+    return np.array([noise.get(signal.name, 1.0) for signal in rig.outputs])
+
+
 def joint_motions(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Mapping[str, float]
 ) -> tuple[JointMotion, ...]:
@@ -80,7 +86,7 @@ def joint_motions(
     noise
         Noise floor of each output.
     """
-    floors = np.array([noise[signal.name] for signal in rig.outputs])
+    floors = noise_of(rig, noise)
     joints = rig.mechanism.joints
     every = _at_every_joint(rig, records, dict(values), floors)
     n_own = every.sizes.size - 2 * len(joints)
@@ -114,7 +120,7 @@ def followed_again(
     """
     for joint, one in zip(joints, alone, strict=True):
         one.jumps = list(_resting(joint, one, records))
-    floors = np.array([noise[s.name] for s in alone[0].equations.structure.rig.outputs])
+    floors = noise_of(alone[0].equations.structure.rig, noise)
     improved(alone, records, floors, DECADES)
     return tuple(_found(joint, one, records, floors) for joint, one in zip(joints, alone, strict=True))
 
@@ -125,9 +131,14 @@ def _at_every_joint(
     """Return the motion that follows the sensors with an unknown force at every joint."""
     joints = rig.mechanism.joints
     equations, forces = with_unknown_forces(rig, [joint.name for joint in joints], ())
-    p = parameter_vector(equations.structure, values)
+    structure = equations.structure
     rest = [
-        rest_state(equations.structure, p, record_input(equations.structure, record)) for record in records
+        rest_state(
+            structure,
+            parameter_vector(structure, record_values(structure, values, record)),
+            record_input(structure, record),
+        )
+        for record in records
     ]
     motions = [np.tile(state, (record.n_samples, 1)) for state, record in zip(rest, records, strict=True)]
     linear = equations.about(records[0], values, motions[0])

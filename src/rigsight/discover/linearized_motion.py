@@ -18,6 +18,7 @@ from rigsight.records.record import Record
 from rigsight.simulate import Structure, parameter_vector, record_input
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.linear_forms import slope
+from rigsight.simulate.simulation import record_values
 from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
@@ -114,7 +115,7 @@ class MotionEquations:
         reference
             States, shape (n_samples, n_states).
         """
-        p = parameter_vector(self.structure, values)
+        p = parameter_vector(self.structure, record_values(self.structure, values, record))
         held = record_input(self.structure, record)
         x, u, times = self._at_samples(record, held, reference)
         readings, seen = self._readings(x, u, times, p)
@@ -139,16 +140,14 @@ class MotionEquations:
     ) -> Floats:
         """Return expressions of the structure's symbols along a motion, shape (n_expressions, n_samples)."""
         x, u, times = self._at_samples(record, record_input(self.structure, record), reference)
-        p = parameter_vector(self.structure, values)
+        p = parameter_vector(self.structure, record_values(self.structure, values, record))
         return _evaluated(_compiled(self._arguments, expressions), (*x, *u, times, *p), record.n_samples)
 
     def _at_samples(
         self, record: Record, held: HeldInput, reference: Floats
     ) -> tuple[Floats, Floats, Floats]:
-        """Return states, inputs and times at the samples; a held input has its last value up to the end."""
-        pieces = held.per_sample * np.arange(record.n_samples)
-        pieces[-1] = held.n_pieces - 1
-        u = _input_at(held, pieces, np.append(np.zeros(record.n_samples - 1), held.interval))
+        """Return states, inputs and times at the samples."""
+        u = held.at_samples(record.n_samples)[: 3 * len(self.structure.rig.inputs)]
         times = np.asarray(record.dt * np.arange(record.n_samples), dtype=np.float64)
         return np.ascontiguousarray(reference.T), u, times
 

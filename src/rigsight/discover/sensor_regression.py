@@ -36,12 +36,15 @@ class SensorRegression:
         Names of the parameters behind the columns of `projected`.
     logarithms
         Sum of the logarithms of the variances that the rows were divided by.
+    decade
+        Logarithm of that intensity.
     """
 
     projected: Projected
     columns: Floats
     fitted: tuple[str, ...]
     logarithms: float
+    decade: float
 
     def criterion(self, left: float, n_terms: int) -> float:
         """Return the Bayesian information criterion of an equation with some terms that leaves a square of so much."""
@@ -127,9 +130,9 @@ def sensor_regressions(
         found.append(
             tuple(
                 _regression(
-                    one, q[:, mine, :, :columns].reshape(-1, columns), known, float(lost), independent
+                    one, q[:, mine, :, :columns].reshape(-1, columns), known, lost, decade, independent
                 )
-                for q, lost in zip(together, logarithms, strict=True)
+                for q, lost, decade in zip(together, logarithms, _DECADES, strict=True)
             )
         )
     return found
@@ -153,7 +156,7 @@ def _short(rows: Floats) -> Floats:
 
 
 def _regression(
-    followed: FollowedMotion, rows: Floats, known: int, logarithms: float, independent: int
+    followed: FollowedMotion, rows: Floats, known: int, logarithms: float, decade: float, independent: int
 ) -> SensorRegression:
     """Add what was known of the parameters beforehand as rows; a parameter that no sensor answers to is left out."""
     squares = np.sum(rows**2, axis=0)
@@ -165,4 +168,4 @@ def _regression(
     rows = np.vstack([rows, before[answered]])
     projected = Projected(rows[:, 1 + answered], rows[:, 0], float(independent))
     names = tuple(followed.fitted[i].name for i in answered)
-    return SensorRegression(projected, rows[:, known:], names, logarithms)
+    return SensorRegression(projected, rows[:, known:], names, float(logarithms), decade)
