@@ -10,7 +10,7 @@ import pytest
 
 from rigsight.discover import Task, known_terms
 from rigsight.records import Record
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3
@@ -91,3 +91,15 @@ def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
 def sweep() -> Callable[[float, float], np.ndarray]:
     """Return a logarithmic sweep of an amplitude and a duration [s]."""
     return _sweep
+
+
+@pytest.fixture(scope="session")
+def drive_train() -> Rig:
+    """Return two masses with a shaft between, a sensor at each."""
+    return RIGS["drive_train"]
+
+
+@pytest.fixture(scope="session")
+def two_link_arm() -> Rig:
+    """Return two links in the vertical plane with a motor at each joint."""
+    return RIGS["two_link_arm"]

@@ -2,6 +2,11 @@
 
 from rigsight.discover.discovery import METHODS as METHODS
 from rigsight.discover.discovery import discover as discover
+from rigsight.discover.joint_force import ForceTrace as ForceTrace
+from rigsight.discover.joint_force import JointForce as JointForce
+from rigsight.discover.joint_force import JointLaw as JointLaw
+from rigsight.discover.joint_force import missing_forces as missing_forces
+from rigsight.discover.joint_law import LawTerm as LawTerm
 from rigsight.discover.missing_force import MissingForce as MissingForce
 from rigsight.discover.missing_force import missing_force as missing_force
 from rigsight.discover.monomials import MONOMIALS as MONOMIALS
@@ -13,9 +18,14 @@ __all__ = [
     "METHODS",
     "MONOMIALS",
     "Discovery",
+    "ForceTrace",
+    "JointForce",
+    "JointLaw",
+    "LawTerm",
     "MissingForce",
     "Task",
     "discover",
     "known_terms",
     "missing_force",
+    "missing_forces",
 ]

@@ -124,6 +124,14 @@ def _runs(bench: Bench, found: Found, output: str) -> tuple[Run, ...]:
     ends = np.cumsum([record.n_samples for record in found.held_out])
     parts = np.split(found.judged.residuals * bench.noise[output], ends[:-1])
     return tuple(
-        Run(record.name, record.role, record.t, record[output], record[output] - error)
+        Run(
+            record.name,
+            record.role,
+            record.t,
+            record[output],
+            record[output] - error,
+            output,
+            bench.rig.outputs[0].unit,
+        )
         for record, error in zip(found.held_out, parts, strict=True)
     )

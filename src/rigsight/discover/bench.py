@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
+from rigsight.discover.support_starts import SupportStarts
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -25,7 +25,6 @@ HOPELESS = 10.0
 _FAR = 2.0
 """Factor over the best held-out error from which finding better initial states changes no choice."""
 _TOLERANCE = 1e-5
-_SMALL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +155,11 @@ class Bench:
     trials: dict[tuple[Support, Support, Support], Trial] = field(default_factory=dict)
 
     @property
+    def starts(self) -> SupportStarts:
+        """Where the fit of a support may start."""
+        return SupportStarts(self.rig, self.values, self.candidates, self.projected)
+
+    @property
     def sparse(self) -> Projected:
         """The regression with nothing projected out that competes."""
         if not self.own_terms:
@@ -195,50 +199,6 @@ class Bench:
                     names.add(name)
         return [name for name in structure.names if name in names]
 
-    def start(self, structure: Structure, support: Support) -> dict[str, float]:
-        """Return the values that the regression gives a support, in SI."""
-        chosen = [self.candidates[name] for name in sorted(support)]
-        columns = (
-            np.column_stack([c.column for c in chosen])
-            if chosen
-            else np.zeros((self.projected.target.size, 0))
-        )
-        solution, _ = self.projected.solved(columns)
-        values, force = _rig_values(self.rig, self.values, solution[: self.projected.base.shape[1]])
-        for candidate, coefficient in zip(
-            chosen, solution[self.projected.base.shape[1] :] * force, strict=True
-        ):
-            values |= self._effect_values(structure, candidate, float(coefficient), values)
-        bounds = {p.name: p for p in structure.parameters}
-        return {
-            name: float(np.clip(value, bounds[name].lower, bounds[name].upper))
-            for name, value in values.items()
-            if name in bounds
-        }
-
-    def _effect_values(
-        self, structure: Structure, candidate: Candidate, coefficient: float, values: Mapping[str, float]
-    ) -> dict[str, float]:
-        effect = candidate.effect
-        own = {p.name: p.default for p in effect.parameters if p.default is not None}
-        own |= candidate.inner
-        own |= {name: share * coefficient for name, share in candidate.linear.items()}
-        found: dict[str, float] = {}
-        if is_loop(effect):
-            assert effect.elastic_share is not None
-            stiffness = self.rig.motion.stiffness.name
-            without = max(values[stiffness], _SMALL * coefficient)
-            total = without + max(coefficient, _SMALL * without)
-            found[stiffness] = total
-            own[effect.elastic_share] = without / total
-        for parameter in effect.parameters:
-            if parameter.name in candidate.linear and parameter.lower == 0.0:
-                # A resisting force that the regression turns round is one that is hardly there.
-                own[parameter.name] = max(own[parameter.name], _SMALL * abs(own[parameter.name]))
-            if parameter.name in own:
-                found[structure.parameter_name(effect, parameter.name)] = own[parameter.name]
-        return found
-
     def trial(self, attempt: Attempt) -> Trial:
         """Polish a support and score it; what has been done is not done again."""
         return self.trials_of([attempt])[0]
@@ -268,7 +228,7 @@ class Bench:
             release = frozenset(special - kept)
             structure = self.structure(support, release)
             start = {
-                **self.start(structure, support),
+                **self.starts.regressed(structure, support),
                 **carried_over(longer.fit.values, longer.fit.structure, structure),
             }
             same = first.fit.structure.fixed == structure.fixed
@@ -321,17 +281,32 @@ class Bench:
         return list(self.threads.side_by_side(finished, rough))
 
     def _first_look(self, attempt: Attempt) -> _Look:
+        """Return the better one of the fits from the regression's values and from those of the best support it contains."""
         structure = self.structure(attempt.support, attempt.release)
-        values = dict(attempt.start) if attempt.start is not None else self.start(structure, attempt.support)
         problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
-        fit = problem.fit(
-            values,
-            self.free_parameters(structure, attempt.left_out),
-            max_evaluations=_FIRST_EVALUATIONS,
-            tolerance=_TOLERANCE,
-            finish=False,
-        )
-        return _Look(attempt, problem, fit)
+        free = self.free_parameters(structure, attempt.left_out)
+        starts = [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
+        fits = [
+            problem.fit(start, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
+            for start in starts
+        ]
+        return _Look(attempt, problem, min(fits, key=lambda fit: fit.cost))
+
+    def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
+        """Return the regression's values, and beside them those of the lowest cost that a contained support came to.
+
+        Columns of a smoothed motion can be far off: a support that starts from them may end above one with fewer terms.
+        """
+        starts = [self.starts.regressed(structure, attempt.support)]
+        contained = [
+            trial.fit
+            for (support, release, left_out), trial in self.trials.items()
+            if support < attempt.support and release == attempt.release and left_out == attempt.left_out
+        ]
+        best = min(contained, key=lambda fit: fit.cost, default=None)
+        if best is not None and np.isfinite(best.cost):
+            starts.append(self.starts.extended(structure, attempt.support, best))
+        return starts
 
     def _roughly_scored(self, support: Support, fit: FitResult, to_beat: float = float("inf")) -> _RoughTrial:
         problem = GreyBoxFit(fit.structure, self.held_out, self.scales, self.noise, threads=self.threads)
@@ -351,27 +326,3 @@ class Bench:
         output = self.rig.outputs[0].name
         errors = np.concatenate([r[:, 0] for r in score.residuals]) / self.noise[output]
         return Trial(trial.support, trial.fit, float(np.sqrt(np.mean(errors**2))), errors)
-
-
-def _rig_values(
-    rig: Rig, known: Mapping[str, float], base: NDArray[np.float64]
-) -> tuple[dict[str, float], float]:
-    """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the others'."""
-    values = dict(known)
-    motion = rig.motion
-    if not rig.is_driven:
-        values |= {motion.damping.name: base[0], motion.stiffness.name: base[1], motion.bias.name: base[2]}
-        return values, 1.0
-    gain = float(motion.drive_gain.subs({s: known[s.name] for s in motion.drive_gain.free_symbols}))
-    assert motion.inertia is not None
-    inertia = gain / base[0] if base[0] * gain > 0.0 else known[motion.inertia.name]
-    values[motion.inertia.name] = inertia
-    values[motion.damping.name] = max(base[1] * inertia, 1e-4 * known[motion.damping.name])
-    if len(base) == 4:
-        stiffness = max(base[2] * inertia, 1e-3 * known[motion.stiffness.name])
-        values[motion.stiffness.name] = stiffness
-        values[motion.rest.name] = known[motion.rest.name] + base[3] * inertia / stiffness
-    else:
-        for symbol in motion.bias.free_symbols:
-            values[symbol.name] = base[2] * inertia
-    return values, inertia

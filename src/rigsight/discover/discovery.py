@@ -12,7 +12,9 @@ import numpy as np
 from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
+from rigsight.discover.held_out import split
 from rigsight.discover.hysteresis import is_loop
+from rigsight.discover.joint_discovery import discover_at_joints
 from rigsight.discover.library import Candidate, candidates, offered_effects
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, own_terms, rows_of
@@ -29,8 +31,6 @@ from rigsight.simulate import Structure, compose
 
 Method = Literal["full", "discrepancy"]
 METHODS: tuple[Method, ...] = ("discrepancy", "full")
-_LEAST_SAMPLES = 200
-_HELD_BACK = 0.3
 _SAME_COLUMN = 0.999
 _FINAL_EVALUATIONS = 150
 _CLEARLY_OFF = 3.0
@@ -53,9 +53,9 @@ def discover(
         Records and rig.
     method
         ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term.
-        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed.
+        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. A rig of several joints has no other.
     pointwise
-        Regress sample by sample instead of in the weak form.
+        Regress sample by sample instead of in the weak form; not for a rig of several joints.
     seed
         Seed of the ensembles.
     progress
@@ -66,14 +66,21 @@ def discover(
     Raises
     ------
     InputError
-        If there is no estimation record, one is too short, or none moves the rig.
+        If there is no estimation record, one is too short, or none moves the rig, or the form is not one for this rig.
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
+    if not task.rig.has_one_motion:
+        if method != "discrepancy" or pointwise:
+            raise InputError(
+                f"The rig '{task.rig.name}' has several joints: its missing forces are regressed through its responses, in the "
+                "discrepancy form. Leave the form and the point-wise rows to rigs of one motion."
+            )
+        return discover_at_joints(task, seed, progress, n_jobs)
     say = progress or (lambda _: None)
     threads = IdleThreads(n_jobs)
     rng = np.random.default_rng(seed)
-    estimation, held_out, how = _split(task)
+    estimation, held_out, how = split(task)
     values = _linear_values(task, estimation)
     scales = characteristic_scales(task.rig, estimation, values)
     output = task.rig.outputs[0].name
@@ -118,37 +125,6 @@ def discover(
     say("ensembles")
     found = Found(estimation, held_out, how, selection, chosen, judged, final, included, force, same, held)
     return assembled(task, method, pointwise, bench, found)
-
-
-def _split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
-    """Return the records to fit, those to score, and in words how the latter were found."""
-    estimation = tuple(r for r in task.records if r.role == "estimation")
-    validation = tuple(r for r in task.records if r.role == "validation")
-    if not estimation:
-        raise InputError('A discovery needs at least one record with role = "estimation".')
-    for record in estimation:
-        if record.n_samples < _LEAST_SAMPLES:
-            raise InputError(
-                f"Record '{record.name}' has {record.n_samples} samples; a discovery needs at least {_LEAST_SAMPLES} in each."
-            )
-    if validation:
-        return estimation, validation, ""
-    if len(estimation) > 1:
-        middle = sorted(estimation, key=lambda r: float(np.std(r[task.rig.inputs[0].name])))[
-            len(estimation) // 2
-        ]
-        rest = tuple(record for record in estimation if record is not middle)
-        return (
-            rest,
-            (middle,),
-            f"No record is for validation; '{middle.name}' was set aside to choose the terms.",
-        )
-    cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
-    return (
-        (estimation[0].slice(0, cut),),
-        (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
-        "There is a single record; its last part was set aside to choose the terms, which judges no other amplitude.",
-    )
 
 
 def _linear_values(task: Task, estimation: Sequence[Record]) -> dict[str, float]:

@@ -176,17 +176,35 @@ def _best_inner(
 ) -> Candidate | None:
     best: Candidate | None = None
     highest = 0.0
-    for inner, names, signals in _with_inner_values(effect, motions, scales):
+    for signals in term_signals(effect, motions, scales):
         parts = sign * np.column_stack(
-            [np.concatenate([rows.of(one) for one in part]) for part in zip(*signals, strict=True)]
+            [np.concatenate([rows.of(one) for one in part]) for part in zip(*signals.parts, strict=True)]
         )
-        weights, share = projected.explained(parts)
-        if share > highest and np.any(weights):
-            # One part keeps its own unit; several are mixed as the regression wishes them.
-            mixture = np.ones(1) if len(weights) == 1 else weights / np.max(np.abs(weights))
-            linear = dict(zip(names, map(float, mixture), strict=True)) if names else {}
-            best, highest = Candidate(effect, inner, linear, parts @ mixture), share
+        candidate, share = mixed(signals, parts, projected)
+        if share > highest:
+            best, highest = candidate, share
     return best
+
+
+def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected) -> tuple[Candidate, float]:
+    """Return the parts of a term as one column, mixed as the regression wishes them, and the share it explains.
+
+    Parameters
+    ----------
+    signals
+        The term.
+    parts
+        Rows of its parts, shape (n_rows, n_parts).
+    projected
+        What is regressed.
+    """
+    weights, share = projected.explained(parts)
+    if not np.any(weights):
+        return Candidate(signals.effect, signals.inner, {}, parts[:, 0]), 0.0
+    # One part keeps its own unit.
+    mixture = np.ones(1) if len(weights) == 1 else weights / np.max(np.abs(weights))
+    linear = dict(zip(signals.names, map(float, mixture), strict=True)) if signals.names else {}
+    return Candidate(signals.effect, signals.inner, linear, parts @ mixture), share
 
 
 def _is_plain(effect: Effect) -> bool:
@@ -235,16 +253,50 @@ def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
     return sp.diff(effect.torque, sp.Symbol(parameter.name, real=True))
 
 
-def _with_inner_values(
+@dataclass(frozen=True, eq=False)
+class TermSignals:
+    """What an effect with certain inner values is along measured motions.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    inner
+        Values of the parameters that stand inside the term.
+    names
+        Linear parameters, one for each part; empty where the term has one part without a coefficient of its own.
+    parts
+        Per record the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
+    """
+
+    effect: Effect
+    inner: Mapping[str, float]
+    names: tuple[str, ...]
+    parts: tuple[tuple[NDArray[np.float64], ...], ...]
+
+
+def term_signals(
     effect: Effect, motions: Sequence[Motion], scales: Mapping[str, float]
-) -> Iterator[tuple[dict[str, float], list[str], list[list[NDArray[np.float64]]]]]:
-    """Yield inner values, names of the linear parameters, and per record the signals of the term's parts."""
+) -> Iterator[TermSignals]:
+    """Yield an effect along measured motions, for each point of the grid of its inner values.
+
+    Parameters
+    ----------
+    effect
+        An effect without states.
+    motions
+        Of all records.
+    scales
+        Size of each base quantity.
+    """
     fitted = [p for p in effect.parameters if p.fitted]
     linear = [p for p in fitted if effect.torque is not None and _is_linear(effect, p)]
     inside = [p for p in fitted if p not in linear]
+    names = tuple(p.name for p in linear)
     for values in itertools.product(*(_grid(p, scales) for p in inside)):
         inner = dict(zip((p.name for p in inside), values, strict=True))
-        yield inner, [p.name for p in linear], [_signals(effect, linear, inner, motion) for motion in motions]
+        parts = tuple(tuple(_signals(effect, linear, inner, motion)) for motion in motions)
+        yield TermSignals(effect, inner, names, parts)
 
 
 def _is_linear(effect: Effect, parameter: Parameter) -> bool:
@@ -278,6 +330,12 @@ def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) ->
     """Return the torque of a static effect along a measured motion, shape (n_samples,)."""
     assert effect.torque is not None
     return _evaluated(effect.torque, values, motion)
+
+
+def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+    """Return what the spring sees of a measured motion behind a static effect, shape (n_samples,)."""
+    assert effect.deflection is not None
+    return _evaluated(effect.deflection, values, motion)
 
 
 def _evaluated(

@@ -19,13 +19,15 @@ _PREFIX = "monomial"
 
 def _monomial(i: int, j: int) -> Effect:
     name = f"c_{i}{j}"
-    dimension = " ".join(factor for factor in ("force", f"x^{-(i + j)}", f"time^{j}" if j else "") if factor)
+    dimension = " ".join(
+        factor for factor in ("force", f"x^{-(i + j)}" if i + j else "", f"time^{j}" if j else "") if factor
+    )
     # Odd in the velocity: it can only take energy out (or, with a negative coefficient, put it in).
     damps = j % 2 == 1 and i % 2 == 0
     return Effect(
         name=f"{_PREFIX}_x{i}_v{j}",
         place=Place.DYNAMICS,
-        summary=f"A resisting torque proportional to {_power('x', i)}{' ' if i and j else ''}{_power(chr(120) + chr(39), j)}.",
+        summary=_summary(i, j),
         parameters=(
             Parameter(
                 name, "coefficient of the monomial", dimension, lower=-1e30, upper=1e30, null=0.0, starts=(0.1, -0.1),
@@ -36,6 +38,12 @@ def _monomial(i: int, j: int) -> Effect:
         signature=Signature(gain_trend=GainTrend.STEADY, even_harmonics=(i + j) % 2 == 0),
         torque=sp.Symbol(name, real=True) * x**i * v**j,
     )  # fmt: skip
+
+
+def _summary(i: int, j: int) -> str:
+    if i == j == 0:
+        return "A constant resisting torque."
+    return f"A resisting torque proportional to {_power('x', i)}{' ' if i and j else ''}{_power(chr(120) + chr(39), j)}."
 
 
 def _power(symbol: str, exponent: int) -> str:
@@ -58,6 +66,10 @@ MONOMIALS: tuple[Effect, ...] = tuple(_monomial(i, j) for i, j in _powers())
 """Declared once; a monomial that an effect of the catalogue already is stands there and not here."""
 
 
+LINEAR: tuple[Effect, ...] = tuple(_monomial(i, j) for i, j in ((0, 0), (1, 0), (0, 1)))
+"""A constant force, a spring and a damper: terms for a joint whose rig declares none."""
+
+
 def known_terms() -> dict[str, Effect]:
     """Return every effect that a model may hold, by name: those of the catalogue and the monomials."""
-    return {effect.name: effect for effect in (*CATALOGUE, *MONOMIALS)}
+    return {effect.name: effect for effect in (*CATALOGUE, *MONOMIALS, *LINEAR)}

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 N_ENSEMBLE = 40
-_BLOCKS = 40
+N_BLOCKS = 40
 """Contiguous stretches of rows that an ensemble draws from: neighboring rows share their noise."""
 _CLEARLY = 1.1
 """Factor by which a larger support must lower what is left: the columns, made of a smoothed motion, are no better."""
@@ -105,7 +105,7 @@ def inclusion_probabilities(
     In every draw the support is the smallest that leaves hardly more than the one of the lowest Bayesian information criterion.
     """
     matrix, target = projected.rest_of(columns), projected.rest
-    blocks = np.array_split(np.arange(target.size), min(_BLOCKS, target.size))
+    blocks = np.array_split(np.arange(target.size), min(N_BLOCKS, target.size))
     counts = np.zeros(columns.shape[1])
     for _ in range(N_ENSEMBLE):
         rows = np.concatenate([blocks[i] for i in rng.integers(len(blocks), size=len(blocks))])

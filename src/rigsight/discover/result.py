@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.discover.joint_force import JointForce
+
 SCHEMA_VERSION = 1
 
 
@@ -51,6 +53,8 @@ class Term:
         Its parameters; empty where it is not kept.
     doubt
         Why it is in doubt, empty where it is not.
+    where
+        Joint at which it acts; empty on a rig that has one.
     """
 
     name: str
@@ -59,6 +63,7 @@ class Term:
     inclusion: float
     coefficients: Mapping[str, Coefficient]
     doubt: str = ""
+    where: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
@@ -69,6 +74,7 @@ class Term:
             "inclusion_probability": self.inclusion,
             "coefficients": {name: c.to_json() for name, c in self.coefficients.items()},
             "doubt": self.doubt,
+            **({"where": self.where} if self.where else {}),
         }
 
 
@@ -106,13 +112,15 @@ class Alternative:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Measured and simulated first output of a record in free run, shape (n_samples,) each."""
+    """Measured and simulated output of a record in free run, shape (n_samples,) each, with the output's name and unit."""
 
     record: str
     role: str
     t: NDArray[np.float64]
     measured: NDArray[np.float64]
     simulated: NDArray[np.float64]
+    output: str
+    unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +159,8 @@ class Discovery:
         Content of ``model.json``.
     warnings
         What a user should know before using the equations, one sentence each.
+    joints
+        Missing force per joint, the likeliest joint first; empty on a rig that has one.
     by_record
         What was found on each record alone, or why nothing was; empty unless asked for.
     """
@@ -175,6 +185,7 @@ class Discovery:
     unit: str
     model: Mapping[str, Any]
     warnings: tuple[str, ...]
+    joints: tuple[JointForce, ...] = ()
     by_record: tuple[tuple[str, Discovery | str], ...] = ()
 
     @property
@@ -204,6 +215,7 @@ class Discovery:
                 "independent_samples": self.independent,
             },
             "warnings": list(self.warnings),
+            **({"joints": [joint.to_json() for joint in self.joints]} if self.joints else {}),
             "by_record": {
                 name: {"error": found} if isinstance(found, str) else found.to_json()
                 for name, found in self.by_record

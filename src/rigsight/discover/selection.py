@@ -25,6 +25,7 @@ _GROWTH = 3
 _WORTH = 0.02
 """Share of the regression's residual power that a term must explain to be worth a polish, unless it is the first in line."""
 _ROUNDS = 4
+"""Rounds in which terms are added; those in which only terms go end by themselves."""
 _RELEASED = 0.98
 """Factor by which a released special value (an exponent of 1) must lower the held-out error to be kept."""
 
@@ -125,10 +126,11 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         return criterion(trial, independent)
 
     best = _fewest(pool, cost)
-    for _ in range(_ROUNDS):
+    # A term that another one has made needless goes, however late that one came.
+    for number in range(_ROUNDS + _MOST_TERMS):
         shorter = _simpler(bench, best.support)
         longer = [best.support | {name} for name in next_terms(bench, best.support)]
-        if len(best.support) >= _MOST_TERMS or at_floor(best):
+        if number >= _ROUNDS or len(best.support) >= _MOST_TERMS or at_floor(best):
             longer = []
         pool += tried([*shorter, *longer])
         # What stopped short from the regression's values may go on from those of the longer equation.

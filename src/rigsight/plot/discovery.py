@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from rigsight.discover import JointForce
 from rigsight.discover.result import Discovery, Run, Term
 from rigsight.plot.drawing import MEASURED, OTHER, WITH_EFFECT, in_style, line, new_figure, shown_in
 
@@ -14,6 +18,9 @@ if TYPE_CHECKING:
 
 _MOST_TERMS = 12
 _MOST_RUNS = 3
+_MOST_JOINTS = 4
+_POINTS = 4000
+"""Samples of a missing force that are drawn."""
 _SURE = 0.9
 
 
@@ -29,20 +36,51 @@ def discovery_figure(found: Discovery) -> Figure:
     terms = found.terms[:_MOST_TERMS]
     runs = found.runs[:_MOST_RUNS]
     numbers = _numbers(found)
+    joints = found.joints[:_MOST_JOINTS]
     top = 0.9 + 0.28 * max(len(terms), len(numbers), 3)
-    figure = new_figure(8.4, top + 2.5 * len(runs))
-    parts = figure.subfigures(2, 1, squeeze=False, height_ratios=[top, 2.5 * len(runs)])[:, 0]
+    heights = [top, 2.5 * len(runs), *(2.3 for _ in joints)]
+    figure = new_figure(8.4, sum(heights))
+    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     left, right = parts[0].subplots(1, 2)
     _draw_inclusion(left, terms)
     _draw_coefficients(right, numbers)
     axes = parts[1].subplots(2 * len(runs), 1, squeeze=False, height_ratios=[3, 1.3] * len(runs))[:, 0]
     for index, run in enumerate(runs):
-        _draw_run(axes[2 * index], axes[2 * index + 1], run, found)
+        _draw_run(axes[2 * index], axes[2 * index + 1], run)
+    for part, joint in zip(parts[2:], joints, strict=True):
+        _draw_joint(part.subplots(1, 2, sharey=True), joint)
     return figure
 
 
+def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
+    """Draw the missing force of a joint over its displacement and its velocity, and what its law says there."""
+    x, v, force, law = (
+        np.concatenate([getattr(trace, name) for trace in joint.traces])
+        for name in ("displacement", "velocity", "force", "law")
+    )
+    some = slice(None, None, max(1, x.size // _POINTS))
+    factor, unit = shown_in(joint.unit, force)
+    motions = ((x, joint.x_unit, "x"), (v, "1/s" if joint.x_unit == "1" else f"{joint.x_unit}/s", "v"))
+    for ax, (motion, motion_unit, symbol) in zip(axes, motions, strict=True):
+        scale, shown_unit = shown_in(motion_unit, motion)
+        ax.plot(
+            scale * motion[some], factor * force[some], ".", color=MEASURED, markersize=1.0, label="missing"
+        )
+        if joint.law.terms:
+            ax.plot(
+                scale * motion[some], factor * law[some], ".", color=WITH_EFFECT, markersize=1.0, label="law"
+            )
+        ax.set_xlabel(f"{symbol} of {_spoken(joint.joint)} [{shown_unit}]")
+        ax.grid()
+    axes[0].set_ylabel(f"force [{unit}]")
+    axes[0].legend(loc="upper left", fontsize=8, markerscale=6.0)
+    axes[0].set_title(
+        f"Missing at {_spoken(joint.joint)}: explains {100.0 * joint.share:.4g} % of the sensors' errors"
+    )
+
+
 def _draw_inclusion(ax: Axes, terms: tuple[Term, ...]) -> None:
-    names = [_spoken(term.name) for term in terms]
+    names = [_spoken(f"{term.name} at {term.where}" if term.where else term.name) for term in terms]
     places = list(range(len(names)))
     colors = [WITH_EFFECT if term.kept else OTHER for term in terms]
     ax.barh(places, [term.inclusion for term in terms], color=colors, height=0.6)
@@ -92,18 +130,18 @@ def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
     ax.set_title("Coefficients after the free-run fit")
 
 
-def _draw_run(upper: Axes, lower: Axes, run: Run, found: Discovery) -> None:
-    factor, unit = shown_in(found.unit, run.measured)
+def _draw_run(upper: Axes, lower: Axes, run: Run) -> None:
+    factor, unit = shown_in(run.unit, run.measured)
     line(upper, run.t, factor * run.measured, MEASURED, "measured", linewidth=1.6)
     line(upper, run.t, factor * run.simulated, WITH_EFFECT, "free run", linewidth=0.9)
-    upper.set_ylabel(f"{found.output} [{unit}]")
+    upper.set_ylabel(f"{run.output} [{unit}]")
     upper.set_title(
         f"Free run on {run.record} (held out)" if run.role == "validation" else f"Free run on {run.record}"
     )
     upper.legend(loc="upper right", ncols=2, fontsize=8)
     upper.tick_params(labelbottom=False)
     error = run.measured - run.simulated
-    error_factor, error_unit = shown_in(found.unit, error)
+    error_factor, error_unit = shown_in(run.unit, error)
     line(lower, run.t, error_factor * error, WITH_EFFECT, linewidth=0.7)
     lower.set_ylabel(f"error [{error_unit}]")
     lower.set_xlabel("time [s]")

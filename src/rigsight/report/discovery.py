@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rigsight.diagnose.result import Estimate
-from rigsight.discover import Discovery
+from rigsight.discover import Discovery, JointForce
 from rigsight.discover.result import Term
 from rigsight.report.quantities import estimate_text, gap_percent
 from rigsight.report.terminal import plain_text
@@ -65,7 +65,9 @@ def discovery_rows(found: Discovery) -> Iterator[tuple[str, str]]:
         yield name, estimate_text(Estimate(c.value, c.std, c.unit))
     for term in found.kept:
         if term.name not in found.rig_parameters:
-            yield term.name, _term(term)
+            yield f"{term.name} at {term.where}" if term.where else term.name, _term(term)
+    for joint in found.joints:
+        yield f"missing at {joint.joint}", _joint(joint)
     where = ", ".join(found.held_out)
     yield (
         "held-out error",
@@ -85,6 +87,12 @@ def _term(term: Term) -> str:
         f"{name} = {estimate_text(Estimate(c.value, c.std, c.unit))}" for name, c in term.coefficients.items()
     )
     return f"{numbers} (taken in {100 * term.inclusion:.0f} % of the draws)"
+
+
+def _joint(joint: JointForce) -> str:
+    left = f"leaves {joint.error_over_noise:.3g} x floor"
+    told = " and ".join(term.text for term in joint.law.terms) or "no law of its motion"
+    return f"explains {100 * joint.share:.4g} % of the sensors' errors, {left}: {told}"
 
 
 def _alone(found: Discovery | str) -> str:

@@ -138,7 +138,7 @@ def discovery_task(campaign: Campaign) -> Task:
     campaign
         A campaign that was read.
     """
-    no_spring = campaign.parameters.get("k") == 0.0
+    no_spring = campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0
     length = window_length(campaign.rig, campaign.estimation) if no_spring else None
     floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
     noise = {floor.output: floor.std for floor in floors}

@@ -8,7 +8,7 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 
-ONE_MOTION_ONLY = frozenset({"discover", "identify"})
+ONE_MOTION_ONLY = frozenset({"identify"})
 """Commands written for rigs of one motion; a command that takes every rig is taken out here."""
 BUILT_IN_ONLY = frozenset({"discover", "identify"})
 """Commands that know the parameters of built-in rigs by their names; one that does not is taken out here."""
@@ -36,7 +36,11 @@ def check_takes(command: str, rig: Rig, records: Iterable[Record] = ()) -> None:
             f"'rigsight {command}' cannot take the rig '{rig.name}' yet: it works on rigs of one motion, with one joint, one "
             "input and no feedback. 'rigsight simulate' runs every rig."
         )
-    if command in BUILT_IN_ONLY and (rig.name not in RIGS or RIGS[rig.name].mechanism != rig.mechanism):
+    if (
+        command in BUILT_IN_ONLY
+        and rig.has_one_motion
+        and (rig.name not in RIGS or RIGS[rig.name].mechanism != rig.mechanism)
+    ):
         raise InputError(
             f"'rigsight {command}' cannot take the rig '{rig.name}' of your own yet: it works on built-in rigs of one motion, "
             f"{_of_one_motion()}. Name one of them in [rig] if the equation is the same."

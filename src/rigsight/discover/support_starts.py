@@ -1,0 +1,147 @@
+"""Where does the fit of a support start? At the values of the regression, or where the fit of a shorter support ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.hysteresis import is_loop
+from rigsight.discover.library import Candidate
+from rigsight.discover.regression import Projected
+from rigsight.identify import FitResult
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, carried_over
+
+_SMALL = 1e-3
+"""Share below which a resisting force, or one part of a spring beside the other, is not let start."""
+
+
+@dataclass(frozen=True, eq=False)
+class SupportStarts:
+    """Start values of supports.
+
+    Attributes
+    ----------
+    rig
+        The rig.
+    values
+        Constants, and linear parameters.
+    candidates
+        The library, by name.
+    projected
+        The regression.
+    """
+
+    rig: Rig
+    values: Mapping[str, float]
+    candidates: Mapping[str, Candidate]
+    projected: Projected
+
+    def regressed(self, structure: Structure, support: frozenset[str]) -> dict[str, float]:
+        """Return the values that the regression gives a support, in SI.
+
+        Parameters
+        ----------
+        structure
+            Its equations.
+        support
+            Names of its terms.
+        """
+        chosen = [self.candidates[name] for name in sorted(support)]
+        columns = (
+            np.column_stack([c.column for c in chosen])
+            if chosen
+            else np.zeros((self.projected.target.size, 0))
+        )
+        solution, _ = self.projected.solved(columns)
+        values, force = _rig_values(self.rig, self.values, solution[: self.projected.base.shape[1]])
+        for candidate, coefficient in zip(
+            chosen, solution[self.projected.base.shape[1] :] * force, strict=True
+        ):
+            values |= self._effect_values(structure, candidate, float(coefficient), values)
+        return _within_bounds(structure, values)
+
+    def extended(self, structure: Structure, support: frozenset[str], shorter: FitResult) -> dict[str, float]:
+        """Return the values that the fit of a support with fewer terms ended at, in SI.
+
+        The coefficients of the terms it lacks are zero, so that the fit begins where the shorter one ended; what stands inside
+        these terms, and how a spring divides into parts with and without memory, is the regression's.
+
+        Parameters
+        ----------
+        structure
+            Equations of the longer support.
+        support
+            Names of its terms.
+        shorter
+            Fit of the shorter one.
+        """
+        values = self.regressed(structure, support)
+        carried = carried_over(shorter.values, shorter.structure, structure)
+        added = [effect for effect in structure.effects if effect not in shorter.structure.effects]
+        if any(is_loop(effect) for effect in added):
+            carried.pop(self.rig.motion.stiffness.name)
+        for effect in added:
+            for parameter in effect.parameters:
+                if parameter.name in self.candidates[effect.name].linear and parameter.null is not None:
+                    carried[structure.parameter_name(effect, parameter.name)] = parameter.null
+        return _within_bounds(structure, {**values, **carried})
+
+    def _effect_values(
+        self, structure: Structure, candidate: Candidate, coefficient: float, values: Mapping[str, float]
+    ) -> dict[str, float]:
+        effect = candidate.effect
+        own = {p.name: p.default for p in effect.parameters if p.default is not None}
+        own |= candidate.inner
+        own |= {name: share * coefficient for name, share in candidate.linear.items()}
+        found: dict[str, float] = {}
+        if is_loop(effect):
+            assert effect.elastic_share is not None
+            stiffness = self.rig.motion.stiffness.name
+            without = max(values[stiffness], _SMALL * coefficient)
+            total = without + max(coefficient, _SMALL * without)
+            found[stiffness] = total
+            own[effect.elastic_share] = without / total
+        for parameter in effect.parameters:
+            if parameter.name in candidate.linear and parameter.lower == 0.0:
+                # A resisting force that the regression turns round is one that is hardly there.
+                own[parameter.name] = max(own[parameter.name], _SMALL * abs(own[parameter.name]))
+            if parameter.name in own:
+                found[structure.parameter_name(effect, parameter.name)] = own[parameter.name]
+        return found
+
+
+def _within_bounds(structure: Structure, values: Mapping[str, float]) -> dict[str, float]:
+    bounds = {p.name: p for p in structure.parameters}
+    return {
+        name: float(np.clip(value, bounds[name].lower, bounds[name].upper))
+        for name, value in values.items()
+        if name in bounds
+    }
+
+
+def _rig_values(
+    rig: Rig, known: Mapping[str, float], base: NDArray[np.float64]
+) -> tuple[dict[str, float], float]:
+    """Return the rig's parameters from the coefficients of its own terms, and the force per unit of the others'."""
+    values = dict(known)
+    motion = rig.motion
+    if not rig.is_driven:
+        values |= {motion.damping.name: base[0], motion.stiffness.name: base[1], motion.bias.name: base[2]}
+        return values, 1.0
+    gain = float(motion.drive_gain.subs({s: known[s.name] for s in motion.drive_gain.free_symbols}))
+    assert motion.inertia is not None
+    inertia = gain / base[0] if base[0] * gain > 0.0 else known[motion.inertia.name]
+    values[motion.inertia.name] = inertia
+    values[motion.damping.name] = max(base[1] * inertia, 1e-4 * known[motion.damping.name])
+    if len(base) == 4:
+        stiffness = max(base[2] * inertia, 1e-3 * known[motion.stiffness.name])
+        values[motion.stiffness.name] = stiffness
+        values[motion.rest.name] = known[motion.rest.name] + base[3] * inertia / stiffness
+    else:
+        for symbol in motion.bias.free_symbols:
+            values[symbol.name] = base[2] * inertia
+    return values, inertia

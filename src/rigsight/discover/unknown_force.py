@@ -1,0 +1,46 @@
+"""What is a force of which nothing is known? An effect like any other: it resists a joint, and its course is a state."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from rigsight.effects import Effect
+from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
+from rigsight.rigs import Joint
+from rigsight.simulate import Structure
+from rigsight.simulate.signal_path import state_symbol
+from rigsight.simulate.structure import input_symbols
+
+_FORCE = sp.Symbol("missing_force", real=True)
+_RATE = sp.Symbol("missing_force_rate", real=True)
+
+UNKNOWN_FORCE = Effect(
+    name="missing_force",
+    place=Place.DYNAMICS,
+    summary="A force of unknown course resists the motion.",
+    parameters=(),
+    energy=Energy.ACTIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    torque=_FORCE,
+    states=(State(_FORCE, _RATE, "force"), State(_RATE, sp.S.Zero, "force time^-1")),
+)
+"""An observer adds noise to the rate of its rate; without it the force is a straight line."""
+
+
+def force_states(structure: Structure, effect: Effect) -> tuple[int, int]:
+    """Return where an unknown force and its rate stand among the states of a structure."""
+    force, rate = (structure.states.index(state_symbol(effect, symbol)) for symbol in (_FORCE, _RATE))
+    return force, rate
+
+
+def joint_motion(structure: Structure, joint: Joint) -> tuple[sp.Expr, sp.Expr]:
+    """Return the motion of a joint from its rest and its velocity, of the structure's symbols."""
+    mechanism = structure.rig.mechanism
+    bound: dict[sp.Symbol, sp.Expr] = {
+        sp.Symbol(name, real=True): symbol
+        for name, symbol in zip(structure.names, structure.parameter_symbols, strict=True)
+    }
+    for coordinate in mechanism.prescribed:
+        value, rate, _ = input_symbols(mechanism.inputs.index(str(coordinate.prescribed_by)))
+        bound |= {coordinate.symbol: value, coordinate.rate: rate}
+    return (joint.motion - joint.rest).xreplace(bound), mechanism.rate(joint.motion).xreplace(bound)

@@ -1,0 +1,80 @@
+"""Is a missing force traced to the joint where it acts, with its law, on rigs of several joints and sensors?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from rigsight.discover import missing_forces
+from rigsight.effects import effect_named, placed
+from rigsight.errors import InputError
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose, simulate
+
+DT, SECONDS = 5e-3, 4.0
+T = DT * np.arange(round(SECONDS / DT))
+TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
+RELATIVE_NOISE = 1e-3
+
+
+def sweep(amplitude: float, phase: float) -> np.ndarray:
+    return amplitude * np.sin(phase + 2.0 * np.pi * (0.5 * T + 0.8 * T**2))
+
+
+def measured(
+    rig: Rig, effect: str, values: Mapping[str, float], amplitudes: tuple[float, ...]
+) -> tuple[list[Record], dict[str, float]]:
+    name, place = effect.split("@")
+    structure = compose(rig, [placed(effect_named(name), place)])
+    rng = np.random.default_rng(0)
+    runs = [
+        simulate(structure, values, Record(f"run {i}", DT, {"u": sweep(a, i)}, {}, hold="foh"), accuracy=1e-6)
+        for i, a in enumerate(amplitudes)
+    ]
+    noise = {s.name: RELATIVE_NOISE * max(float(np.std(r[s.name])) for r in runs) for s in rig.outputs}
+    noisy = [
+        r.with_signals(**{n: r[n] + rng.normal(scale=std, size=r.n_samples) for n, std in noise.items()})
+        for r in runs
+    ]
+    return noisy, noise
+
+
+def disturbed(values: Mapping[str, float], share: float = 0.05) -> dict[str, float]:
+    rng = np.random.default_rng(1)
+    return {
+        name: value if name == "k_t" else value * (1.0 + share * rng.uniform(-1.0, 1.0))
+        for name, value in values.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "value"),
+    [("quadratic_damping@motor_bearing", "c_2", 1e-4), ("cubic_stiffness@load_bearing", "k_3", 0.3)],
+)
+def test_law_and_place_of_a_missing_force_are_found(
+    drive_train: Rig, effect: str, parameter: str, value: float
+) -> None:
+    records, noise = measured(drive_train, effect, {**TRAIN, parameter: value}, (0.8, 1.5))
+    first, *others = missing_forces(drive_train, records, disturbed(TRAIN), noise)
+    (term,) = first.law.terms
+    assert term.effect.name == effect
+    assert term.values[parameter] == pytest.approx(value, rel=0.03)
+    assert first.share > 0.99
+    assert first.error_over_noise < 1.2
+    assert all(other.criterion > first.criterion for other in others)
+    assert first.parameters["J_l"] == pytest.approx(TRAIN["J_l"], rel=0.01)
+
+
+def test_a_joint_that_cannot_explain_all_sensors_contradicts_them(drive_train: Rig) -> None:
+    values = {**TRAIN, "c_2": 1e-4}
+    records, noise = measured(drive_train, "quadratic_damping@motor_bearing", values, (0.8, 1.5))
+    errors = {f.joint: f.error_over_noise for f in missing_forces(drive_train, records, TRAIN, noise)}
+    assert errors["motor_bearing"] < 1.2 < errors["shaft"]
+
+
+def test_without_records_nothing_is_traced(drive_train: Rig) -> None:
+    with pytest.raises(InputError, match="there is none"):
+        missing_forces(drive_train, [], TRAIN, {"motor_angle": 1.0, "load_angle": 1.0})
