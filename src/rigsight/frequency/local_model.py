@@ -31,7 +31,7 @@ from rigsight.frequency.signal_pair import (
 )
 from rigsight.records.record import Hold, Record
 
-_SPARE = 6
+SPARE = 6
 """Equations beyond the unknowns in the narrowest band chosen by itself: a variance from fewer is a lottery."""
 _CHUNK = 4096
 _RANK = 1e-11
@@ -174,7 +174,7 @@ def _local_response(
     what = f"Record '{record.name}'"
     span = record.n_samples * record.dt
     unknowns = (2 if transient else 1) * (order + 1) + poles
-    narrowest = unknowns + _SPARE
+    narrowest = unknowns + SPARE
     if bandwidth is None:
         bandwidth = 2.0 * math.pi / span * narrowest
     # One degree of freedom is what a variance needs at least.
@@ -217,6 +217,53 @@ def _local_response(
     )
 
 
+class LocalFit:
+    """Least squares in many local bands at once; terms that say the same share a coefficient.
+
+    Parameters
+    ----------
+    terms
+        Shape (n_bands, n_equations, n_terms).
+    sides
+        What they add up to, shape (n_bands, n_equations).
+    absorbed
+        Terms that were projected out of both before.
+
+    Attributes
+    ----------
+    left_over
+        Sum of squares of what no term explains, shape (n_bands,).
+    noise
+        The same per degree of freedom, shape (n_bands,).
+    """
+
+    def __init__(
+        self, terms: NDArray[np.complex128], sides: NDArray[np.complex128], absorbed: int = 0
+    ) -> None:
+        scales = np.linalg.norm(terms, axis=1, keepdims=True)
+        scales[scales == 0.0] = 1.0
+        left, singular, right = np.linalg.svd(terms / scales, full_matrices=False)
+        kept = singular > _RANK * singular[:, :1]
+        inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
+        projected = np.einsum("lws,lw->ls", left.conj(), sides)
+        theta = np.einsum("lsp,ls->lp", right.conj(), inverse * projected)
+        residual = sides - np.einsum("lwp,lp->lw", terms / scales, theta)
+        freedom = terms.shape[1] - absorbed - np.count_nonzero(kept, axis=1)
+        self.left_over = np.sum(np.abs(residual) ** 2, axis=1)
+        self.noise = self.left_over / freedom
+        self._scales, self._theta = scales[:, 0], theta
+        self._left, self._inverse, self._right = left, inverse, right
+
+    def coefficient(self, term: int) -> NDArray[np.complex128]:
+        """Return the coefficient of one term, shape (n_bands,)."""
+        return np.asarray(self._theta[:, term] / self._scales[:, term])
+
+    def shares(self, term: int) -> NDArray[np.complex128]:
+        """Return what each equation has in the coefficient of one term, shape (n_bands, n_equations)."""
+        rows = np.einsum("ls,lws->lw", self._right[:, :, term].conj() * self._inverse, self._left.conj())
+        return np.asarray(rows / self._scales[:, term, None])
+
+
 def _solve(
     U: NDArray[np.complex128],
     Y: NDArray[np.complex128],
@@ -241,17 +288,5 @@ def _solve(
         terms.append(powers.astype(np.complex128))
     if poles:
         terms.append(-(r[..., None] ** np.arange(1, poles + 1)) * near_Y)
-    K = np.concatenate(terms, axis=-1)
-    scales = np.linalg.norm(K, axis=1, keepdims=True)
-    scales[scales == 0.0] = 1.0
-    left, singular, right = np.linalg.svd(K / scales, full_matrices=False)
-    kept = singular > _RANK * singular[:, :1]
-    inverse = np.where(kept, 1.0 / np.where(kept, singular, 1.0), 0.0)
-    projected = np.einsum("lws,lw->ls", left.conj(), near_Y[..., 0])
-    theta = np.einsum("lsp,ls->lp", right.conj(), inverse * projected)
-    residual = near_Y[..., 0] - np.einsum("lwp,lp->lw", K / scales, theta)
-    freedom = width - np.count_nonzero(kept, axis=1)
-    noise = np.sum(np.abs(residual) ** 2, axis=1) / freedom
-    scale = scales[:, 0, 0]
-    rows = np.einsum("ls,lws->lw", right[:, :, 0].conj() * inverse, left.conj())
-    return theta[:, 0] / scale, rows * (np.sqrt(noise) / scale)[:, None], picked
+    fit = LocalFit(np.concatenate(terms, axis=-1), near_Y[..., 0])
+    return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked

@@ -1,0 +1,370 @@
+"""How do records in which several inputs move, at once or one at a time, give the response of a signal to each of them?
+
+Close to a frequency every record says ``A(r) Y(k + r) = sum_i B_i(r) U_i(k + r) + T(r)``: the responses are shared by all
+records, the transient T is each one's own. Inputs that are smooth multiples of each other there say the same, and are not told
+apart.
+
+References
+----------
+R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 2 and 7. R. Pintelon,
+J. Schoukens, G. Vandersteen and K. Barbe, "Estimation of nonparametric noise and FRF models for multivariable systems", Mech.
+Syst. Signal Process. (2010).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.frequency.frequency_response import FrequencyResponse
+from rigsight.frequency.local_model import SPARE, LocalFit
+from rigsight.frequency.signal_pair import excited, hold_response, line_frequencies, pair_unit
+from rigsight.records.periods import repeated_period
+from rigsight.records.record import Hold, Record
+
+_OWN_SHARE = 1e-4
+"""Share of an input's power that no other input explains, from which its response is its own: 40 dB, as for silence."""
+_MOSTLY = 0.5
+"""Share of its frequencies at which an input must be told apart to be worth a response."""
+_SHORT = 0.5
+"""Duration over that of the longest record below which a record would blur what the longest resolves."""
+_MOST_FREQUENCIES = 400
+"""As many as a plot can show; a resonance of a damping ratio of 1 % still holds several of them."""
+_STANDS_OUT = 4.0
+"""Power over variance from which a value says something about a magnitude: half of it at most is error."""
+_NEIGHBORS, _MOST_OF_THEM = 9, 0.8
+"""One value stands out by chance in twenty bands; eight of nine neighbors do not."""
+_FEWEST = 8
+"""Values below which there is no curve."""
+_STILL = 1e-12
+_CHUNK = 128
+
+
+@dataclass(frozen=True, eq=False)
+class ResponsesOfInputs:
+    """Responses of some signals to some inputs.
+
+    Attributes
+    ----------
+    found
+        By (source, response); one that these records do not show is not there.
+    problems
+        Why it is not, a sentence by (source, response).
+    together
+        Inputs that move together in these records, so that nobody can tell their responses apart.
+    """
+
+    found: Mapping[tuple[str, str], FrequencyResponse]
+    problems: Mapping[tuple[str, str], str]
+    together: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectra:
+    """Lines of one record with equal noise in all records; inputs as they are between samples, zero where one does not move."""
+
+    record: Record
+    omega: NDArray[np.float64]
+    inputs: NDArray[np.complex128]
+    moves: NDArray[np.bool_]
+    excites: NDArray[np.bool_]
+    scale: float
+    has_transient: bool
+
+    @property
+    def line(self) -> float:
+        return float(self.omega[0])
+
+    def width(self, order: int, poles: int, resolution: float | None) -> int:
+        """Return the lines of a local band: its unknowns and some more, or those that a resolution holds."""
+        unknowns = (order + 1) * (int(np.count_nonzero(self.moves)) + self.has_transient) + poles
+        wished = 0 if resolution is None else round(resolution / self.line)
+        return max(unknowns + SPARE, wished) | 1
+
+
+def responses_of_inputs(
+    records: Sequence[Record],
+    sources: Sequence[str],
+    responses: Sequence[str],
+    *,
+    order: int = 2,
+    poles: int = 2,
+    resolution: float | None = None,
+    smooth: Sequence[str] = (),
+) -> ResponsesOfInputs:
+    """Return the frequency responses of every signal to every input, from all records together.
+
+    Parameters
+    ----------
+    records
+        In each one or several inputs move; they may differ in length, sample time and in the signals they hold. Steps say nothing
+        here. Of inputs that repeat, whole periods are averaged, without the first.
+    sources, responses
+        Names of the signals.
+    order
+        Degree of the polynomials in a local band.
+    poles
+        Degree of the common denominator; 0 for a local polynomial model.
+    resolution
+        Width of a local band [rad/s]; None takes the narrowest of each record.
+    smooth
+        Sources that were measured, and go on between their samples without content above Nyquist; others by the record's hold.
+
+    Raises
+    ------
+    InputError
+        If a record is too short for `resolution`, or there are no inputs.
+    """
+    if not sources:
+        raise InputError("There is no input, so there is no frequency response.")
+    found: dict[tuple[str, str], FrequencyResponse] = {}
+    problems: dict[tuple[str, str], str] = {}
+    together: dict[tuple[str, ...], None] = {}
+    spectra = [
+        _spectra(r, sources, smooth)
+        for r in records
+        if r.kind != "step" and any(_moves(r, source) for source in sources)
+    ]
+    for response in responses:
+        own = _long_enough(
+            [s for s in spectra if response in s.record and s.width(order, poles, resolution) <= s.omega.size]
+        )
+        local = _LocalModels(own, response, order, poles, resolution) if own else None
+        for index, source in enumerate(sources):
+            if local is None or not any(s.moves[index] for s in own):
+                problems[source, response] = _unmoved(source, response, records)
+                continue
+            curve, rivals = local.curve(index, sources)
+            if curve is not None:
+                found[source, response] = curve
+            elif rivals:
+                together[tuple(sorted((source, *rivals), key=list(sources).index))] = None
+                problems[source, response] = _inseparable(source, rivals)
+            else:
+                problems[source, response] = (
+                    f"the response of '{response}' to '{source}' does not stand out of its noise. Drive '{source}' more "
+                    "strongly, or for longer."
+                )
+    return ResponsesOfInputs(found, problems, tuple(together))
+
+
+def _unmoved(source: str, response: str, records: Sequence[Record]) -> str:
+    if not any(response in record for record in records):
+        return f"no record holds '{response}'."
+    if any(r.kind == "step" and response in r and _moves(r, source) for r in records):
+        return f"'{source}' moves in steps alone, which give no frequency response. Record a sweep or a multisine of it."
+    return f"'{source}' does not move in any record that holds '{response}'. Record one in which it does."
+
+
+def _inseparable(source: str, rivals: Sequence[str]) -> str:
+    others = " and ".join(f"'{rival}'" for rival in rivals)
+    return (
+        f"'{source}' moves together with {others}: their responses cannot be told apart. Record one in which '{source}' moves "
+        "alone, or with phases of its own."
+    )
+
+
+def _moves(record: Record, source: str) -> bool:
+    samples = record[source]
+    return float(np.ptp(samples)) > _STILL * float(np.max(np.abs(samples)))
+
+
+def _spectra(record: Record, sources: Sequence[str], smooth: Sequence[str]) -> _Spectra:
+    mean, n_periods = _mean_period(record, sources)
+    n = mean.n_samples
+    omega = line_frequencies(n, mean.dt)
+    # The noise of a mean of periods is that much lower.
+    scale = math.sqrt(max(n_periods, 1) * mean.dt / n)
+    inputs, excites = [], []
+    for source in sources:
+        moves = _moves(record, source)
+        hold: Hold = "band_limited" if source in smooth else record.hold
+        lines = np.fft.rfft(mean[source] - np.mean(mean[source]))[1 : omega.size + 1]
+        inputs.append(scale * lines * hold_response(omega, mean.dt, hold) if moves else np.zeros_like(lines))
+        width = min(2 * SPARE + 1, omega.size)
+        power = np.convolve(np.abs(inputs[-1]) ** 2, np.full(width, 1.0 / width), mode="same")
+        excites.append(excited(omega, power, None, "") if moves else np.zeros(omega.size, dtype=np.bool_))
+    return _Spectra(
+        mean,
+        omega,
+        np.array(inputs),
+        np.array([_moves(record, source) for source in sources]),
+        np.array(excites),
+        scale,
+        n_periods == 0,
+    )
+
+
+def _mean_period(record: Record, sources: Sequence[str]) -> tuple[Record, int]:
+    """Return the mean of all common periods but the first of the inputs that move, and of how many; or the record and 0."""
+    period = 1
+    for source in sources:
+        if _moves(record, source):
+            own = repeated_period(record[source])
+            if own is None:
+                return record, 0
+            period = math.lcm(period, own)
+    count = record.n_samples // period
+    if count < 2:
+        return record, 0
+    kept = {
+        name: samples[period : count * period].reshape(count - 1, period).mean(axis=0)
+        for name, samples in record.signals.items()
+    }
+    return replace(record, signals=kept), count - 1
+
+
+def _long_enough(spectra: Sequence[_Spectra]) -> list[_Spectra]:
+    """Leave out records that would blur what others resolve, unless only they move an input."""
+    if not spectra:
+        return []
+    finest = min(s.line for s in spectra)
+    kept = [s for s in spectra if _SHORT * s.line <= finest]
+    seen = np.any([s.moves for s in kept], axis=0)
+    return [s for s in spectra if s in kept or bool(np.any(s.moves & ~seen))]
+
+
+class _LocalModels:
+    """Local models of one signal at all frequencies that any input excites."""
+
+    def __init__(
+        self,
+        spectra: Sequence[_Spectra],
+        response: str,
+        order: int,
+        poles: int,
+        resolution: float | None,
+    ) -> None:
+        self._spectra, self._response = spectra, response
+        self._order, self._poles = order, poles
+        self._widths = [s.width(order, poles, resolution) for s in spectra]
+        self._moving = np.flatnonzero(np.any([s.moves for s in spectra], axis=0))
+        self._lines = [np.fft.rfft(s.record[response])[1 : s.omega.size + 1] * s.scale for s in spectra]
+        self._omega = _frequencies(spectra)
+        chunks = [self._omega[i : i + _CHUNK] for i in range(0, self._omega.size, _CHUNK)]
+        parts = [self._solved(chunk) for chunk in chunks]
+        self._values, self._variance, self._against, self._own = (
+            np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+        )
+
+    def curve(self, index: int, sources: Sequence[str]) -> tuple[FrequencyResponse | None, tuple[str, ...]]:
+        """Return the response to one input, or the inputs that it moves together with; neither where it drowns in noise."""
+        column = int(np.flatnonzero(self._moving == index)[0])
+        excites = np.any([_at_lines(s, s.excites[index], self._omega) for s in self._spectra], axis=0)
+        apart = self._own[:, column] >= _OWN_SHARE
+        if np.mean(apart[excites]) < _MOSTLY:
+            others = [i for i in range(self._moving.size) if i != column]
+            alone = [i for i in others if np.mean(self._against[excites, column, i] >= _OWN_SHARE) < _MOSTLY]
+            return None, tuple(sources[self._moving[i]] for i in alone or others)
+        values, variance = self._values[:, column], self._variance[:, column]
+        stands_out = excites & apart & (np.abs(values) ** 2 > _STANDS_OUT * variance)
+        # A value may stand out by chance; so do not its neighbors.
+        around = np.convolve(stands_out, np.ones(_NEIGHBORS), mode="same")
+        present = np.convolve(np.ones(stands_out.size), np.ones(_NEIGHBORS), mode="same")
+        kept = stands_out & (around >= _MOST_OF_THEM * present)
+        if np.count_nonzero(kept) < _FEWEST:
+            return None, ()
+        names = tuple(s.record.name for s in self._spectra)
+        kind = f"local {'rational' if self._poles else 'polynomial'}, order {self._order}"
+        return FrequencyResponse(
+            omega=self._omega[kept],
+            values=values[kept],
+            source=sources[index],
+            response=self._response,
+            unit=pair_unit(self._spectra[0].record, sources[index], self._response),
+            variance=variance[kept],
+            records=names,
+            method=f"{kind}, {len(sources)} inputs, {len(names)} records together",
+        ), ()
+
+    def _solved(
+        self, omega: NDArray[np.float64]
+    ) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return values and variances of all inputs, and the share of each that others do not explain: each other one, and all.
+
+        Shapes (n_frequencies, n_moving), the third (n_frequencies, n_moving, n_moving).
+        """
+        n_terms, n_inputs = self._order + 1, self._moving.size
+        reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
+        collected: tuple[list[NDArray[np.complex128]], ...] = ([], [], [])
+        for s, width, lines in zip(self._spectra, self._widths, self._lines, strict=True):
+            center = np.round(omega / s.line).astype(np.intp) - 1
+            picked = np.clip(center - width // 2, 0, s.omega.size - width)[:, None] + np.arange(width)
+            r = (s.omega[picked] - omega[:, None]) / reach
+            powers = r[..., None] ** np.arange(max(n_terms, self._poles + 1))
+            # Beyond its last line a record says nothing.
+            heard = (omega <= s.omega[-1])[:, None, None]
+            near_inputs = np.moveaxis(s.inputs[self._moving][:, picked], 0, 2)
+            near = np.where(heard, lines[picked][..., None], 0.0)
+            terms = near_inputs[..., None] * powers[..., None, :n_terms]
+            own = [
+                np.where(heard, terms.reshape(*picked.shape, -1), 0.0),
+                -powers[..., 1 : self._poles + 1] * near,
+                near,
+            ]
+            if s.has_transient:
+                own = _without(powers[..., :n_terms], own)
+            for parts, part in zip(collected, own, strict=True):
+                parts.append(part)
+        inputs, past, answers = (np.concatenate(parts, axis=1) for parts in collected)
+        absorbed = n_terms * sum(s.has_transient for s in self._spectra)
+        fit = LocalFit(np.concatenate([inputs, past], axis=2), answers[..., 0], absorbed)
+        first = [n_terms * i for i in range(n_inputs)]
+        values = np.stack([fit.coefficient(term) for term in first], axis=1)
+        shares = np.stack([np.sum(np.abs(fit.shares(term)) ** 2, axis=1) for term in first], axis=1)
+        return values, fit.noise[:, None] * shares, *_own_shares(inputs, n_terms)
+
+
+def _frequencies(spectra: Sequence[_Spectra]) -> NDArray[np.float64]:
+    """Return lines that any input excites, of the finest record that moves it, spread over the logarithm."""
+    lines = []
+    for index in np.flatnonzero(np.any([s.moves for s in spectra], axis=0)):
+        finest = min((s for s in spectra if s.moves[index]), key=lambda s: s.line)
+        lines.append(finest.omega[finest.excites[index]])
+    every = np.unique(np.concatenate(lines))
+    if every.size <= _MOST_FREQUENCIES:
+        return every
+    wished = np.geomspace(every[0], every[-1], _MOST_FREQUENCIES)
+    return np.unique(every[np.clip(np.searchsorted(every, wished), 0, every.size - 1)])
+
+
+def _at_lines(s: _Spectra, flags: NDArray[np.bool_], omega: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return what holds at the lines of a record next to some frequencies."""
+    nearest = np.clip(np.round(omega / s.line).astype(np.intp) - 1, 0, s.omega.size - 1)
+    return np.asarray(flags[nearest] & (omega <= s.omega[-1]))
+
+
+def _without(
+    powers: NDArray[np.float64], parts: Sequence[NDArray[np.complex128]]
+) -> list[NDArray[np.complex128]]:
+    """Take out of the equations of a record what its transient can explain: polynomials over each band."""
+    basis = np.linalg.qr(powers)[0]
+    return [part - basis @ (np.swapaxes(basis, 1, 2) @ part) for part in parts]
+
+
+def _own_shares(
+    inputs: NDArray[np.complex128], n_terms: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the share of each input's power that one other, and that all others, leave unexplained."""
+    n_bands, n_rows, n_columns = inputs.shape
+    n = n_columns // n_terms
+    blocks = inputs.reshape(n_bands, n_rows, n, n_terms)
+    against, own = np.ones((n_bands, n, n)), np.ones((n_bands, n))
+    for i in range(n):
+        power = np.maximum(np.sum(np.abs(blocks[:, :, i, 0]) ** 2, axis=1), 1e-300)
+        others = [j for j in range(n) if j != i]
+
+        def unexplained(rivals: list[int], i: int = i) -> NDArray[np.float64]:
+            terms = blocks[:, :, rivals].reshape(n_bands, n_rows, -1)
+            return np.asarray(LocalFit(terms, blocks[:, :, i, 0]).left_over)
+
+        for j in others:
+            against[:, i, j] = unexplained([j]) / power
+        if others:
+            own[:, i] = against[:, i, others[0]] if len(others) == 1 else unexplained(others) / power
+    return against, own
