@@ -11,12 +11,11 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.effects import effect_named, placed
-from rigsight.rigs import ELEMENT, Rig, read_rig_file
+from rigsight.rigs import ELEMENT, RIGS, read_rig_file
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization, linearize
 from rigsight.simulate.structure import TIME, input_symbols
 
-FILES = Path(__file__).parents[1] / "rigs" / "files"
 OMEGA = np.geomspace(0.1, 300.0, 25)
 
 TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
@@ -61,10 +60,6 @@ unit = "rad/s"
 """
 
 
-def rig_of(name: str) -> Rig:
-    return read_rig_file(FILES / f"{name}.toml")
-
-
 def by_differences(
     structure: Structure, values: dict[str, float], at: Linearization
 ) -> dict[str, NDArray[np.float64]]:
@@ -105,7 +100,7 @@ def by_differences(
 def test_matrices_and_responses_are_those_of_the_equations(
     name: str, values: dict[str, float], inputs: dict[str, float]
 ) -> None:
-    structure = compose(rig_of(name))
+    structure = compose(RIGS[name])
     found = linearize(structure, values, inputs)
     assert found.rests
     expected = by_differences(structure, values, found)
@@ -128,7 +123,7 @@ def test_matrices_and_responses_are_those_of_the_equations(
 def test_transfer_functions_poles_and_zeros_are_those_of_python_control(
     name: str, values: dict[str, float]
 ) -> None:
-    found = linearize(compose(rig_of(name)), values)
+    found = linearize(compose(RIGS[name]), values)
     for j, source in enumerate(found.inputs):
         for i, response in enumerate(found.outputs):
             system = control.ss(
@@ -180,7 +175,7 @@ def test_a_force_that_follows_a_prescribed_rate_has_more_zeros_than_poles() -> N
 
 
 def test_what_nothing_holds_drifts_and_does_not_rest_under_a_force() -> None:
-    structure = compose(rig_of("drive_train"))
+    structure = compose(RIGS["drive_train"])
     assert linearize(structure, {**TRAIN, "k_l": 0.0}).rests
     pushed = linearize(structure, {**TRAIN, "k_l": 0.0}, {"u": 0.1})
     assert not pushed.rests
@@ -189,7 +184,7 @@ def test_what_nothing_holds_drifts_and_does_not_rest_under_a_force() -> None:
 
 
 def test_a_pendulum_that_stands_falls() -> None:
-    structure = compose(rig_of("cart_pendulum"))
+    structure = compose(RIGS["cart_pendulum"])
     standing = linearize(structure, PENDULUM, state=np.array([0.0, np.pi, 0.0, 0.0]))
     assert standing.rests
     assert standing.stability == "unstable"
@@ -197,7 +192,7 @@ def test_a_pendulum_that_stands_falls() -> None:
 
 
 def test_dry_friction_is_left_out_and_the_rest_stays() -> None:
-    rig = rig_of("drive_train")
+    rig = RIGS["drive_train"]
     rough = compose(rig, [placed(effect_named("coulomb_friction"), "load_bearing")])
     with_friction = linearize(rough, {**TRAIN, "T_c": 0.01}, {"u": 0.3})
     np.testing.assert_array_equal(
