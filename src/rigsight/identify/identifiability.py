@@ -19,6 +19,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.identify.combination_text import ONE, listed, percent, product_text, sum_text
 from rigsight.identify.information import Information
 
 Floats = NDArray[np.float64]
@@ -30,8 +31,6 @@ _NO_INFLUENCE = 100.0
 _TAKES_PART = 0.05
 """Share of the largest entry from which a parameter takes part in a direction."""
 _LARGEST_POWER = 3
-_NEAR_POWER = 0.03
-"""Distance at which a ratio of entries counts as a small fraction; the step that follows decides."""
 _STEP = 1.5
 """Factor of the step that tests a combination: far enough that a sum and a product part."""
 _ROUNDING = 1e-9
@@ -98,9 +97,9 @@ class Identifiability:
             return "Nothing was left to be identified."
         if len(self.determined) == len(names):
             worst = max(names, key=lambda name: self.relative_errors[name])
-            error = _percent(self.relative_errors[worst])
+            error = percent(self.relative_errors[worst])
             return f"The records determine all parameters; the least certain is {worst} ({error})."
-        known = f"The records determine {_listed(self.determined)}." if self.determined else ""
+        known = f"The records determine {listed(self.determined)}." if self.determined else ""
         return " ".join(
             filter(None, [known or "The records determine no parameter by itself.", *self.statements])
         )
@@ -114,20 +113,30 @@ def identifiability(found: Information) -> Identifiability:
     found
         What the records say.
     """
-    errors = _conditional_errors(found.root)
-    # What does next to nothing is held: that it may be anything is no reason to doubt the others.
-    held = errors >= POORLY_KNOWN
-    errors[~held] = _marginal_errors(found.root[:, ~held])
-    search = _Search(found)
+    errors, search = relative_errors(found), _Search(found)
     statements = tuple(search.statements())
-    determined = tuple(n for n, e in zip(found.names, errors, strict=True) if e < POORLY_KNOWN)
     return Identifiability(
-        relative_errors=dict(zip(found.names, map(float, errors), strict=True)),
-        determined=determined,
+        relative_errors=errors,
+        determined=tuple(name for name, error in errors.items() if error < POORLY_KNOWN),
         combinations=tuple(search.combinations()),
         statements=statements,
         free_directions=_undetermined(found.root).shape[1],
     )
+
+
+def relative_errors(found: Information) -> dict[str, float]:
+    """Return the relative standard error of each parameter, see `Identifiability`.
+
+    Parameters
+    ----------
+    found
+        What the records say.
+    """
+    errors = _conditional_errors(found.root)
+    # What does next to nothing is held: that it may be anything is no reason to doubt the others.
+    held = errors >= POORLY_KNOWN
+    errors[~held] = _marginal_errors(found.root[:, ~held])
+    return dict(zip(found.names, map(float, errors), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +197,7 @@ class _Search:
                 continue
             if q.text in self._held:
                 other = self._held[q.text]
-                text, value = _product([(q.text, 1), (other.text, -1)]), q.value / other.value
+                text, value = product_text([(q.text, 1), (other.text, -1)]), q.value / other.value
                 yield Combination(text, (*q.members, *other.members), value, abs(value) * error)
             elif len(q.members) > 1:
                 yield Combination(q.text, q.members, q.value, abs(q.size) * error, q.unit)
@@ -206,7 +215,7 @@ class _Search:
         how = (
             "it has no influence"
             if errors[index] > _NO_INFLUENCE
-            else f"standard error {_percent(errors[index])}"
+            else f"standard error {percent(errors[index])}"
         )
         return f"{quantity.text} is not determined ({how})."
 
@@ -239,7 +248,7 @@ class _Search:
             a, b = power.numerator, -power.denominator
             if a < 0:
                 a, b = -a, -b
-            text = _product([(first.text, a), (second.text, b)])
+            text = product_text([(first.text, a), (second.text, b)])
             value = first.value**a * second.value**b
             kind = "product" if b > 0 else "ratio"
             together = _Quantity(text, members, "", value, value, first.direction / a, a * first.power)
@@ -247,13 +256,13 @@ class _Search:
         weight = -(first.size * along_first) / (second.size * along_second)
         value = first.value + weight * second.value
         size = value or first.size
-        text, unit = _weighted_sum(first, weight, second)
+        text = sum_text(first.text, weight, second.text, first.unit == second.unit)
         plain_sum = f"{first.text} + {second.text}", f"{first.text} - {second.text}"
         kind = ("sum " if weight > 0.0 else "difference ") if text in plain_sum else ""
         exact = self._change([first, second], [along_first, along_second], False) <= _UNCHANGED
         closely = "" if exact else ", close to these values"
         words = f"{name} only as {'their ' if kind else ''}{kind}{text}{closely}."
-        return _Quantity(text, members, unit, value, size, first.direction * size / first.size), words
+        return _Quantity(text, members, first.unit, value, size, first.direction * size / first.size), words
 
     def _group(self, free: Floats) -> str:
         """Name quantities that change together without a trace, and hold one of them."""
@@ -271,13 +280,13 @@ class _Search:
             return self._sums(members, along)
         held = max(zip(members, along, strict=True), key=lambda pair: abs(pair[1]))[0]
         self._quantities.remove(held)
-        return f"{_listed([q.text for q in members])} are not told apart: a change of one is made up for by the others."
+        return f"{listed([q.text for q in members])} are not told apart: a change of one is made up for by the others."
 
     def _factor(self, members: Sequence[_Quantity], powers: Sequence[Fraction]) -> str:
         """Name quantities that may all be multiplied without a trace, and hold the first."""
         held = next(q for q, power in zip(members, powers, strict=True) if abs(power) == 1)
         self._quantities.remove(held)
-        names = _listed([q.text for q in members])
+        names = listed([q.text for q in members])
         if len(set(powers)) > 1:
             moved = ", ".join(f"{q.text} x 2^{power}" for q, power in zip(members, powers, strict=True))
             return f"{names} change together without a trace ({moved}): one of them must be known for the others."
@@ -293,16 +302,16 @@ class _Search:
         for q, slope in zip(members, slopes, strict=True):
             if q is not held:
                 weight = -slope / slopes[shared]
-                text, unit = _weighted_sum(q, weight, held)
+                text = sum_text(q.text, weight, held.text, q.unit == held.unit)
                 value = q.value + weight * held.value
                 size = value or q.size
                 made.append(
                     _Quantity(
-                        text, (*q.members, *held.members), unit, value, size, q.direction * size / q.size
+                        text, (*q.members, *held.members), q.unit, value, size, q.direction * size / q.size
                     )
                 )
         self._quantities = [q for q in self._quantities if q not in members] + made
-        return f"{_listed([q.text for q in members])} only as {_listed([q.text for q in made])}."
+        return f"{listed([q.text for q in members])} only as {listed([q.text for q in made])}."
 
     def _change(self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool) -> float:
         """Return how the outputs change along a direction, over what its first member alone would change.
@@ -368,31 +377,5 @@ def _sparsest(free: Floats) -> Floats:
 
 def _small_fraction(ratio: float) -> Fraction | None:
     nearest = Fraction(ratio).limit_denominator(_LARGEST_POWER)
-    close = nearest != 0 and abs(float(nearest) - ratio) <= _NEAR_POWER * abs(ratio)
+    close = nearest != 0 and abs(float(nearest) - ratio) <= ONE * abs(ratio)
     return nearest if close and abs(nearest.numerator) <= _LARGEST_POWER else None
-
-
-def _product(factors: Sequence[tuple[str, int]]) -> str:
-    above = [_power(text, power) for text, power in factors if power > 0]
-    below = [_power(text, -power) for text, power in factors if power < 0]
-    return "*".join(above) + "".join(f"/{text}" for text in below)
-
-
-def _weighted_sum(first: _Quantity, weight: float, second: _Quantity) -> tuple[str, str]:
-    """Return how ``first + weight * second`` is written, and its unit; without a factor where that is one."""
-    same = first.unit == second.unit
-    factor = "" if same and abs(abs(weight) - 1.0) < _NEAR_POWER else f"{abs(weight):.3g} "
-    return f"{first.text} {'-' if weight < 0.0 else '+'} {factor}{second.text}", first.unit
-
-
-def _power(text: str, power: int) -> str:
-    whole = f"({text})" if any(sign in text for sign in " */") else text
-    return whole if power == 1 else f"{whole}^{power}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _percent(error: float) -> str:
-    return f"{100.0 * error:.2g} %" if error < 10.0 else f"{error:.2g} times its value"

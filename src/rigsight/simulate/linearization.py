@@ -303,7 +303,7 @@ class _SlopeFunctions:
         held = self._held
         near = np.abs(by_place[:, held]) @ (_NEAR * np.maximum(np.abs(state[held]), 1.0))
         by_inputs = slopes[:, n_states:].reshape(n_states, 3, n_inputs)
-        outputs_by = outputs[:, n_states:].reshape(-1, 3, n_inputs)
+        outputs_by = outputs[:, n_states:].reshape(outputs.shape[0], 3, n_inputs)
         return _Slopes(
             slopes[:, :n_states],
             np.moveaxis(by_inputs, 1, 0),

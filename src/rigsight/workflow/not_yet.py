@@ -8,9 +8,9 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 
-ONE_MOTION_ONLY = frozenset({"compare", "diagnose", "discover", "export", "identify", "vary"})
+ONE_MOTION_ONLY = frozenset({"compare", "diagnose", "discover", "export", "vary"})
 """Commands written for rigs of one motion; a command that takes every rig is taken out here."""
-BUILT_IN_ONLY = frozenset({"discover", "identify"})
+BUILT_IN_ONLY = frozenset({"discover"})
 """Commands that know the parameters of built-in rigs by their names; one that does not is taken out here."""
 
 
