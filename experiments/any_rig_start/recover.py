@@ -79,7 +79,9 @@ def steps(amplitude: float, rng: np.random.Generator) -> Floats:
     return np.asarray(amplitude * rng.uniform(-1.5, 1.5, 41)[np.searchsorted(edges, np.arange(N))])
 
 
-def drawn(case: Case, rig: Rig, rng: np.random.Generator) -> tuple[dict[str, float], list[Record], dict[str, float]]:
+def drawn(
+    case: Case, rig: Rig, rng: np.random.Generator
+) -> tuple[dict[str, float], list[Record], dict[str, float]]:
     """Return true parameters, records and the noise of each sensor; a rig that flies off is drawn again."""
     structure = compose(rig)
     while True:
@@ -108,7 +110,9 @@ def drawn(case: Case, rig: Rig, rng: np.random.Generator) -> tuple[dict[str, flo
     return truth, records, noise
 
 
-def determined(rig: Rig, records: list[Record], truth: Mapping[str, float], noise: Mapping[str, float]) -> bool:
+def determined(
+    rig: Rig, records: list[Record], truth: Mapping[str, float], noise: Mapping[str, float]
+) -> bool:
     """Return True if no parameter, nor the scale of all, is free: the Fisher matrix at the truth has full rank."""
     free = [p.name for p in rig.parameters]
     constants = {c.name: float(c.default or 0.0) for c in rig.constants}
@@ -140,7 +144,9 @@ def main(names: list[str], count: int, first: int) -> None:
             start = {**constants, **linear_start(rig, records, constants, {})}
             started = time.perf_counter()
             scales = characteristic_scales(rig, records, start)
-            fit = GreyBoxFit(compose(rig), records, scales, noise).fit(start, [p.name for p in rig.parameters])
+            fit = GreyBoxFit(compose(rig), records, scales, noise).fit(
+                start, [p.name for p in rig.parameters]
+            )
             seconds.append(time.perf_counter() - begin)
             good = fit.weighted_rms <= REACHED
             reached += good
@@ -148,7 +154,10 @@ def main(names: list[str], count: int, first: int) -> None:
             told = f"  {seed}: {fit.weighted_rms:.3f} noise floors, start {started - begin:.1f} s, all {seconds[-1]:.1f} s"
             told += "" if good else "  " + ", ".join(f"{k} x{fit.values[k] / truth[k]:.3g}" for k in truth)
             print(told, flush=True)
-        print(f"| {name} | {reached} of {count} | {free} | {np.median(seconds):.1f} s | {max(seconds):.1f} s |", flush=True)
+        print(
+            f"| {name} | {reached} of {count} | {free} | {np.median(seconds):.1f} s | {max(seconds):.1f} s |",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

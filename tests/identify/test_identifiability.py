@@ -185,3 +185,10 @@ def test_gain_and_inertia_of_a_rig_are_not_both_identifiable(tmp_path: Path) -> 
         assert known.relative_errors[name] * result.values[name] == pytest.approx(
             result.standard_errors[name], rel=0.3
         )
+
+
+def test_a_small_part_of_a_sum_is_named_with_the_large_one_it_adds_to() -> None:
+    found = said(
+        lambda i, m, s: (i + 0.09 * m) * wave(0.3) + (s + 0.3 * m) * wave(0.5, 7.0), i=0.05, m=0.02, s=0.12
+    )
+    assert found.statements == ("i, m and s only as i + 0.09 m and s + 0.3 m.",)

@@ -29,7 +29,7 @@ POORLY_KNOWN = 0.5
 _NO_INFLUENCE = 100.0
 """Standard error over the value, with all other parameters known, from which a parameter is said to do nothing."""
 _TAKES_PART = 0.05
-"""Share of the largest entry from which a parameter takes part in a direction."""
+"""Share of the largest influence from which a parameter takes part in a direction."""
 _LARGEST_POWER = 3
 _STEP = 1.5
 """Factor of the step that tests a combination: far enough that a sum and a product part."""
@@ -266,8 +266,7 @@ class _Search:
 
     def _group(self, free: Floats) -> str:
         """Name quantities that change together without a trace, and hold one of them."""
-        direction = _sparsest(free)
-        taking_part = np.flatnonzero(np.abs(direction) >= _TAKES_PART * np.max(np.abs(direction)))
+        direction, taking_part = _sparsest(free, np.linalg.norm(self._root(), axis=0))
         members = [self._quantities[i] for i in taking_part]
         along = [float(entry) for entry in direction[taking_part] / np.max(np.abs(direction))]
         powers = [p for entry in along if (p := _small_fraction(entry)) is not None]
@@ -318,6 +317,23 @@ class _Search:
 
         Infinite where a bound stands in the way.
         """
+        for side in (1.0, -1.0):
+            places = self._moved(quantities, [side * entry for entry in along], as_powers)
+            if all(np.all((self._found.lower <= p) & (p <= self._found.upper)) for p in places):
+                break
+        else:
+            return np.inf
+        lengths = [
+            self._found.change(dict(zip(self._found.names, map(float, p), strict=True))) for p in places
+        ]
+        if not np.all(np.isfinite(lengths)) or lengths[1] == 0.0:
+            return np.inf
+        return lengths[0] / lengths[1]
+
+    def _moved(
+        self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool
+    ) -> tuple[Floats, Floats]:
+        """Return the parameters after a step of all, and after that of the first alone."""
         found, largest = self._found, max(abs(entry) for entry in along)
         moved, alone = found.values.copy(), found.values.copy()
         for number, (quantity, entry) in enumerate(zip(quantities, along, strict=True)):
@@ -327,14 +343,7 @@ class _Search:
             moved += step
             if number == 0:
                 alone += step
-        if np.any(moved < found.lower) or np.any(moved > found.upper) or np.any(alone < found.lower):
-            return np.inf
-        lengths = [
-            found.change(dict(zip(found.names, map(float, place), strict=True))) for place in (moved, alone)
-        ]
-        if not np.all(np.isfinite(lengths)) or lengths[1] == 0.0:
-            return np.inf
-        return lengths[0] / lengths[1]
+        return moved, alone
 
 
 def _marginal_errors(root: Floats) -> Floats:
@@ -361,9 +370,12 @@ def _undetermined(root: Floats) -> Floats:
     return np.asarray(right[sizes * POORLY_KNOWN < 1.0].T)
 
 
-def _sparsest(free: Floats) -> Floats:
-    """Return the direction with the fewest entries among those of a reduced row echelon form."""
-    rows = free.T.copy()
+def _sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the direction with the fewest members among those of a reduced row echelon form, and the indices of these.
+
+    What counts is what a member's part does to the outputs: a small number changes much, relatively, for a little of a large one.
+    """
+    rows = (free * influence[:, None]).T
     for place in range(rows.shape[0]):
         pivot = np.unravel_index(np.argmax(np.abs(rows[place:])), rows[place:].shape)
         row, column = place + int(pivot[0]), int(pivot[1])
@@ -371,8 +383,9 @@ def _sparsest(free: Floats) -> Floats:
         rows[place] /= rows[place, column]
         others = np.arange(rows.shape[0]) != place
         rows[others] -= np.outer(rows[others, column], rows[place])
-    entries = [np.count_nonzero(np.abs(row) >= _TAKES_PART * np.max(np.abs(row))) for row in rows]
-    return np.asarray(rows[int(np.argmin(entries))])
+    members = [np.flatnonzero(np.abs(row) >= _TAKES_PART * np.max(np.abs(row))) for row in rows]
+    best = min(range(len(members)), key=lambda i: members[i].size)
+    return np.asarray(rows[best] / influence), members[best]
 
 
 def _small_fraction(ratio: float) -> Fraction | None:

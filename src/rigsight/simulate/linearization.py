@@ -6,28 +6,23 @@ left out: no line has the slope of its jump.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any, Literal
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 from scipy.linalg import eigvals
-from scipy.optimize import least_squares
 
-from rigsight.effects.symbols import positive_part
 from rigsight.errors import SimulationError
-from rigsight.rigs import evaluated
+from rigsight.simulate.equation_slopes import declared_start, slope_functions
 from rigsight.simulate.simulation import parameter_vector
-from rigsight.simulate.structure import TIME, Structure, input_symbols
+from rigsight.simulate.structure import Structure
 
 Floats = NDArray[np.float64]
 Stability = Literal["stable", "drifts", "unstable"]
 
-_NEAR = 1e-6
-"""How near a place of rest must be, relative to each state or in its SI unit: its search stops at 1e-8."""
 _ROUNDED = 1e-7
 """Distance of two roots, over the largest pole, that may be rounding: double roots are known to the root of 1e-16."""
 _VANISHES = 1e-10
@@ -184,12 +179,17 @@ def linearize(
     names = structure.rig.mechanism.inputs
     at_inputs = np.array([(inputs or {}).get(name, 0.0) for name in names], dtype=np.float64)
     p = parameter_vector(structure, values)
-    functions = _slopes(_SameStructure(structure))
+    functions = slope_functions(structure)
     if state is None:
-        at_state = functions.resting(_declared_start(structure, p), at_inputs, p)
+        at_state = functions.resting(declared_start(structure, p), at_inputs, p)
     else:
         at_state = np.asarray(state, dtype=np.float64)
-    slopes = functions.at(at_state, at_inputs, p)
+    try:
+        slopes = functions.at(at_state, at_inputs, p)
+    except np.linalg.LinAlgError:
+        raise SimulationError(
+            f"The mass matrix of {structure.rig.name} is singular where it rests."
+        ) from None
     A, direct = slopes.states, slopes.inputs
     # z = x - E_0 u - E_1 u' takes the rates of the inputs out of the equations.
     E_1 = direct[2]
@@ -214,157 +214,6 @@ def linearize(
             f"The equations of {structure.rig.name} have no slope where it rests: a root or a quotient ends there."
         )
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Slopes:
-    """Derivatives at one place, by states and by inputs, their rates and curvatures, and whether it is one of rest."""
-
-    states: Floats
-    inputs: Floats
-    outputs_by_states: Floats
-    outputs_by_inputs: Floats
-    rests: bool
-
-
-class _SlopeFunctions:
-    """Compiled derivatives of a structure's equations; the mass matrix is inverted in numbers, as symbols it would explode."""
-
-    def __init__(self, structure: Structure) -> None:
-        tree, motion = structure.tree, structure.tree.motion
-        self._n = len(motion.coordinates)
-        states = structure.states
-        triples = [input_symbols(index) for index in range(len(structure.rig.mechanism.inputs))]
-        by = [*states, *(triple[order] for order in range(3) for triple in triples)]
-        self._n_states, self._n_inputs = len(states), len(triples)
-        arguments = [*by, *structure.parameter_symbols, TIME]
-        mass = motion.mass.applyfunc(tree.flattened)
-        forces = [tree.flattened(force) for force in motion.forces]
-        rates = [tree.flattened(state.rate) for state in tree.states]
-        self._mass = _function(arguments, mass)
-        self._balance = _function(arguments, [*forces, *rates])
-        self._mass_slopes = _function(arguments, [_slope(mass, symbol) for symbol in by])
-        self._force_slopes = _function(arguments, _jacobian(forces, by))
-        self._rate_slopes = _function(arguments, _jacobian(rates, by))
-        self._output_slopes = _function(arguments, _jacobian(structure.outputs, by))
-
-    def _place(self, state: Floats, inputs: Floats, p: Floats) -> list[float]:
-        return [*state, *inputs, *np.zeros(2 * self._n_inputs), *p, 0.0]
-
-    @property
-    def _held(self) -> NDArray[np.intp]:
-        """Indices of the states that are not velocities."""
-        return np.r_[0 : self._n, 2 * self._n : self._n_states].astype(np.intp)
-
-    def resting(self, near: Floats, inputs: Floats, p: Floats) -> Floats:
-        """Return the state at which nothing moves under constant inputs, or that comes nearest to it, from a place near by."""
-        state, held = near.copy(), self._held
-        state[self._n : 2 * self._n] = 0.0
-        if not held.size:
-            return state
-
-        def at(unknown: Floats) -> list[float]:
-            state[held] = unknown
-            return self._place(state, inputs, p)
-
-        def balance(unknown: Floats) -> Floats:
-            return np.asarray(self._balance(*at(unknown)), dtype=np.float64)
-
-        def slopes(unknown: Floats) -> Floats:
-            place = at(unknown)
-            return np.vstack([self._force_slopes(*place), self._rate_slopes(*place)])[:, held]
-
-        begin = state[held].copy()
-        with np.errstate(all="ignore"):
-            found = (
-                least_squares(balance, begin, jac=slopes, x_scale="jac")
-                if _is_finite(balance, slopes, begin)
-                else None
-            )
-        state[held] = begin if found is None or not found.success else found.x
-        return state
-
-    def at(self, state: Floats, inputs: Floats, p: Floats) -> _Slopes:
-        """Return the derivatives at a state under constant inputs."""
-        n, n_states, n_inputs = self._n, self._n_states, self._n_inputs
-        place = self._place(state, inputs, p)
-        slopes = np.zeros((n_states, n_states + 3 * n_inputs))
-        with np.errstate(all="ignore"):
-            balance = np.array(self._balance(*place), dtype=np.float64)
-            by_place = np.vstack([self._force_slopes(*place), self._rate_slopes(*place)])
-            outputs = self._output_slopes(*place)
-            slopes[2 * n :] = by_place[n:]
-            if n:
-                mass = self._mass(*place)
-                accelerations = np.linalg.solve(mass, balance[:n])
-                turned = np.column_stack([slope @ accelerations for slope in self._mass_slopes(*place)])
-                slopes[np.arange(n), n + np.arange(n)] = 1.0
-                slopes[n : 2 * n] = np.linalg.solve(mass, by_place[:n] - turned)
-        held = self._held
-        near = np.abs(by_place[:, held]) @ (_NEAR * np.maximum(np.abs(state[held]), 1.0))
-        by_inputs = slopes[:, n_states:].reshape(n_states, 3, n_inputs)
-        outputs_by = outputs[:, n_states:].reshape(outputs.shape[0], 3, n_inputs)
-        return _Slopes(
-            slopes[:, :n_states],
-            np.moveaxis(by_inputs, 1, 0),
-            outputs[:, :n_states],
-            np.moveaxis(outputs_by, 1, 0),
-            bool(np.all(np.abs(balance) <= near)),
-        )
-
-
-def _declared_start(structure: Structure, p: Floats) -> Floats:
-    """Return the start values of the rig's file, shape (n_states,); zero where it declares none."""
-    mechanism, values = structure.rig.mechanism, dict(zip(structure.names, p, strict=True))
-    starts = {state.symbol: state.start for state in mechanism.states} | dict(mechanism.initial)
-    found = np.zeros(len(structure.states))
-    for symbol, expression in starts.items():
-        if symbol in structure.states:
-            found[structure.states.index(symbol)] = evaluated(expression, values)
-    return found
-
-
-def _is_finite(
-    balance: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], place: Floats
-) -> bool:
-    return bool(np.all(np.isfinite(balance(place))) and np.all(np.isfinite(slopes(place))))
-
-
-class _SameStructure:
-    """Let a structure, whose rig holds dictionaries and so cannot be hashed, be the key of a cache by identity."""
-
-    def __init__(self, structure: Structure) -> None:
-        self.structure = structure
-
-    def __hash__(self) -> int:
-        return id(self.structure)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SameStructure) and self.structure is other.structure
-
-
-@lru_cache(maxsize=128)
-def _slopes(key: _SameStructure) -> _SlopeFunctions:
-    return _SlopeFunctions(key.structure)
-
-
-def _jacobian(expressions: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> sp.Matrix:
-    return sp.Matrix(
-        len(expressions), len(by), [_slope(expression, symbol) for expression in expressions for symbol in by]
-    )
-
-
-def _slope(expression: Any, symbol: sp.Symbol) -> Any:
-    # The jump of a sign has no slope; what rests on it is left out.
-    return sp.diff(expression, symbol).replace(sp.DiracDelta, lambda *_: sp.S.Zero)
-
-
-def _function(arguments: Sequence[sp.Symbol], expressions: Any) -> Callable[..., Any]:
-    return sp.lambdify(arguments, expressions, [{positive_part.__name__: _positive_part}, "numpy"], cse=True)  # type: ignore[no-any-return]
-
-
-def _positive_part(x: float) -> float:
-    return max(x, 0.0)
 
 
 def _zeros(A: Floats, b: Floats, c: Floats, d: float) -> tuple[NDArray[np.complex128], float]:
