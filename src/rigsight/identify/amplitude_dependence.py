@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
+from rigsight.identify.physical import PhysicalEstimates
 
 _CHANCE = 1e-3
 """Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
@@ -52,7 +53,7 @@ def amplitude_dependence(
     names = [
         name
         for part in zip(*parts, strict=True)
-        for name in _shared_names([own.names if own is not None else () for own in part])
+        for name in _shared_names([() if own is None else _determined(own) for own in part])
     ]
     span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {input_unit}".rstrip()
     if not names:
@@ -129,6 +130,10 @@ def _comparable(
         if len(groups) > len(best):
             best = groups
     return best
+
+
+def _determined(found: PhysicalEstimates) -> list[str]:
+    return [name for name in found.names if np.isfinite(found.standard_errors[name])]
 
 
 def _driven_alike(found: RecordIdentification) -> tuple[str, ...]:
