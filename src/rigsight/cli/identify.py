@@ -21,7 +21,7 @@ def identify(
         typer.Option(
             "--method",
             metavar="NAME",
-            help="How frequency responses are estimated: local_rational, local_polynomial, h1 or thesis.",
+            help="How frequency responses are estimated: local_rational, local_polynomial; h1 or thesis of one input.",
         ),
     ] = "local_rational",
     resolution: Annotated[
@@ -38,9 +38,10 @@ def identify(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Fit frequency responses and steps: the parameters of the linear rig, by record and for all together.
+    """Fit frequency responses and steps: the parameters of the rig, by record and for all together.
 
-    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR, all or none.
+    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR, all or none; of a rig of any
+    shape identification.html with the responses of every sensor to every input, poles, and what the records determine.
     """
     with told(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify
@@ -54,4 +55,5 @@ def identify(
         from rigsight.report import identification_summary
 
         show(identification_summary(identification))
-        show_files({"Results": out / "identification.json", "Model": out / "model.json"})
+        page = {} if identification.identifiability is None else {"Page": out / "identification.html"}
+        show_files({**page, "Results": out / "identification.json", "Model": out / "model.json"})

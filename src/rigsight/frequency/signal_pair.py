@@ -17,8 +17,20 @@ _UNEXCITED = 1e-4
 
 def pair_unit(record: Record, source: str, response: str) -> str:
     """Return the unit of response over source, ``"1"`` where both are dimensionless."""
-    above, below = (record.units.get(signal) or "1" for signal in (response, source))
-    return above if below == "1" else f"{above}/{below}"
+    return ratio_unit(record.units.get(response, ""), record.units.get(source, ""))
+
+
+def ratio_unit(above: str, below: str) -> str:
+    """Return the unit of a ratio, ``"1"`` where both are dimensionless.
+
+    Parameters
+    ----------
+    above, below
+        Units; an empty one is dimensionless.
+    """
+    if (below or "1") == "1":
+        return above or "1"
+    return f"{above or '1'}/({below})" if " " in below else f"{above or '1'}/{below}"
 
 
 def check_alike(records: Sequence[Record], source: str, response: str) -> None:

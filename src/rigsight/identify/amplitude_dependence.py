@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
+from rigsight.identify.physical import PhysicalEstimates
 
 _CHANCE = 1e-3
 """Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
@@ -38,14 +39,21 @@ def amplitude_dependence(
     """
     compared = _comparable(records)
     if len(compared) < 2:
+        if len({tuple(path.source for path in found.paths) for found in records}) > 1:
+            return (
+                "No two records drive the same inputs at different amplitudes, so they cannot tell whether the parameters change "
+                "with it. Record one of them at another amplitude.",
+                (),
+            )
         return (
             "The records have one amplitude, so they cannot tell whether the parameters change with it. Record another one.",
             (),
         )
+    parts = ([*(path.physical for path in r.paths), r.own] for _, group in compared for r in group)
     names = [
         name
-        for path in zip(*(r.paths for _, group in compared for r in group), strict=True)
-        for name in _shared_names([p.physical.names if p.physical else () for p in path])
+        for part in zip(*parts, strict=True)
+        for name in _shared_names([() if own is None else _determined(own) for own in part])
     ]
     span = f"from {compared[0][0]:.3g} to {compared[-1][0]:.3g} {input_unit}".rstrip()
     if not names:
@@ -111,9 +119,9 @@ def _comparable(
 ) -> list[tuple[float, list[RecordIdentification]]]:
     """Return amplitudes in increasing order with their records, of the kind of records that has most amplitudes."""
     best: list[tuple[float, list[RecordIdentification]]] = []
-    for kind in dict.fromkeys(r.record.kind for r in records):
+    for alike in dict.fromkeys(map(_driven_alike, records)):
         groups: list[tuple[float, list[RecordIdentification]]] = []
-        own = [r for r in records if r.record.kind == kind and r.motion.physical is not None]
+        own = [r for r in records if _driven_alike(r) == alike and _has_numbers(r)]
         for found in sorted(own, key=lambda r: r.amplitude):
             if groups and found.amplitude <= (1.0 + _SAME_AMPLITUDE) * groups[-1][0]:
                 groups[-1][1].append(found)
@@ -122,6 +130,19 @@ def _comparable(
         if len(groups) > len(best):
             best = groups
     return best
+
+
+def _determined(found: PhysicalEstimates) -> list[str]:
+    return [name for name in found.names if np.isfinite(found.standard_errors[name])]
+
+
+def _driven_alike(found: RecordIdentification) -> tuple[str, ...]:
+    """Return what two records must share to be compared: the kind, and the paths that they show."""
+    return (found.record.kind, *(f"{path.source} -> {path.response}" for path in found.paths))
+
+
+def _has_numbers(found: RecordIdentification) -> bool:
+    return found.own is not None or (bool(found.paths) and found.motion.physical is not None)
 
 
 def _shared_names(names: Sequence[Sequence[str]]) -> list[str]:

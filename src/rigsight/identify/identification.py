@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.conicity import ConicityEstimate
+from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.joint import JointFit
+from rigsight.identify.linear_view import LinearView
 from rigsight.identify.physical import PhysicalEstimates
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.records.record import Record
@@ -62,6 +64,8 @@ class RecordIdentification:
         Angular frequency at which the measured magnitude is largest [rad/s]; None where it has no peak.
     warnings
         What the user must know, a sentence each.
+    own
+        Parameters of a fit of this record alone, over time; None where they follow from `paths`, or where it failed.
     """
 
     record: Record
@@ -71,6 +75,17 @@ class RecordIdentification:
     conicity: ConicityEstimate | None = None
     resonance: float | None = None
     warnings: tuple[str, ...] = ()
+    own: PhysicalEstimates | None = None
+
+    @property
+    def is_identified(self) -> bool:
+        """True if it gave parameters: of a rig with one motion its motion, of others a fit over time."""
+        return self.own is not None or (bool(self.paths) and not self.motion.problem)
+
+    @property
+    def source(self) -> str:
+        """The input that its amplitude is of; empty for a rig without inputs."""
+        return self.paths[0].source if self.paths else ""
 
     @property
     def motion(self) -> PathIdentification:
@@ -81,7 +96,7 @@ class RecordIdentification:
     def estimates(self) -> dict[str, tuple[float, float]]:
         """Value and standard error of every physical parameter found, by name."""
         found: dict[str, tuple[float, float]] = {}
-        for part in (*(path.physical for path in self.paths), self.offsets):
+        for part in (*(path.physical for path in self.paths), self.offsets, self.own):
             if part is not None:
                 errors = part.standard_errors
                 found.update({name: (part.values[name], errors[name]) for name in part.names})
@@ -169,6 +184,13 @@ class Identification:
         Content of ``model.json``.
     warnings
         Every warning, with the record it is about.
+    views
+        The rig close to its rest, for each set of constants that records have; empty for the built-in rigs of one motion, whose
+        transfer functions are fitted record by record.
+    identifiability
+        Which parameters the records determine together; None for these built-in rigs.
+    meanings
+        What each parameter is, by name; empty for these built-in rigs.
     """
 
     title: str
@@ -181,3 +203,6 @@ class Identification:
     joint: JointIdentification
     model: dict[str, Any]
     warnings: tuple[str, ...]
+    views: tuple[LinearView, ...] = ()
+    identifiability: Identifiability | None = None
+    meanings: dict[str, str] = field(default_factory=dict)

@@ -141,12 +141,9 @@ def fit_jointly(
         _check_kinds(records, list(groups))
     _check_moves(structure, records)
     held = dict(known or {})
-    begin = {
-        **constants,
-        **linear_start(structure.rig, records, constants, held),
-        **dict(start or {}),
-        **held,
-    }
+    begin = {**constants, **dict(start or {}), **held}
+    if any(p.name not in begin for p in structure.rig.parameters):
+        begin = {**linear_start(structure.rig, records, constants, held), **begin}
     begin = {**{p.name: p.default for p in structure.parameters if p.default is not None}, **begin}
     missing = [name for name in structure.names if name not in begin]
     if missing:
@@ -199,6 +196,9 @@ def _check_kinds(records: Sequence[Record], kinds: Sequence[str]) -> None:
 
 
 def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
+    if not structure.rig.has_one_motion:
+        # What decays moves without an input; what does not move at all was left out by the reader.
+        return
     source = structure.rig.inputs[0].name
     for record in records:
         if np.ptp(record[source]) <= 1e-12 * np.max(np.abs(record[source])):

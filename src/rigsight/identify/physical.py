@@ -42,12 +42,15 @@ class PhysicalEstimates:
         Shape (n_parameters, n_parameters).
     method
         Equations and records they come from.
+    positive
+        Names of those that are positive by nature.
     """
 
     names: tuple[str, ...]
     values: dict[str, float]
     covariance: NDArray[np.float64]
     method: str
+    positive: frozenset[str] = _POSITIVE
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -62,8 +65,8 @@ class PhysicalEstimates:
         value, error = self.values[name], self.standard_errors[name]
         width = float(norm.ppf(0.5 + 0.5 * level))
         if not math.isfinite(error):
-            return (0.0 if name in _POSITIVE else -math.inf), math.inf
-        if name in _POSITIVE:
+            return (0.0 if name in self.positive else -math.inf), math.inf
+        if name in self.positive:
             factor = math.exp(min(width * error / value, 700.0))
             return value / factor, value * factor
         return value - width * error, value + width * error

@@ -101,8 +101,8 @@ def identify_record(
 
 
 def input_peak(record: Record, rig: Rig) -> float:
-    """Return the height of a step, or half the range of another input, in its unit."""
-    spanned = float(np.ptp(record[rig.inputs[0].name]))
+    """Return the height of a step, or half the range of another input, in its unit; of several inputs the first that moves."""
+    spanned = next((range_ for s in rig.inputs if (range_ := float(np.ptp(record[s.name]))) > 0.0), 0.0)
     # Not the deviation from mean or median: a sweep that begins slowly has both off zero.
     return spanned if record.kind == "step" else 0.5 * spanned
 

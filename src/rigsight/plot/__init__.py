@@ -33,6 +33,8 @@ from rigsight.plot.model_comparison import model_errors as model_errors
 from rigsight.plot.model_comparison import model_responses as model_responses
 from rigsight.plot.model_comparison import model_steps as model_steps
 from rigsight.plot.model_comparison import model_styles as model_styles
+from rigsight.plot.response_grid import ResponseCell as ResponseCell
+from rigsight.plot.response_grid import response_grid as response_grid
 from rigsight.plot.rig_picture import PlaceMark as PlaceMark
 from rigsight.plot.rig_picture import rig_picture as rig_picture
 
@@ -49,6 +51,7 @@ __all__ = [
     "ForceLoop",
     "Panel",
     "PlaceMark",
+    "ResponseCell",
     "ResponsesPanel",
     "StepPanel",
     "amplitude_dependence",
@@ -70,6 +73,7 @@ __all__ = [
     "model_styles",
     "overlaid_responses",
     "ranking",
+    "response_grid",
     "rig_picture",
     "step_window",
     "style",

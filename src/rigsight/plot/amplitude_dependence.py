@@ -103,5 +103,7 @@ def _draw(ax: Axes, panel: AmplitudePanel) -> None:
     ax.set_title(f"{panel.name}{unit}")
     ax.margins(x=0.12, y=0.15)
     ax.yaxis.set_major_locator(MaxNLocator(5))
+    # An offset would stand on the title.
+    ax.ticklabel_format(axis="y", useOffset=False)
     ax.grid()
     ax.set_axisbelow(True)

@@ -90,8 +90,8 @@ def bode(panels: Sequence[Panel]) -> Figure:
     for column, whole in enumerate(panels):
         panel = replace(whole, measured=thinned(whole.measured))
         top, bottom = axes[0, column], axes[1, column]
-        _magnitude(top, panel)
-        _phase(bottom, panel)
+        draw_magnitude(top, panel)
+        draw_phase(bottom, panel)
         top.set_title(panel.title)
         top.set_ylabel(f"magnitude [dB re 1 {panel.measured.unit}]")
         bottom.set_ylabel("phase [deg]")
@@ -180,7 +180,8 @@ def decibel(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(20.0 * np.log10(np.maximum(values, 1e-300)))
 
 
-def _magnitude(ax: Axes, panel: Panel) -> None:
+def draw_magnitude(ax: Axes, panel: Panel) -> None:
+    """Draw the magnitude of a path [dB] with its bands."""
     measured = panel.measured
     size = measured.magnitude
     shown = measured.magnitude_db
@@ -210,7 +211,8 @@ def measured_label(measured: FrequencyResponse) -> str:
     return "measured, 95 % band" if measured.variance is not None else "measured"
 
 
-def _phase(ax: Axes, panel: Panel) -> None:
+def draw_phase(ax: Axes, panel: Panel) -> None:
+    """Draw the phase of a path [deg] with its bands."""
     from matplotlib.ticker import MultipleLocator
 
     measured = panel.measured
@@ -249,6 +251,11 @@ def log_axis(ax: Axes, responses: Sequence[FrequencyResponse]) -> None:
     """Let the frequency axis span these responses."""
     left = min(float(response.omega[0]) for response in responses)
     right = max(float(response.omega[-1]) for response in responses)
+    log_axis_over(ax, left, right)
+
+
+def log_axis_over(ax: Axes, left: float, right: float) -> None:
+    """Let the frequency axis span these limits [rad/s]."""
     ax.set_xscale("log")
     ax.set_xlim(left, right)
     plain_log_ticks(ax, left, right)

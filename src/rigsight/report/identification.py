@@ -45,6 +45,14 @@ class IdentificationSummary:
         for subject, words in joint_rows(found):
             table.add_row(text(subject, "bold"), text(words))
         yield Padding(table, (0, 0, 0, 2), expand=False)
+        if found.identifiability is not None:
+            yield text("")
+            yield text("What these records determine", "bold")
+            yield text(found.identifiability.sentence)
+            rows = Table.grid(padding=(0, 2))
+            for subject, words in linear_rows(found):
+                rows.add_row(text(subject, "bold"), text(words))
+            yield Padding(rows, (0, 0, 0, 2), expand=False)
         if found.warnings:
             yield text("")
             yield text("Worth knowing", "bold yellow")
@@ -78,7 +86,7 @@ def _amplitude_tables(found: Identification, text: Callable[..., Text], width: i
         table.add_column(text("record"))
         for record in part:
             table.add_column(text(record.record.name), justify="right", overflow="fold")
-        unit = found.units.get(part[0].motion.source, "")
+        unit = found.units.get(part[0].source, "")
         table.add_row(text(f"amplitude{unit_in_brackets(unit)}"), *(text(f"{r.amplitude:.4g}") for r in part))
         for name in names:
             head = text(f"{name}{unit_in_brackets(found.units.get(name, ''))}")
@@ -123,6 +131,23 @@ def joint_rows(found: Identification) -> Iterator[tuple[str, str]]:
         yield "delta_0", found.joint.conicity.statement
     for score in found.joint.scores:
         yield score.record, f"{score.role}, NRMSE {_score_text(score)}"
+
+
+def linear_rows(found: Identification) -> Iterator[tuple[str, str]]:
+    """Yield subject and words: combinations that are determined, and the poles of the rig close to its rest."""
+    if found.identifiability is not None:
+        for c in found.identifiability.combinations:
+            yield c.text, estimate_text(Estimate(c.value, c.std, c.unit))
+    for view in found.views:
+        at = ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
+        for mode in view.modes:
+            frequency = estimate_text(Estimate(mode.natural_frequency, mode.frequency_std, "rad/s"))
+            damping = (
+                estimate_text(Estimate(mode.damping_ratio, mode.damping_std, "1"))
+                if math.isfinite(mode.damping_ratio)
+                else "none"
+            )
+            yield f"pole{f' ({at})' if at else ''}", f"{frequency}, damping ratio {damping}"
 
 
 def _score_text(score: RecordScore) -> str:

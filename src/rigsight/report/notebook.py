@@ -61,7 +61,7 @@ def identification_html(identification: Identification) -> str:
     """
     records = sorted(identification.records, key=lambda record: record.amplitude)
     names = dict.fromkeys(name for record in records for name in record.estimates)
-    unit = identification.units.get(records[0].motion.source, "")
+    unit = identification.units.get(records[0].source, "")
     alone = NotebookTable(
         ("record", *(record.record.name for record in records)),
         [
@@ -76,7 +76,12 @@ def identification_html(identification: Identification) -> str:
         ],
     )
     together = NotebookTable(("all records", ""), list(joint_rows(identification)))
-    sentences = [identification.amplitude_statement, identification.joint.statement]
+    told = identification.identifiability
+    sentences = [
+        identification.amplitude_statement,
+        identification.joint.statement,
+        "" if told is None else told.sentence,
+    ]
     return _html(f"Identified: {identification.title}", sentences, [alone, together], identification.warnings)
 
 

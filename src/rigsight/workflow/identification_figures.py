@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rigsight.frequency.signal_pair import ratio_unit
 from rigsight.identify.identification import Identification, PathIdentification, RecordIdentification
+from rigsight.identify.linear_view import LinearView
 from rigsight.plot import (
     AmplitudePanel,
     AmplitudePoint,
     FittedCurve,
     Panel,
+    ResponseCell,
     amplitude_dependence,
     bode,
     overlaid_responses,
+    response_grid,
     svg_text,
 )
 
@@ -39,13 +43,23 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
         The result.
     """
     found: dict[str, tuple[str, str]] = {}
-    for record in identification.records:
+    for number, view in enumerate(identification.views, 1):
+        if view.measured is not None:
+            file = RESPONSES_FILE if number == 1 else f"responses_{number}.svg"
+            what = (
+                "Responses of every sensor to every input, measured against the linearized model, 95 % bands"
+            )
+            found[file] = (
+                f"{what}{_of_constants(view)}",
+                svg_text(view_figure(view, identification.units), file),
+            )
+    for record in () if identification.views else identification.records:
         drawing = bode_figure(record, identification)
         if drawing is not None:
             file = _free_name(f"bode_{_plain(record.record.name)}", found)
             what = f"Bode plot of record '{record.record.name}', measured against fitted, 95 % bands"
             found[file] = (what, svg_text(drawing, file))
-    drawing = responses_figure(identification)
+    drawing = None if identification.views else responses_figure(identification)
     if drawing is not None:
         what = "Magnitudes of all records over each other, measured and fitted (as the thesis's Figures 5.6 and 5.7)"
         found[RESPONSES_FILE] = (what, svg_text(drawing, RESPONSES_FILE))
@@ -58,18 +72,101 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
 
 def bode_figure(record: RecordIdentification, identification: Identification) -> Figure | None:
     """Return the Bode plot of one record, measured against fitted; None where it has no frequency response."""
+    if identification.identifiability is not None:
+        measured = {(path.source, path.response): path for path in record.paths}
+        return _grid(measured, {}, identification.units) if measured else None
     panels = _panels(record, identification)
     return bode(panels) if panels else None
 
 
 def responses_figure(identification: Identification) -> Figure | None:
-    """Return the magnitudes of all records over each other; None where there are none."""
+    """Return the magnitudes of all records over each other; None where there are none.
+
+    Of a rig of several inputs or sensors it is the grid of their responses, all records together.
+    """
+    if identification.identifiability is not None:
+        views = [view for view in identification.views if view.measured is not None]
+        return view_figure(views[0], identification.units) if views else None
     columns = _columns(identification)
     return overlaid_responses(columns) if columns else None
 
 
+def view_figure(view: LinearView, units: Mapping[str, str]) -> Figure:
+    """Return the grid of the responses of every sensor to every input, measured against the linearized model.
+
+    Parameters
+    ----------
+    view
+        Of a rig with inputs.
+    units
+        Unit by signal.
+    """
+    assert view.measured is not None
+    linear, measured = view.linearization, view.measured
+    paths = {
+        (source, response): PathIdentification(
+            source,
+            response,
+            measured=measured.found.get((source, response)),
+            problem=measured.problems.get((source, response), ""),
+        )
+        for response in linear.outputs
+        for source in linear.inputs
+    }
+    bands = [curve.omega for curve in measured.found.values()]
+    omega = np.geomspace(min(b[0] for b in bands), max(b[-1] for b in bands), _GRID) if bands else np.zeros(0)
+    model = {}
+    for row, response in enumerate(linear.outputs):
+        for column, source in enumerate(linear.inputs):
+            known = view.model.get((source, response))
+            if not omega.size:
+                continue
+            values = linear.frequency_response(omega)[:, row, column]
+            # Standard errors change slowly beside the response itself.
+            std = (
+                np.zeros(omega.size)
+                if known is None
+                else np.interp(omega, measured.found[source, response].omega, known[1])
+            )
+            model[source, response] = FittedCurve(omega, values, std, "linearized model")
+    return _grid(paths, model, units)
+
+
+def _grid(
+    paths: Mapping[tuple[str, str], PathIdentification],
+    model: Mapping[tuple[str, str], FittedCurve],
+    units: Mapping[str, str],
+) -> Figure:
+    sources = dict.fromkeys(source for source, _ in paths)
+    responses = dict.fromkeys(response for _, response in paths)
+    return response_grid(
+        [
+            [
+                ResponseCell(
+                    source,
+                    response,
+                    ratio_unit(units.get(response, ""), units.get(source, "")),
+                    paths[source, response].measured,
+                    model.get((source, response)),
+                    "not shown by these records" if paths[source, response].measured is None else "",
+                )
+                for source in sources
+            ]
+            for response in responses
+        ]
+    )
+
+
+def _of_constants(view: LinearView) -> str:
+    listed = ", ".join(f"{name} = {value:g}" for name, value in view.constants.items())
+    return f", records with {listed}" if listed else ""
+
+
 def amplitudes_figure(identification: Identification) -> Figure | None:
     """Return the parameters of each record over its amplitude; None where no record gave any."""
+    if identification.identifiability is not None and len({r.source for r in identification.records}) > 1:
+        # Amplitudes of different inputs have no axis in common.
+        return None
     parameters = _parameters(identification)
     return amplitude_dependence(parameters, _amplitude_label(identification)) if parameters else None
 
@@ -125,16 +222,21 @@ def fitted_curve(path: PathIdentification) -> FittedCurve | None:
 
 
 def _amplitude_text(found: RecordIdentification, identification: Identification) -> str:
-    unit = identification.units.get(found.motion.source, "")
+    unit = identification.units.get(found.source, "")
     alone = [r for r in identification.records if math.isclose(r.amplitude, found.amplitude, rel_tol=1e-6)]
     text = f"{found.amplitude:.3g} {unit}".strip()
     return text if len(alone) == 1 else f"{text}, {found.record.name}"
 
 
 def _amplitude_label(identification: Identification) -> str:
-    source = identification.records[0].motion.source
+    source = identification.records[0].source
     unit = identification.units.get(source, "")
     return f"amplitude of {source}" + (f" [{unit}]" if unit else "")
+
+
+def _is_shown(record: RecordIdentification, name: str) -> bool:
+    """Return False for a number that a fit over time left where it began."""
+    return record.own is None or math.isfinite(record.estimates[name][1])
 
 
 def _parameters(identification: Identification) -> list[AmplitudePanel]:
@@ -145,8 +247,10 @@ def _parameters(identification: Identification) -> list[AmplitudePanel]:
         points = tuple(
             AmplitudePoint(record.amplitude, record.record.kind, *record.estimates[name])
             for record in identification.records
-            if name in record.estimates
+            if name in record.estimates and _is_shown(record, name)
         )
+        if not points:
+            continue
         common = None
         if name in joint.names:
             common = (joint.fit.fit.values[name], joint.fit.fit.standard_errors[name])

@@ -19,7 +19,7 @@ from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
 from rigsight.report.quantities import gap_percent
-from rigsight.simulate import compose
+from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign import Campaign
 
 _DIFFERENT = 0.01
@@ -61,7 +61,7 @@ def identify_jointly(
     windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
     known = _known(campaign, records, no_spring)
     fit = fit_jointly(
-        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=_parent
+        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=parent
     )
     pooled = _pooled(found) if fit.probability < _DIFFERENT and not known.keys() & _LATERAL else None
     if pooled is not None:
@@ -72,7 +72,7 @@ def identify_jointly(
             known={**known, **pooled.values},
             start=fit.fit.values,
             output_noise=fit.noise,
-            group_of=_parent,
+            group_of=parent,
         )
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
@@ -94,6 +94,46 @@ def identify_jointly(
         conicity=conicity,
         scores=scores,
         left_out=tuple(r.record.name for r in found if r.record.name not in names),
+    )
+
+
+def fit_any_rig_jointly(
+    campaign: Campaign,
+    structure: Structure,
+    found: Sequence[RecordIdentification],
+    start: Mapping[str, float],
+    length: float | None,
+) -> JointIdentification:
+    """Fit one set of all parameters to all estimation records of a rig of any shape, and one to each alone; score every record.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    structure
+        Its rig.
+    found
+        What each estimation record shows by itself.
+    start
+        Start value of every parameter.
+    length
+        Of windows into which records are cut [s]; None leaves them whole.
+    """
+    windows = cut([r.record for r in found], length)
+    fit = fit_jointly(structure, windows, campaign.constants, start=start, group_of=parent)
+    amplitudes = {r.record.name: r.amplitude for r in found}
+    scores = (
+        *_estimation_scores(fit, windows, amplitudes),
+        *(_validation_score(fit, record, campaign, length) for record in campaign.validation),
+    )
+    return JointIdentification(
+        fit=fit,
+        names=fit.fit.free,
+        pooled=None,
+        statement=_statement(fit, scores, list(amplitudes)),
+        conicity=None,
+        scores=scores,
+        left_out=(),
     )
 
 
@@ -125,7 +165,8 @@ def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) ->
     }
 
 
-def _parent(record: Record) -> str:
+def parent(record: Record) -> str:
+    """Return the name of the record that a window was cut from."""
     return record.name.split(WINDOW)[0]
 
 
@@ -165,7 +206,7 @@ def _estimation_scores(
     outputs = [signal.name for signal in fit.fit.structure.rig.outputs]
     scores = []
     for own in fit.kinds:
-        places = [i for i, window in enumerate(windows) if _parent(window) == own.kind]
+        places = [i for i, window in enumerate(windows) if parent(window) == own.kind]
         records = [windows[i] for i in places]
         joint = [fit.fit.residuals[i] for i in places] if fit.fit.residuals else []
         scores.append(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rigsight.frequency import FrequencyResponse
 from rigsight.identify.conicity import ConicityEstimate
 from rigsight.identify.identification import (
     Identification,
@@ -16,6 +14,12 @@ from rigsight.identify.identification import (
 )
 from rigsight.identify.physical import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer_fit import TransferFit
+from rigsight.workflow.identification_linear_json import (
+    finite,
+    identifiability_json,
+    response_json,
+    view_json,
+)
 
 SCHEMA_VERSION = 1
 
@@ -31,6 +35,16 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         File name -> what it shows.
     """
     units = identification.units
+    told = identification.identifiability
+    # Rigs of one motion with transfer functions of their own have neither.
+    of_any_rig = (
+        {}
+        if told is None
+        else {
+            "identifiability": identifiability_json(told),
+            "linear": [view_json(view, units) for view in identification.views],
+        }
+    )
     return {
         "schema_version": SCHEMA_VERSION,
         "title": identification.title,
@@ -45,34 +59,30 @@ def identification_json(identification: Identification, figures: Mapping[str, st
         },
         "joint": _joint(identification.joint, units),
         "validation": [
-            {"record": s.record, "amplitude": _finite(s.amplitude), "nrmse": _all_finite(s.nrmse)}
+            {"record": s.record, "amplitude": finite(s.amplitude), "nrmse": _all_finite(s.nrmse)}
             for s in identification.joint.scores
             if s.role == "validation"
         ],
         "records": [_record(record, units) for record in identification.records],
+        **of_any_rig,
         "figures": dict(figures),
     }
 
 
-def _finite(value: float | None) -> float | None:
-    """Return None for what JSON has no word for: infinite, or not a number."""
-    return value if value is not None and math.isfinite(value) else None
-
-
 def _all_finite(values: Mapping[str, float]) -> dict[str, float | None]:
-    return {name: _finite(value) for name, value in values.items()}
+    return {name: finite(value) for name, value in values.items()}
 
 
 def _row(found: RecordIdentification, units: Mapping[str, str]) -> dict[str, Any]:
     return {
         "record": found.record.name,
         "kind": found.record.kind,
-        "amplitude": _finite(found.amplitude),
+        "amplitude": finite(found.amplitude),
         **{
-            name: {"value": value, "std": _finite(error), "unit": units.get(name, "")}
+            name: {"value": value, "std": finite(error), "unit": units.get(name, "")}
             for name, (value, error) in found.estimates.items()
         },
-        "resonance": _finite(found.resonance),
+        "resonance": finite(found.resonance),
     }
 
 
@@ -80,12 +90,13 @@ def _record(found: RecordIdentification, units: Mapping[str, str]) -> dict[str, 
     return {
         "record": found.record.name,
         "kind": found.record.kind,
-        "amplitude": _finite(found.amplitude),
-        "identified": not found.motion.problem,
+        "amplitude": finite(found.amplitude),
+        "identified": found.is_identified,
         "warnings": list(found.warnings),
         "paths": [_path(path, units) for path in found.paths],
         "offsets": None if found.offsets is None else _physical(found.offsets, units),
         "delta_0": None if found.conicity is None else _conicity(found.conicity),
+        **({} if found.own is None else {"parameters": _physical(found.own, units)}),
     }
 
 
@@ -96,7 +107,7 @@ def _path(path: PathIdentification, units: Mapping[str, str]) -> dict[str, Any]:
         "problem": path.problem,
         "fit": None if path.fit is None else _fit(path.fit),
         "physical": None if path.physical is None else _physical(path.physical, units),
-        "frequency_response": None if path.measured is None else _response(path.measured),
+        "frequency_response": None if path.measured is None else response_json(path.measured),
         "coherence": None
         if path.coherence is None or path.coherence.coherence is None
         else {
@@ -113,7 +124,7 @@ def _fit(fit: TransferFit) -> dict[str, Any]:
         "gain_unit": fit.unit,
         "method": fit.method,
         "message": fit.message,
-        "misfit": _finite(fit.misfit),
+        "misfit": finite(fit.misfit),
         "values": fit.values,
         "std": _all_finite(fit.standard_errors),
     }
@@ -124,8 +135,8 @@ def _physical(found: PhysicalEstimates, units: Mapping[str, str]) -> dict[str, A
     return {
         name: {
             "value": found.values[name],
-            "std": _finite(errors[name]),
-            "interval": [_finite(end) for end in found.interval(name)],
+            "std": finite(errors[name]),
+            "interval": [finite(end) for end in found.interval(name)],
             "unit": units.get(name, ""),
             "method": found.method,
         }
@@ -136,8 +147,8 @@ def _physical(found: PhysicalEstimates, units: Mapping[str, str]) -> dict[str, A
 def _conicity(found: ConicityEstimate) -> dict[str, Any]:
     return {
         "value": found.value,
-        "unbounded": _finite(found.unbounded),
-        "std": _finite(found.standard_error),
+        "unbounded": finite(found.unbounded),
+        "std": finite(found.standard_error),
         "interval": None if found.interval is None else list(found.interval),
         "determined": found.determined,
         "statement": found.statement,
@@ -145,31 +156,19 @@ def _conicity(found: ConicityEstimate) -> dict[str, Any]:
     }
 
 
-def _response(response: FrequencyResponse) -> dict[str, Any]:
-    return {
-        "method": response.method,
-        "unit": response.unit,
-        "omega": response.omega.tolist(),
-        "real": response.values.real.tolist(),
-        "imaginary": response.values.imag.tolist(),
-        "variance": None if response.variance is None else response.variance.tolist(),
-        "coherence": None if response.coherence is None else response.coherence.tolist(),
-    }
-
-
 def _joint(joint: JointIdentification, units: Mapping[str, str]) -> dict[str, Any]:
     fit = joint.fit
     return {
         "statement": joint.statement,
-        "probability": _finite(fit.probability),
+        "probability": finite(fit.probability),
         "success": fit.fit.success,
         "message": fit.fit.message,
         "left_out": list(joint.left_out),
         "parameters": {
             name: {
                 "value": fit.fit.values[name],
-                "std": _finite(fit.fit.standard_errors[name]),
-                "interval": [_finite(end) for end in fit.interval(name)],
+                "std": finite(fit.fit.standard_errors[name]),
+                "interval": [finite(end) for end in fit.interval(name)],
                 "unit": units.get(name, ""),
             }
             for name in joint.names

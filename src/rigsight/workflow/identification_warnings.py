@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigsight.identify.identification import JointIdentification, RecordIdentification
+from rigsight.identify.linear_view import LinearView
 from rigsight.identify.record_identification import MISFIT, input_peak
 from rigsight.identify.record_response import driven_band
 from rigsight.records import Record
@@ -77,6 +78,67 @@ def campaign_warnings(
         )
     if not joint.fit.fit.success:
         told.append(joint.statement)
+    return told
+
+
+def any_rig_warnings(
+    campaign: Campaign, views: Sequence[LinearView], joint: JointIdentification
+) -> list[str]:
+    """Return what reading, responses, poles and the fit of a rig of any shape have to tell, a sentence each.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    views
+        The rig close to its rest.
+    joint
+        The fit.
+    """
+    told = list(campaign.notes)
+    told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
+    for view in views:
+        told += _of_view(view)
+    if not joint.fit.fit.success:
+        told.append(joint.statement)
+    return list(dict.fromkeys(told))
+
+
+def _of_view(view: LinearView) -> list[str]:
+    told = []
+    where = (
+        f" ({', '.join(f'{name} = {value:g}' for name, value in view.constants.items())})"
+        if view.constants
+        else ""
+    )
+    near_rest = view.linearization
+    if not near_rest.rests:
+        told.append(
+            f"Nothing balances the mean input{where}: poles and responses are those of the place that comes nearest to rest."
+        )
+    if near_rest.stability == "unstable":
+        told.append(
+            f"The rig is unstable where it rests{where}. Records are fitted in short windows with initial states of their own; "
+            "frequency responses of an unstable rig mean something only if a controller outside the rig keeps it there."
+        )
+    if view.measured is None:
+        return told
+    told += [
+        f"{source} -> {response}{where}: {problem}"
+        for (source, response), problem in view.measured.problems.items()
+    ]
+    off = {pair: view.misfit(*pair) for pair in view.measured.found}
+    beside = [
+        f"{source} -> {response} ({off[source, response]:.2g})"
+        for source, response in off
+        if off[source, response] > MISFIT
+    ]
+    if beside:
+        told.append(
+            f"The linearized equations leave more than noise explains{where}, as multiples of it: {', '.join(beside)}. Either "
+            "the motion is too large for one linear picture, or something is missing. The fit over time, which is not linearized, "
+            "tells which; 'rigsight diagnose' looks for what is missing."
+        )
     return told
 
 

@@ -17,10 +17,13 @@ from rigsight.identify.identification import Identification, JointIdentification
 from rigsight.identify.physical import PhysicalEstimates
 from rigsight.identify.record_identification import Wishes, identify_record
 from rigsight.identify.record_response import METHODS, Method
+from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign import Campaign, read_campaign
-from rigsight.workflow.identification_figures import identification_figures
+from rigsight.workflow.diagnose import versions
+from rigsight.workflow.identification_any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
+from rigsight.workflow.identification_figures import amplitudes_figure, identification_figures, view_figure
 from rigsight.workflow.identification_joint import identify_jointly
 from rigsight.workflow.identification_json import identification_json
 from rigsight.workflow.identification_warnings import (
@@ -30,12 +33,11 @@ from rigsight.workflow.identification_warnings import (
 )
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
 from rigsight.workflow.model_file import MODEL_FILE
-from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
 from rigsight.workflow.results import check_writable, json_text, write_together
 
 IDENTIFICATION_FILE = "identification.json"
-IDENTIFYING = "Identifying"
+PAGE_FILE = "identification.html"
 _STEPS_AFTER_RECORDS = 2
 
 
@@ -77,7 +79,7 @@ def run_identify(
         check_writable(Path(out))
     identification = identify_campaign(read_campaign(campaign), wishes, jobs, listener)
     if out is not None:
-        write_identification(identification, Path(out))
+        write_identification(identification, Path(out), f"rigsight identify {campaign} --out {out}")
     return identification
 
 
@@ -121,7 +123,8 @@ def identify_campaign(
     InputError
         If a record is too short for the resolution wished for, or no record shows the motion.
     """
-    check_takes("identify", campaign.rig, campaign.records)
+    if not has_transfer_forms(campaign):
+        return identify_any_rig(campaign, wishes, n_jobs, listener)
     no_spring = campaign.parameters.get("k") == 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
@@ -162,8 +165,17 @@ def identify_campaign(
     return identification
 
 
-def write_identification(identification: Identification, out: Path) -> tuple[Path, ...]:
+def write_identification(identification: Identification, out: Path, command: str = "") -> tuple[Path, ...]:
     """Write all results of an identification into a folder, all or none.
+
+    Parameters
+    ----------
+    identification
+        The result.
+    out
+        Made if it does not exist.
+    command
+        The command line that the page quotes, if there is a page.
 
     Raises
     ------
@@ -172,11 +184,19 @@ def write_identification(identification: Identification, out: Path) -> tuple[Pat
     """
     figures = identification_figures(identification)
     captions = {file: what for file, (what, _) in figures.items()}
+    page = {}
+    if identification.identifiability is not None:
+        drawings = [
+            view_figure(v, identification.units) for v in identification.views if v.measured is not None
+        ]
+        amplitudes = amplitudes_figure(identification)
+        page[PAGE_FILE] = render_identification(identification, drawings, amplitudes, command, versions())
     return write_together(
         out,
         {
             IDENTIFICATION_FILE: json_text(identification_json(identification, captions)),
             MODEL_FILE: json_text(identification.model),
+            **page,
             **{file: svg for file, (_, svg) in figures.items()},
         },
     )

@@ -1,4 +1,4 @@
-"""Which commands cannot take every rig yet? They say so before anything runs, rather than leave a signal or a place out."""
+"""What can a command not take yet? It says so before anything runs, rather than leave something out."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 
-ONE_MOTION_ONLY = frozenset({"identify"})
-"""Commands written for rigs of one motion; a command that takes every rig is taken out here."""
-BUILT_IN_ONLY = frozenset({"discover", "identify"})
-"""Commands that know the parameters of built-in rigs by their names; one that does not is taken out here."""
+_BUILT_IN_ONLY = frozenset({"discover"})
+"""Commands that know the parameters of built-in rigs of one motion by their names; one that does not is taken out here."""
+_SAME_CONSTANTS_ONLY = frozenset({"discover", "identify"})
+"""Commands that read several records as if they were of one rig; one that tells them apart is taken out here."""
 
 
 def check_takes(command: str, rig: Rig, records: Iterable[Record] = ()) -> None:
@@ -31,28 +31,17 @@ def check_takes(command: str, rig: Rig, records: Iterable[Record] = ()) -> None:
     InputError
         If it was written for other rigs, or records have constants of their own.
     """
-    if command in ONE_MOTION_ONLY and not rig.has_one_motion:
+    is_built_in = rig.name in RIGS and RIGS[rig.name].mechanism == rig.mechanism
+    if command in _BUILT_IN_ONLY and rig.has_one_motion and not is_built_in:
+        listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
         raise InputError(
-            f"'rigsight {command}' cannot take the rig '{rig.name}' yet: it works on rigs of one motion, with one joint, one "
-            "input and no feedback. 'rigsight simulate' runs every rig."
+            f"'rigsight {command}' cannot take the rig '{rig.name}' of your own yet: of rigs of one motion it takes {listed}. "
+            "Name one of them in [rig] if the equation is the same."
         )
-    if (
-        command in BUILT_IN_ONLY
-        and rig.has_one_motion
-        and (rig.name not in RIGS or RIGS[rig.name].mechanism != rig.mechanism)
-    ):
-        raise InputError(
-            f"'rigsight {command}' cannot take the rig '{rig.name}' of your own yet: it works on built-in rigs of one motion, "
-            f"{_of_one_motion()}. Name one of them in [rig] if the equation is the same."
-        )
-    for record in records if command in ONE_MOTION_ONLY else ():
+    for record in records if command in _SAME_CONSTANTS_ONLY else ():
         if record.constants:
             listed = ", ".join(record.constants)
             raise InputError(
                 f"'rigsight {command}' cannot take constants that differ from record to record yet, and record "
                 f"'{record.name}' gives {listed}. Give them under [rig.constants], or leave the record out."
             )
-
-
-def _of_one_motion() -> str:
-    return ", ".join(name for name, rig in RIGS.items() if rig.has_one_motion)

@@ -1,0 +1,52 @@
+"""How are combinations of parameters, lists of them and relative errors written?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+ONE = 0.03
+"""Distance from one at which a factor of two numbers with the same unit is left out, and from a small fraction a power is one."""
+
+
+def product_text(factors: Sequence[tuple[str, int]]) -> str:
+    """Return a product of powers, as in ``k*m^2/d``.
+
+    Parameters
+    ----------
+    factors
+        Name and power of each.
+    """
+    above = [_power(text, power) for text, power in factors if power > 0]
+    below = [_power(text, -power) for text, power in factors if power < 0]
+    return "*".join(above) + "".join(f"/{text}" for text in below)
+
+
+def sum_text(first: str, weight: float, second: str, same_unit: bool) -> str:
+    """Return ``first + weight second``; the weight is left out where it is one and both have one unit.
+
+    Parameters
+    ----------
+    first, second
+        Names.
+    weight
+        Of the second.
+    same_unit
+        Whether both have one unit.
+    """
+    factor = "" if same_unit and abs(abs(weight) - 1.0) < ONE else f"{abs(weight):.3g} "
+    return f"{first} {'-' if weight < 0.0 else '+'} {factor}{second}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as in ``a, b and c``."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def percent(error: float) -> str:
+    """Return a relative error in percent, a large one as a multiple."""
+    return f"{100.0 * error:.2g} %" if error < 10.0 else f"{error:.2g} times its value"
+
+
+def _power(text: str, power: int) -> str:
+    whole = f"({text})" if any(sign in text for sign in " */") else text
+    return whole if power == 1 else f"{whole}^{power}"

@@ -1,0 +1,394 @@
+"""Which parameters do the records determine, and which only in combinations with others? Said in words.
+
+Directions of the information matrix along which nothing moves are parameters that follow each other. A combination is named when
+a finite step along it leaves the outputs as they are: derivatives at one place cannot tell a ratio from a difference.
+
+References
+----------
+T. J. Rothenberg, Econometrica 39 (1971) 577, for local identifiability. R. N. Gutenkunst et al., PLoS Comput. Biol. 3 (2007)
+e189, for the eigenvalues in relative units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.combination_text import ONE, listed, percent, product_text, sum_text
+from rigsight.identify.information import Information
+
+Floats = NDArray[np.float64]
+
+POORLY_KNOWN = 0.5
+"""Relative standard error from which a parameter is not determined: its 95 % interval holds zero, or twice the value."""
+_NO_INFLUENCE = 100.0
+"""Standard error over the value, with all other parameters known, from which a parameter is said to do nothing."""
+_TAKES_PART = 0.05
+"""Share of the largest influence from which a parameter takes part in a direction."""
+_LARGEST_POWER = 3
+_STEP = 1.5
+"""Factor of the step that tests a combination: far enough that a sum and a product part."""
+_ROUNDING = 1e-9
+"""Entry of a unit direction below which it is rounding."""
+_UNCHANGED = 0.005
+"""Change of the outputs along a combination, over that by one of its members alone, below which the outputs stay."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A combination of parameters that the records determine where they do not determine its members.
+
+    Attributes
+    ----------
+    text
+        As in ``J_m/k_t``.
+    members
+        Names of the parameters.
+    value
+        Of the combination.
+    std
+        Its standard error.
+    unit
+        Unit where it is that of the members, else empty.
+    """
+
+    text: str
+    members: tuple[str, ...]
+    value: float
+    std: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What is identifiable from some records.
+
+    Attributes
+    ----------
+    relative_errors
+        Relative standard error by parameter, infinite where nothing is known; of one that may be zero relative to its size in the
+        records.
+    determined
+        Names of the parameters that the records determine.
+    combinations
+        What they determine of the others.
+    statements
+        What they do not determine, a sentence each.
+    free_directions
+        How many independent changes of parameters leave the outputs within the noise.
+    """
+
+    relative_errors: dict[str, float]
+    determined: tuple[str, ...]
+    combinations: tuple[Combination, ...]
+    statements: tuple[str, ...]
+    free_directions: int
+
+    @property
+    def sentence(self) -> str:
+        """All in one: what is determined, and what is not."""
+        names = list(self.relative_errors)
+        if not names:
+            return "Nothing was left to be identified."
+        if len(self.determined) == len(names):
+            worst = max(names, key=lambda name: self.relative_errors[name])
+            error = percent(self.relative_errors[worst])
+            return f"The records determine all parameters; the least certain is {worst} ({error})."
+        known = f"The records determine {listed(self.determined)}." if self.determined else ""
+        return " ".join(
+            filter(None, [known or "The records determine no parameter by itself.", *self.statements])
+        )
+
+
+def identifiability(found: Information) -> Identifiability:
+    """Return which parameters the records determine, and which combinations of the others.
+
+    Parameters
+    ----------
+    found
+        What the records say.
+    """
+    errors, search = relative_errors(found), _Search(found)
+    statements = tuple(search.statements())
+    return Identifiability(
+        relative_errors=errors,
+        determined=tuple(name for name, error in errors.items() if error < POORLY_KNOWN),
+        combinations=tuple(search.combinations()),
+        statements=statements,
+        free_directions=_undetermined(found.root).shape[1],
+    )
+
+
+def relative_errors(found: Information) -> dict[str, float]:
+    """Return the relative standard error of each parameter, see `Identifiability`.
+
+    Parameters
+    ----------
+    found
+        What the records say.
+    """
+    errors = _conditional_errors(found.root)
+    # What does next to nothing is held: that it may be anything is no reason to doubt the others.
+    held = errors >= POORLY_KNOWN
+    errors[~held] = _marginal_errors(found.root[:, ~held])
+    return dict(zip(found.names, map(float, errors), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Quantity:
+    """A parameter or a combination of some.
+
+    Attributes
+    ----------
+    text, members, unit
+        How it is written, and of what.
+    value, size
+        Its value, and what its relative changes are relative to.
+    direction
+        Relative change of the parameters when it alone grows by its size, shape (n,).
+    power
+        In which power of it the parameter grows that is moved for it.
+    """
+
+    text: str
+    members: tuple[str, ...]
+    unit: str
+    value: float
+    size: float
+    direction: Floats
+    power: int = 1
+
+    def step(self, factor: float) -> Floats:
+        """Return the relative change of the parameters when it alone grows by a factor, shape (n,)."""
+        return np.asarray(self.direction * self.power * (factor ** (1.0 / self.power) - 1.0))
+
+
+class _Search:
+    """Puts parameters together until what is left is determined or named."""
+
+    def __init__(self, found: Information) -> None:
+        self._found = found
+        self._quantities = [
+            _Quantity(name, (name,), unit, float(value), float(size), row)
+            for name, unit, value, size, row in zip(
+                found.names, found.units, found.values, found.sizes, np.eye(len(found.names)), strict=True
+            )
+        ]
+        self._held: dict[str, _Quantity] = {}
+        """By the text of a quantity the one to which its ratio is determined."""
+
+    def statements(self) -> Iterator[str]:
+        """Yield what is not determined, each time with one direction less that nothing is known of."""
+        while self._quantities and (free := _undetermined(self._root())).shape[1]:
+            yield self._alone() or self._pair() or self._group(free)
+
+    def combinations(self) -> Iterator[Combination]:
+        """Yield the combinations that were made and are determined."""
+        if not self._quantities:
+            return
+        errors = _marginal_errors(self._root())
+        for q, error in zip(self._quantities, map(float, errors), strict=True):
+            if error >= POORLY_KNOWN:
+                continue
+            if q.text in self._held:
+                other = self._held[q.text]
+                text, value = product_text([(q.text, 1), (other.text, -1)]), q.value / other.value
+                yield Combination(text, (*q.members, *other.members), value, abs(value) * error)
+            elif len(q.members) > 1:
+                yield Combination(q.text, q.members, q.value, abs(q.size) * error, q.unit)
+
+    def _root(self) -> Floats:
+        return self._found.root @ np.column_stack([q.direction for q in self._quantities])
+
+    def _alone(self) -> str:
+        """Name a quantity that the records would not determine if all others were known, and leave it as it is."""
+        errors = _conditional_errors(self._root())
+        index = int(np.argmax(errors))
+        if errors[index] < POORLY_KNOWN:
+            return ""
+        quantity = self._quantities.pop(index)
+        how = (
+            "it has no influence"
+            if errors[index] > _NO_INFLUENCE
+            else f"standard error {percent(errors[index])}"
+        )
+        return f"{quantity.text} is not determined ({how})."
+
+    def _pair(self) -> str:
+        """Put two quantities together that follow each other."""
+        root, best, pair = self._root(), 1.0 / POORLY_KNOWN, None
+        for i, j in combinations(range(len(self._quantities)), 2):
+            _, singular, right = np.linalg.svd(root[:, [i, j]], full_matrices=False)
+            if singular[-1] < best:
+                best, pair = float(singular[-1]), (i, j, right[-1])
+        if pair is None:
+            return ""
+        i, j, (along_i, along_j) = pair
+        first, second = self._quantities[i], self._quantities[j]
+        together, words = self._combined(first, second, float(along_i), float(along_j))
+        self._quantities = [q for q in self._quantities if q is not first and q is not second] + [together]
+        return words
+
+    def _combined(
+        self, first: _Quantity, second: _Quantity, along_first: float, along_second: float
+    ) -> tuple[_Quantity, str]:
+        """Return what two quantities that follow each other determine together: a product of powers, or a sum."""
+        members = (*first.members, *second.members)
+        name = f"{first.text} and {second.text}"
+        # A number that may be zero is no factor.
+        plain = all(quantity.size == quantity.value for quantity in (first, second))
+        power = _small_fraction(along_second / along_first) if plain and along_first else None
+        change = self._change([first, second], [along_first, along_second], power is not None)
+        if power is not None and change <= _UNCHANGED:
+            a, b = power.numerator, -power.denominator
+            if a < 0:
+                a, b = -a, -b
+            text = product_text([(first.text, a), (second.text, b)])
+            value = first.value**a * second.value**b
+            kind = "product" if b > 0 else "ratio"
+            together = _Quantity(text, members, "", value, value, first.direction / a, a * first.power)
+            return together, f"{name} only as their {kind} {text}."
+        weight = -(first.size * along_first) / (second.size * along_second)
+        value = first.value + weight * second.value
+        size = value or first.size
+        text = sum_text(first.text, weight, second.text, first.unit == second.unit)
+        plain_sum = f"{first.text} + {second.text}", f"{first.text} - {second.text}"
+        kind = ("sum " if weight > 0.0 else "difference ") if text in plain_sum else ""
+        exact = self._change([first, second], [along_first, along_second], False) <= _UNCHANGED
+        closely = "" if exact else ", close to these values"
+        words = f"{name} only as {'their ' if kind else ''}{kind}{text}{closely}."
+        return _Quantity(text, members, first.unit, value, size, first.direction * size / first.size), words
+
+    def _group(self, free: Floats) -> str:
+        """Name quantities that change together without a trace, and hold one of them."""
+        direction, taking_part = _sparsest(free, np.linalg.norm(self._root(), axis=0))
+        members = [self._quantities[i] for i in taking_part]
+        along = [float(entry) for entry in direction[taking_part] / np.max(np.abs(direction))]
+        powers = [p for entry in along if (p := _small_fraction(entry)) is not None]
+        if (
+            len(powers) == len(members)
+            and self._change(members, list(map(float, powers)), True) <= _UNCHANGED
+        ):
+            return self._factor(members, powers)
+        if self._change(members, along, False) <= _UNCHANGED:
+            return self._sums(members, along)
+        held = max(zip(members, along, strict=True), key=lambda pair: abs(pair[1]))[0]
+        self._quantities.remove(held)
+        return f"{listed([q.text for q in members])} are not told apart: a change of one is made up for by the others."
+
+    def _factor(self, members: Sequence[_Quantity], powers: Sequence[Fraction]) -> str:
+        """Name quantities that may all be multiplied without a trace, and hold the first."""
+        held = next(q for q, power in zip(members, powers, strict=True) if abs(power) == 1)
+        self._quantities.remove(held)
+        names = listed([q.text for q in members])
+        if len(set(powers)) > 1:
+            moved = ", ".join(f"{q.text} x 2^{power}" for q, power in zip(members, powers, strict=True))
+            return f"{names} change together without a trace ({moved}): one of them must be known for the others."
+        self._held |= {q.text: held for q in members if q is not held}
+        return f"{names} only up to a common factor: their ratios are determined, and one of them must be known for the others."
+
+    def _sums(self, members: Sequence[_Quantity], along: Sequence[float]) -> str:
+        """Put quantities together of which one stands in sums with each of the others."""
+        slopes = [q.size * entry for q, entry in zip(members, along, strict=True)]
+        # The one that is added to the most others reads best.
+        shared = max(range(len(members)), key=lambda i: sum(slope * slopes[i] < 0.0 for slope in slopes))
+        held, made = members[shared], []
+        for q, slope in zip(members, slopes, strict=True):
+            if q is not held:
+                weight = -slope / slopes[shared]
+                text = sum_text(q.text, weight, held.text, q.unit == held.unit)
+                value = q.value + weight * held.value
+                size = value or q.size
+                made.append(
+                    _Quantity(
+                        text, (*q.members, *held.members), q.unit, value, size, q.direction * size / q.size
+                    )
+                )
+        self._quantities = [q for q in self._quantities if q not in members] + made
+        return f"{listed([q.text for q in members])} only as {listed([q.text for q in made])}."
+
+    def _change(self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool) -> float:
+        """Return how the outputs change along a direction, over what its first member alone would change.
+
+        Infinite where a bound stands in the way.
+        """
+        for side in (1.0, -1.0):
+            places = self._moved(quantities, [side * entry for entry in along], as_powers)
+            if all(np.all((self._found.lower <= p) & (p <= self._found.upper)) for p in places):
+                break
+        else:
+            return np.inf
+        lengths = [
+            self._found.change(dict(zip(self._found.names, map(float, p), strict=True))) for p in places
+        ]
+        if not np.all(np.isfinite(lengths)) or lengths[1] == 0.0:
+            return np.inf
+        return lengths[0] / lengths[1]
+
+    def _moved(
+        self, quantities: Sequence[_Quantity], along: Sequence[float], as_powers: bool
+    ) -> tuple[Floats, Floats]:
+        """Return the parameters after a step of all, and after that of the first alone."""
+        found, largest = self._found, max(abs(entry) for entry in along)
+        moved, alone = found.values.copy(), found.values.copy()
+        for number, (quantity, entry) in enumerate(zip(quantities, along, strict=True)):
+            grows = entry / largest
+            factor = _STEP**grows if as_powers else 1.0 + (_STEP - 1.0) * grows
+            step = found.sizes * quantity.step(factor)
+            moved += step
+            if number == 0:
+                alone += step
+        return moved, alone
+
+
+def _marginal_errors(root: Floats) -> Floats:
+    """Return the standard error of each coordinate, infinite where it takes part in what nothing is known of."""
+    _, singular, right = np.linalg.svd(root, full_matrices=True)
+    sizes = np.zeros(root.shape[1])
+    sizes[: singular.size] = singular
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = np.where(np.abs(right) > _ROUNDING, np.abs(right) / sizes[:, None], 0.0)
+    return np.asarray(np.sqrt(np.sum(parts**2, axis=0)))
+
+
+def _conditional_errors(root: Floats) -> Floats:
+    """Return the standard error of each coordinate if all others were known."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / np.linalg.norm(root, axis=0))
+
+
+def _undetermined(root: Floats) -> Floats:
+    """Return an orthonormal basis of the directions of which less is known than of a poorly known parameter."""
+    _, singular, right = np.linalg.svd(root, full_matrices=True)
+    sizes = np.zeros(root.shape[1])
+    sizes[: singular.size] = singular
+    return np.asarray(right[sizes * POORLY_KNOWN < 1.0].T)
+
+
+def _sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the direction with the fewest members among those of a reduced row echelon form, and the indices of these.
+
+    What counts is what a member's part does to the outputs: a small number changes much, relatively, for a little of a large one.
+    """
+    rows = (free * influence[:, None]).T
+    for place in range(rows.shape[0]):
+        pivot = np.unravel_index(np.argmax(np.abs(rows[place:])), rows[place:].shape)
+        row, column = place + int(pivot[0]), int(pivot[1])
+        rows[[place, row]] = rows[[row, place]]
+        rows[place] /= rows[place, column]
+        others = np.arange(rows.shape[0]) != place
+        rows[others] -= np.outer(rows[others, column], rows[place])
+    members = [np.flatnonzero(np.abs(row) >= _TAKES_PART * np.max(np.abs(row))) for row in rows]
+    best = min(range(len(members)), key=lambda i: members[i].size)
+    return np.asarray(rows[best] / influence), members[best]
+
+
+def _small_fraction(ratio: float) -> Fraction | None:
+    nearest = Fraction(ratio).limit_denominator(_LARGEST_POWER)
+    close = nearest != 0 and abs(float(nearest) - ratio) <= ONE * abs(ratio)
+    return nearest if close and abs(nearest.numerator) <= _LARGEST_POWER else None

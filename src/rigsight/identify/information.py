@@ -1,0 +1,154 @@
+"""What do fitted records say of each parameter, and of their combinations? The information matrix in relative units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import orth
+
+from rigsight.identify.coordinates import Coordinates
+from rigsight.identify.fit_problem import Problem
+from rigsight.identify.fit_result import FitResult
+from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.simulate import carries_tangents
+from rigsight.units import characteristic_value
+
+Floats = NDArray[np.float64]
+
+_FOLLOWED = 1e-10
+"""Share of the largest influence of initial states below which a combination of them has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """How the outputs answer to relative changes of parameters, whatever the initial states do meanwhile.
+
+    Attributes
+    ----------
+    names, units
+        Of the fitted parameters.
+    values
+        Their values, shape (n,).
+    sizes
+        What a relative change is relative to, shape (n,): the value, or the size in the records of one that may be zero.
+    lower, upper
+        Their bounds, shape (n,).
+    root
+        ``root.T @ root`` is the information matrix in units of the noise, shape (m, n).
+    change
+        Length of the change of all outputs, in units of the noise, when parameters take other values.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Floats
+    sizes: Floats
+    lower: Floats
+    upper: Floats
+    root: Floats
+    change: Callable[[Mapping[str, float]], float]
+
+
+def information(fit: GreyBoxFit, result: FitResult) -> Information:
+    """Return what the records of a fit say of its parameters.
+
+    Parameters
+    ----------
+    fit
+        Structure, records and noise.
+    result
+        Its result; residuals that are colored say less, as its standard errors know.
+    """
+    parameters = [p for p in fit.structure.parameters if p.name in result.free]
+    values = np.array([result.values[p.name] for p in parameters])
+    scales = np.array([abs(characteristic_value(p.dimension, fit.scales)) for p in parameters])
+    # A number that may have either sign, an offset, is not known better for being large.
+    may_vanish = np.array([p.lower < 0.0 for p in parameters])
+    sizes = np.where((np.abs(values) < scales) & may_vanish | (values == 0.0), scales, values)
+    names = tuple(p.name for p in parameters)
+    model = _Model(fit, result, names)
+    noise = np.sqrt(result.cost / max(result.n_samples - len(names), 1)) or 1.0
+    root = np.vstack([_triangle(rows) for rows in model.rows]) * sizes / noise
+    return Information(
+        names=names,
+        units=tuple(p.unit for p in parameters),
+        values=values,
+        sizes=sizes,
+        lower=np.array([p.lower for p in parameters]),
+        upper=np.array([p.upper for p in parameters]),
+        root=_triangle(root) / _coloring(root, result, names, sizes),
+        change=lambda moved: model.change({**result.values, **moved}) / noise,
+    )
+
+
+class _Model:
+    """Outputs of a fitted model as functions of its parameters, without what initial states could follow."""
+
+    def __init__(self, fit: GreyBoxFit, result: FitResult, names: Sequence[str]) -> None:
+        self._fit, self._result = fit, result
+        problem, theta = self._problem(result.values, names)
+        n, slopes = len(names), problem.coordinates.jacobian(theta[: len(names)])
+        self._residuals, self._followed, self.rows = [], [], []
+        for residual, derivative in _sensitivities(problem, theta):
+            states = derivative[:, n:]
+            length = np.linalg.norm(states, axis=0)
+            basis = orth(states[:, length > 0.0] / length[length > 0.0], rcond=_FOLLOWED)
+            own = np.linalg.solve(slopes.T, derivative[:, :n].T).T
+            self._residuals.append(residual)
+            self._followed.append(basis)
+            self.rows.append(own - basis @ (basis.T @ own))
+
+    def _problem(self, values: Mapping[str, float], free: Sequence[str]) -> tuple[Problem, Floats]:
+        data, result = self._fit.data, self._result
+        coordinates = Coordinates.of(self._fit.structure, free, values, self._fit.scales)
+        own = coordinates.from_values(values)
+        sizes = data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
+        theta = np.concatenate([own, *(state / sizes for state in result.initial_states)])
+        problem = Problem(data, coordinates, sizes.size, np.full(theta.size, np.inf))
+        problem.substeps = list(result.substeps)
+        return problem, theta
+
+    def change(self, values: Mapping[str, float]) -> float:
+        """Return the length of the change of all weighted outputs when parameters take other values."""
+        problem, theta = self._problem(values, ())
+        total = 0.0
+        for (moved, _), residual, basis in zip(
+            problem.sensitivities(theta), self._residuals, self._followed, strict=True
+        ):
+            change = moved - residual
+            total += float(np.sum((change - basis @ (basis.T @ change)) ** 2))
+        return float(np.sqrt(total))
+
+
+def _sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:
+    """Return residuals and derivatives per record; where they are differences, central ones.
+
+    One-sided differences err by their step times the curvature: where nothing moves, that looks like information.
+    """
+    forward = problem.sensitivities(theta)
+    if carries_tangents(problem.data.structure):
+        return forward
+    problem.upper = np.full(theta.size, -np.inf)
+    backward = problem.sensitivities(theta)
+    return [
+        (residual, 0.5 * (one + other)) for (residual, one), (_, other) in zip(forward, backward, strict=True)
+    ]
+
+
+def _triangle(rows: Floats) -> Floats:
+    return np.asarray(np.linalg.qr(rows, mode="r"))
+
+
+def _coloring(root: Floats, result: FitResult, names: Sequence[str], sizes: Floats) -> float:
+    """Return how much larger standard errors are than white residuals would make them, in the middle of the parameters."""
+    left, singular, right = np.linalg.svd(root, full_matrices=False)
+    del left
+    known = singular > 1e-6 * singular[:1]
+    white = np.sqrt(np.sum((right[known] / singular[known, None]) ** 2, axis=0))
+    told = np.array([result.standard_errors[name] for name in names]) / np.abs(sizes)
+    # Only where a parameter takes no part in what is unseen do the two measure the same.
+    seen = np.all(np.abs(right[~known]) < 1e-3, axis=0) & np.isfinite(told) & (told > 0.0) & (white > 0.0)
+    return max(float(np.median(told[seen] / white[seen])), 1.0) if np.any(seen) else 1.0

@@ -1,0 +1,232 @@
+"""What are the poles and frequency responses of a fitted rig close to its rest, how sure are they, and what was measured?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.frequency import ResponsesOfInputs, responses_of_inputs
+from rigsight.identify.identifiability import POORLY_KNOWN
+from rigsight.identify.information import Information
+from rigsight.identify.record_response import Method
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure
+from rigsight.simulate.linearization import Linearization, linearize
+
+Floats = NDArray[np.float64]
+
+_STEP = 1e-4
+"""Relative change of a parameter for a difference: rounding and curvature both leave 1e-8 of it."""
+_ROUNDING = 1e-9
+_POLES = {"local_rational": 2, "local_polynomial": 0}
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One pole, or a pair of conjugate ones.
+
+    Attributes
+    ----------
+    pole
+        The one above the real axis [1/s].
+    natural_frequency, damping_ratio
+        Its size [rad/s], and its damping ratio; NaN where it lies at zero.
+    frequency_std, damping_std
+        Their standard errors.
+    """
+
+    pole: complex
+    natural_frequency: float
+    damping_ratio: float
+    frequency_std: float
+    damping_std: float
+
+
+@dataclass(frozen=True, eq=False)
+class LinearView:
+    """A fitted rig close to its rest, for records with the same constants.
+
+    Attributes
+    ----------
+    constants
+        Those that these records have of their own.
+    records
+        Names of the records.
+    linearization
+        About the place where the rig rests under the mean inputs of these records.
+    modes
+        Its poles by their size, with what the records say of them.
+    measured
+        Frequency responses of these records together; None for a rig without inputs.
+    model
+        By (source, response) the linearized response at the measured frequencies with its standard error, shape (n,) each.
+    """
+
+    constants: dict[str, float]
+    records: tuple[str, ...]
+    linearization: Linearization
+    modes: tuple[Mode, ...]
+    measured: ResponsesOfInputs | None
+    model: Mapping[tuple[str, str], tuple[NDArray[np.complex128], Floats]]
+
+    def misfit(self, source: str, response: str) -> float:
+        """Return how far the model is from the measured response, in units of what noise explains; 1 where that is all.
+
+        By the median over frequencies: some values at the ends of a band are always wild.
+        """
+        assert self.measured is not None
+        curve, (values, std) = self.measured.found[source, response], self.model[source, response]
+        assert curve.variance is not None
+        relative = np.abs(curve.values - values) ** 2 / (curve.variance + std**2)
+        # A squared complex error has an exponential law.
+        return float(np.sqrt(np.median(relative) / np.log(2.0)))
+
+
+def measured_responses(
+    records: Sequence[Record], rig: Rig, method: Method, resolution: float | None
+) -> ResponsesOfInputs | None:
+    """Return the frequency responses of all sensors to all inputs, None for a rig without inputs.
+
+    Parameters
+    ----------
+    records
+        Records with the same constants.
+    rig
+        Their rig.
+    method
+        A local method.
+    resolution
+        Width of a local band [rad/s]; None takes what each record gives.
+    """
+    if not rig.inputs:
+        return None
+    return responses_of_inputs(
+        records,
+        [signal.name for signal in rig.inputs],
+        [signal.name for signal in rig.outputs],
+        poles=_POLES[method],
+        resolution=resolution,
+        # A prescribed motion was measured: it is smooth between its samples.
+        smooth=[str(coordinate.prescribed_by) for coordinate in rig.mechanism.prescribed],
+    )
+
+
+def by_constants(records: Sequence[Record]) -> list[list[Record]]:
+    """Return records in groups that have the same constants of their own."""
+    groups: dict[tuple[tuple[str, float], ...], list[Record]] = {}
+    for record in records:
+        groups.setdefault(tuple(sorted(record.constants.items())), []).append(record)
+    return list(groups.values())
+
+
+def linear_view(
+    structure: Structure,
+    values: Mapping[str, float],
+    records: Sequence[Record],
+    measured: ResponsesOfInputs | None,
+    known: Information,
+) -> LinearView:
+    """Return a fitted rig close to where it rests in some records.
+
+    Parameters
+    ----------
+    structure
+        The rig.
+    values
+        Fitted values by name.
+    records
+        Records with the same constants.
+    measured
+        Their frequency responses.
+    known
+        What the records say of the parameters.
+
+    Raises
+    ------
+    SimulationError
+        If the equations have no slope there.
+    """
+    constants = dict(records[0].constants)
+    inputs = {
+        signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
+    }
+
+    def at(moved: Mapping[str, float]) -> Linearization:
+        return linearize(structure, {**values, **constants, **moved}, inputs)
+
+    found, neighbors = at({}), list(_neighbors(known, at))
+    model = {}
+    for (source, response), curve in (measured.found if measured is not None else {}).items():
+        column, row = found.inputs.index(source), found.outputs.index(response)
+        changes = [
+            change.factor
+            * (change.ahead.frequency_response(curve.omega) - change.behind.frequency_response(curve.omega))
+            for change in neighbors
+        ]
+        spread = np.sqrt(
+            np.sum(np.abs([np.zeros_like(curve.values), *(c[:, row, column] for c in changes)]) ** 2, axis=0)
+        )
+        model[source, response] = (found.frequency_response(curve.omega)[:, row, column], np.asarray(spread))
+    return LinearView(
+        constants=constants,
+        records=tuple(record.name for record in records),
+        linearization=found,
+        modes=tuple(_mode(pole, neighbors) for pole in found.poles if pole.imag >= 0.0),
+        measured=measured,
+        model=model,
+    )
+
+
+def _mean(samples: Sequence[Floats]) -> float:
+    """Return the mean of an input, zero where it is no more than rounding leaves of an excitation."""
+    mean = float(np.mean([np.mean(own) for own in samples]))
+    return mean if abs(mean) > _ROUNDING * max(float(np.max(np.abs(own))) for own in samples) else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """Two linearizations, and the factor by which their difference is one standard error of a direction of the parameters."""
+
+    ahead: Linearization
+    behind: Linearization
+    factor: float
+
+
+def _neighbors(known: Information, at: Callable[[Mapping[str, float]], Linearization]) -> Iterator[_Change]:
+    """Yield a change for each direction of which something is known; along the others nothing that was measured moves."""
+    _, singular, right = np.linalg.svd(known.root, full_matrices=False)
+    for size, direction in zip(singular, right, strict=True):
+        if size * POORLY_KNOWN <= 1.0:
+            continue
+        step = _STEP * known.sizes * direction
+        ahead, behind = (
+            at(dict(zip(known.names, map(float, known.values + side * step), strict=True)))
+            for side in (1.0, -1.0)
+        )
+        yield _Change(ahead, behind, 1.0 / (2.0 * _STEP * float(size)))
+
+
+def _mode(pole: complex, neighbors: Sequence[_Change]) -> Mode:
+    frequency, damping = [0.0], [0.0]
+    for change in neighbors:
+        ahead, behind = (
+            complex(linear.poles[np.argmin(np.abs(linear.poles - pole))])
+            for linear in (change.ahead, change.behind)
+        )
+        frequency.append(change.factor * (abs(ahead) - abs(behind)))
+        damping.append(change.factor * (_damping(ahead) - _damping(behind)))
+    return Mode(
+        pole=complex(pole),
+        natural_frequency=abs(pole),
+        damping_ratio=_damping(pole),
+        frequency_std=float(np.linalg.norm(frequency)),
+        damping_std=float(np.linalg.norm(damping)),
+    )
+
+
+def _damping(pole: complex) -> float:
+    return -pole.real / abs(pole) if pole != 0.0 else float("nan")

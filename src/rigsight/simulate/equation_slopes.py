@@ -1,0 +1,195 @@
+"""How do a rig's equations change with states and inputs, and where does it rest? Symbolic derivatives, called with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rigsight.effects.symbols import positive_part
+from rigsight.rigs import evaluated
+from rigsight.simulate.structure import TIME, Structure, input_symbols
+
+Floats = NDArray[np.float64]
+
+_NEAR = 1e-6
+"""How near a place of rest must be, relative to each state or in its SI unit: its search stops at 1e-8."""
+
+
+def slope_functions(structure: Structure) -> SlopeFunctions:
+    """Return the derivatives of a structure's equations; those of the same structure are the same object."""
+    return _functions_of(_SameStructure(structure))
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Derivatives of the equations at one place.
+
+    Attributes
+    ----------
+    states, inputs
+        Of the rates of the states, by states, shape (n_states, n_states), and by inputs, their rates and their curvatures, shape
+        (3, n_states, n_inputs).
+    outputs_by_states, outputs_by_inputs
+        Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
+    rests
+        Whether nothing moves at that place.
+    """
+
+    states: Floats
+    inputs: Floats
+    outputs_by_states: Floats
+    outputs_by_inputs: Floats
+    rests: bool
+
+
+class SlopeFunctions:
+    """Compiled derivatives of a structure's equations; the mass matrix is inverted in numbers, as symbols it would explode."""
+
+    def __init__(self, structure: Structure) -> None:
+        tree, motion = structure.tree, structure.tree.motion
+        self._n = len(motion.coordinates)
+        states = structure.states
+        triples = [input_symbols(index) for index in range(len(structure.rig.mechanism.inputs))]
+        by = [*states, *(triple[order] for order in range(3) for triple in triples)]
+        self._n_states, self._n_inputs = len(states), len(triples)
+        arguments = [*by, *structure.parameter_symbols, TIME]
+        mass = motion.mass.applyfunc(tree.flattened)
+        forces = [tree.flattened(force) for force in motion.forces]
+        rates = [tree.flattened(state.rate) for state in tree.states]
+        self._mass = _function(arguments, mass)
+        self._balance = _function(arguments, [*forces, *rates])
+        self._mass_slopes = _function(arguments, [_slope(mass, symbol) for symbol in by])
+        self._force_slopes = _function(arguments, _jacobian(forces, by))
+        self._rate_slopes = _function(arguments, _jacobian(rates, by))
+        self._output_slopes = _function(arguments, _jacobian(structure.outputs, by))
+
+    def _place(self, state: Floats, inputs: Floats, p: Floats) -> list[float]:
+        return [*state, *inputs, *np.zeros(2 * self._n_inputs), *p, 0.0]
+
+    @property
+    def _held(self) -> NDArray[np.intp]:
+        """Indices of the states that are not velocities."""
+        return np.concatenate([np.arange(self._n), np.arange(2 * self._n, self._n_states)])
+
+    def resting(self, near: Floats, inputs: Floats, p: Floats) -> Floats:
+        """Return the state at which nothing moves under constant inputs, or that comes nearest to it, from a place near by."""
+        state, held = near.copy(), self._held
+        state[self._n : 2 * self._n] = 0.0
+        if not held.size:
+            return state
+
+        def at(unknown: Floats) -> list[float]:
+            state[held] = unknown
+            return self._place(state, inputs, p)
+
+        def balance(unknown: Floats) -> Floats:
+            return np.asarray(self._balance(*at(unknown)), dtype=np.float64)
+
+        def slopes(unknown: Floats) -> Floats:
+            place = at(unknown)
+            return np.vstack([self._force_slopes(*place), self._rate_slopes(*place)])[:, held]
+
+        begin = state[held].copy()
+        with np.errstate(all="ignore"):
+            found = (
+                least_squares(balance, begin, jac=slopes, x_scale="jac")
+                if _is_finite(balance, slopes, begin)
+                else None
+            )
+        state[held] = begin if found is None or not found.success else found.x
+        return state
+
+    def at(self, state: Floats, inputs: Floats, p: Floats) -> Slopes:
+        """Return the derivatives at a state under constant inputs.
+
+        Raises
+        ------
+        LinAlgError
+            If the mass matrix is singular.
+        """
+        n, n_states, n_inputs = self._n, self._n_states, self._n_inputs
+        place = self._place(state, inputs, p)
+        slopes = np.zeros((n_states, n_states + 3 * n_inputs))
+        with np.errstate(all="ignore"):
+            balance = np.array(self._balance(*place), dtype=np.float64)
+            by_place = np.vstack([self._force_slopes(*place), self._rate_slopes(*place)])
+            outputs = self._output_slopes(*place)
+            slopes[2 * n :] = by_place[n:]
+            if n:
+                mass = self._mass(*place)
+                accelerations = np.linalg.solve(mass, balance[:n])
+                turned = np.column_stack([slope @ accelerations for slope in self._mass_slopes(*place)])
+                slopes[np.arange(n), n + np.arange(n)] = 1.0
+                slopes[n : 2 * n] = np.linalg.solve(mass, by_place[:n] - turned)
+        held = self._held
+        near = np.abs(by_place[:, held]) @ (_NEAR * np.maximum(np.abs(state[held]), 1.0))
+        by_inputs = slopes[:, n_states:].reshape(n_states, 3, n_inputs)
+        outputs_by = outputs[:, n_states:].reshape(outputs.shape[0], 3, n_inputs)
+        return Slopes(
+            slopes[:, :n_states],
+            np.moveaxis(by_inputs, 1, 0),
+            outputs[:, :n_states],
+            np.moveaxis(outputs_by, 1, 0),
+            bool(np.all(np.abs(balance) <= near)),
+        )
+
+
+def declared_start(structure: Structure, p: Floats) -> Floats:
+    """Return the start values of the rig's file, shape (n_states,); zero where it declares none."""
+    mechanism, values = structure.rig.mechanism, dict(zip(structure.names, p, strict=True))
+    starts = {state.symbol: state.start for state in mechanism.states} | dict(mechanism.initial)
+    found = np.zeros(len(structure.states))
+    for symbol, expression in starts.items():
+        if symbol in structure.states:
+            found[structure.states.index(symbol)] = evaluated(expression, values)
+    return found
+
+
+def _is_finite(
+    balance: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], place: Floats
+) -> bool:
+    return bool(np.all(np.isfinite(balance(place))) and np.all(np.isfinite(slopes(place))))
+
+
+class _SameStructure:
+    """Let a structure, whose rig holds dictionaries and so cannot be hashed, be the key of a cache by identity."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+
+    def __hash__(self) -> int:
+        return id(self.structure)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _SameStructure) and self.structure is other.structure
+
+
+@lru_cache(maxsize=128)
+def _functions_of(key: _SameStructure) -> SlopeFunctions:
+    return SlopeFunctions(key.structure)
+
+
+def _jacobian(expressions: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> sp.Matrix:
+    return sp.Matrix(
+        len(expressions), len(by), [_slope(expression, symbol) for expression in expressions for symbol in by]
+    )
+
+
+def _slope(expression: Any, symbol: sp.Symbol) -> Any:
+    # The jump of a sign has no slope; what rests on it is left out.
+    return sp.diff(expression, symbol).replace(sp.DiracDelta, lambda *_: sp.S.Zero)
+
+
+def _function(arguments: Sequence[sp.Symbol], expressions: Any) -> Callable[..., Any]:
+    return sp.lambdify(arguments, expressions, [{positive_part.__name__: _positive_part}, "numpy"], cse=True)  # type: ignore[no-any-return]
+
+
+def _positive_part(x: float) -> float:
+    return max(x, 0.0)
