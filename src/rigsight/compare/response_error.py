@@ -90,7 +90,8 @@ class ResponseError:
 def signal_paths(rig: Rig) -> tuple[SignalPath, ...]:
     """Return the paths of a rig: input to first output, and that to each output behind it.
 
-    On a rig of several motions they are each input to each sensor. The cuts are those of the thesis where a state follows the motion, none on other rigs.
+    On a rig of several motions they are each input to each sensor. The cuts are those of the thesis where a state follows the
+    motion, none on other rigs.
     """
     if not rig.has_one_motion:
         prescribing = {coordinate.prescribed_by for coordinate in rig.mechanism.prescribed}

@@ -176,7 +176,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     outs = [quantity.name for quantity in exported.outputs]
     room = max(1, len(exported.inputs))
     kernel = "\n".join(
-        [equations.text("const parameters *p", list(names.values())), *map(template, ACCURATE)]
+        [equations.text("const parameters *p", list(names.values())), accurate_integrator(equations)]
     )
     rest = _rest(exported, names)
     fragments = {

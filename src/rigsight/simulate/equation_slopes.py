@@ -144,9 +144,8 @@ class SlopeFunctions:
 def declared_start(structure: Structure, p: Floats) -> Floats:
     """Return the start values of the rig's file, shape (n_states,); zero where it declares none."""
     mechanism, values = structure.rig.mechanism, dict(zip(structure.names, p, strict=True))
-    starts = {state.symbol: state.start for state in mechanism.states} | dict(mechanism.initial)
     found = np.zeros(len(structure.states))
-    for symbol, expression in starts.items():
+    for symbol, expression in mechanism.initial.items():
         if symbol in structure.states:
             found[structure.states.index(symbol)] = evaluated(expression, values)
     return found

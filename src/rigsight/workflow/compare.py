@@ -215,8 +215,8 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
     own, rig = model.structure.rig, campaign.rig
     if own.name == rig.name and own.mechanism != rig.mechanism:
         raise InputError(
-            f"Model '{name}' is of a rig '{own.name}' with other equations than that of {campaign.called}: only models of that rig "
-            "can be compared. Leave it out, or make it anew with this rig file."
+            f"Model '{name}' is of a rig '{own.name}' with other equations than that of {campaign.called}: only models of that "
+            "rig can be compared. Leave it out, or make it anew with this rig file."
         )
     if own.name != rig.name:
         raise InputError(
