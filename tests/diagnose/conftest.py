@@ -2,19 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from rigsight.diagnose.workbench import Scored
-from rigsight.effects import effect_named
+from rigsight.effects import Effect, effect_named
 from rigsight.identify import FitResult
-from rigsight.rigs import AXIS
-from rigsight.simulate import compose
+from rigsight.records.record import Record
+from rigsight.rigs import AXIS, RIGS, Rig
+from rigsight.simulate import compose, simulate
 
 MakeScored = Callable[..., Scored]
+
+
+@dataclass(frozen=True)
+class Train:
+    """A drive train whose records can be drawn."""
+
+    rig: Rig = RIGS["drive_train"]
+    noise: float = 1e-4
+    dt: float = 5e-3
+    n_samples: int = 1200
+    values: Mapping[str, float] = field(
+        default_factory=lambda: {
+            "k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 0.4, "d_s": 1e-3, "d_m": 5e-4, "d_l": 1e-3, "k_l": 0.1,
+        }
+    )  # fmt: skip
+
+    def records(
+        self, effects: Sequence[Effect] = (), values: Mapping[str, float] | None = None
+    ) -> tuple[Record, ...]:
+        """Return two records to fit and one to score, with white noise on both angles."""
+        rng = np.random.default_rng(4)
+        t = self.dt * np.arange(self.n_samples)
+        structure = compose(self.rig, effects)
+        records = []
+        for name, amplitude, role in (("large", 1.0, False), ("small", 0.4, False), ("other", 0.7, True)):
+            phases = rng.uniform(0.0, 2.0 * np.pi, 20)
+            lines = np.sum(
+                [np.cos(2.0 * np.pi * (0.5 + 0.4 * i) * t + p) for i, p in enumerate(phases)], axis=0
+            )
+            drive = amplitude * lines / np.max(np.abs(lines))
+            record = Record(name, self.dt, {"u": drive}, {}, role="validation" if role else "estimation")
+            shown = simulate(structure, {**self.values, **(values or {})}, record)
+            noisy = {
+                s.name: shown[s.name] + self.noise * rng.standard_normal(self.n_samples)
+                for s in self.rig.outputs
+            }
+            records.append(record.with_signals(**noisy))
+        return tuple(records)
+
+
+@pytest.fixture(scope="session")
+def train() -> Train:
+    """Return the drive train."""
+    return Train()
 
 
 @pytest.fixture(scope="session")

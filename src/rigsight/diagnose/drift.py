@@ -35,7 +35,7 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
     rates = [e.rate for e in structure.equations if e.symbol not in motion.coordinates]
     slopes = sp.Matrix([*rates, *structure.outputs]).jacobian(states)
     symbols = sorted(slopes.free_symbols, key=str)
-    function = sp.lambdify(symbols, slopes, "numpy")
+    function = sp.lambdify(symbols, slopes, [{"positive_part": lambda x: np.maximum(x, 0.0)}, "numpy"])
     rng = np.random.default_rng(0)
     still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
     defaults = {p.name: p.default for p in (*rig.constants, *rig.parameters) if p.default is not None}

@@ -1,0 +1,32 @@
+"""A rig that nothing brings back is told from one that has a spring, a weight or a control loop."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigsight.diagnose.drift import can_drift
+from rigsight.diagnose.task import Task
+from rigsight.rigs import AXIS, RIGS
+
+
+@pytest.mark.parametrize("name", ["drive_train", "servo", "two_link_arm", "quarter_car"])
+def test_springs_weights_and_control_loops_bring_a_rig_back(name: str) -> None:
+    assert not can_drift(RIGS[name], {})
+
+
+def test_a_cart_rolls_away() -> None:
+    assert can_drift(RIGS["cart_pendulum"], {})
+
+
+def test_a_spring_that_is_given_as_zero_is_none() -> None:
+    assert can_drift(RIGS["drive_train"], {"k_l": 0.0})
+    assert not can_drift(RIGS["drive_train"], {"k_s": 0.3, "k_l": 0.1})
+
+
+@pytest.mark.parametrize(("k", "absent"), [(0.0, "k"), (2.0, None), (None, None)])
+def test_one_mass_is_without_a_spring_where_its_stiffness_is_given_as_zero(
+    k: float | None, absent: str | None
+) -> None:
+    task = Task("", AXIS, {"gain": 1.0}, {} if k is None else {"k": k}, ())
+    assert task.absent_spring == absent
+    assert task.drifts == (absent is not None)

@@ -1,0 +1,64 @@
+"""The place of a hidden effect is found before any effect is fitted, and the diagnosis names effect and place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose import Task, candidates_on, diagnose
+from rigsight.diagnose.characterize import fit_linear
+from rigsight.diagnose.places import search_places
+from rigsight.diagnose.workbench import Workbench
+from rigsight.effects import effect_named, placed
+from rigsight.identify import characteristic_scales
+from rigsight.rigs import RIGS
+
+TRAIN = RIGS["drive_train"]
+
+EFFECTS = [
+    effect_named(n) for n in ("quadratic_damping", "cubic_stiffness", "input_saturation", "sensor_lag")
+]
+HIDDEN = [
+    ("quadratic_damping", "load_bearing", {"c_2": 2e-4}),
+    ("cubic_stiffness", "shaft", {"k_3": 5.0}),
+    ("input_saturation", "motor", {"u_max": 0.5}),
+    ("sensor_lag", "load_angle", {"T_m": 0.02}),
+]
+
+
+@pytest.mark.parametrize(("name", "place", "values"), HIDDEN, ids=[f"{n}@{p}" for n, p, _ in HIDDEN])
+def test_the_place_comes_first(train: Any, name: str, place: str, values: dict[str, float]) -> None:
+    records = train.records([placed(effect_named(name), place)], values)
+    fitted = tuple(record for record in records if record.role == "estimation")
+    noise = {signal.name: train.noise for signal in TRAIN.outputs}
+    scales = characteristic_scales(TRAIN, fitted, train.values)
+    bench = Workbench(TRAIN, fitted, fitted, fitted, scales, noise, frozenset(), train.values)
+    linear = fit_linear(bench, train.values)
+    effects = candidates_on(TRAIN, EFFECTS)
+    search = search_places(bench, linear, effects)
+    assert search.places[0].name == place
+    assert all(effect in search.effects for effect in effects if effect.at == place)
+    assert len(search.effects) + len(search.others) == len(effects)
+
+
+def test_effect_and_place_are_named(train: Any) -> None:
+    records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 2e-4})
+    found = diagnose(Task("train", TRAIN, {"k_t": 0.05}, {}, records), EFFECTS[:2])
+    assert (found.verdict, found.effects) == ("effect", ("quadratic_damping@load_bearing",))
+    told = found.to_json()
+    assert (told["effects"], told["where"]) == (["quadratic_damping"], ["load_bearing"])
+    assert set(told["gap"]) == {"motor_angle", "load_angle"}
+    assert told["gap_by_place"][0]["place"] == "load_bearing"
+    c_2 = next(c for c in found.candidates if c.effects == found.effects).parameters["c_2"]
+    assert abs(c_2.value - 2e-4) < 5.0 * c_2.std
+
+
+def test_a_record_may_lack_a_sensor(train: Any) -> None:
+    records = train.records()
+    partial = replace(records[1], signals={n: s for n, s in records[1].signals.items() if n != "motor_angle"})
+    found = diagnose(Task("train", TRAIN, {"k_t": 0.05}, {}, (records[0], partial, records[2])), EFFECTS[:1])
+    assert found.verdict == "none"
+    assert np.isfinite(found.gap["motor_angle"].after)
