@@ -22,6 +22,8 @@ BALANCED = 1e-8
 """Share of the forces that are out of balance where the search begins that may be left where it ends."""
 PATH_STEPS = 32
 """Steps in which the inputs rise where hysteresis remembers the way: its error is some 3 % of what it holds."""
+_HUGE = 1e100
+"""In the place of infinity: its square is still a number."""
 _PRECISE = 1e-15
 """Change of cost, place and slope at which the search ends: as near as numbers go."""
 
@@ -113,7 +115,10 @@ def _reached(
 
     def missing(y: Floats) -> Floats:
         state = states_of(y)
-        rates = np.asarray(balance.rates(p, inputs, state, before, y[n:]), dtype=np.float64)[free]
+        # A power of a memory that is empty may divide by zero; what it is multiplied by is zero as well.
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            rates = np.asarray(balance.rates(p, inputs, state, before, y[n:]), dtype=np.float64)[free]
+        rates = np.nan_to_num(rates, nan=0.0, posinf=_HUGE, neginf=-_HUGE)
         turned = np.asarray(balance.turned(p, inputs, state, before, y[n:]), dtype=np.float64)
         held = np.where(slides == 0.0, turned, y[n:] - slides) if with_friction else y[n:]
         return np.concatenate([rates, held])
