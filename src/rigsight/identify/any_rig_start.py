@@ -7,11 +7,12 @@ minima are fitted roughly by simulation, and the one that leaves least is the st
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
 from rigsight.errors import InputError
 from rigsight.identify.first_states import rig_state
@@ -20,7 +21,7 @@ from rigsight.identify.grey_box import GreyBoxFit
 from rigsight.identify.linearized_responses import LinearizedResponses
 from rigsight.identify.place_scales import scales_at_places
 from rigsight.identify.rig_equations import equations_of
-from rigsight.identify.spread_search import balanced, ends_of_search
+from rigsight.identify.spread_search import AGREEING, PERSISTENT, balanced, ends_of_search
 from rigsight.identify.typical_size import size_of_signal
 from rigsight.identify.weak_equations import WeakEquations
 from rigsight.parameters import Parameter
@@ -39,11 +40,17 @@ _ROUGH_EVALUATIONS = 15
 _ROUGH_TOLERANCE = 1e-3
 _PIECES = (32, 16, 8, 4, 2)
 """Into how many pieces each record is cut, in turn."""
+_TOLD = 1.0
+"""Error that changing a parameter to its double must make, of size one for noise, for the records to tell it; else it is held."""
+_LONG_PIECES = 8
+"""Pieces of a record that are long: free initial states make up for many a wrong number in shorter ones."""
 _MOST_PIECES = 16
 _MOST_SAMPLES = 10000
 """Samples of all records together that are simulated for a start."""
 _EXPLAINED = 2.0
 """Residual over what is rough in the sensors at which nothing further is tried: a spline leaves half of the noise at least."""
+_HIGHEST = 0.9
+"""Share of the spectrum behind which it is taken for noise."""
 _LEAST_NOISE = 1e-4
 """Noise of a sensor that shows none, relative to its size: a fit that comes so near has found its place."""
 
@@ -75,40 +82,50 @@ def any_rig_start(
         return dict(known)
     values = {**constants, **known}
     rough = _Rough(rig, records, values, [p.name for p in sought])
-    tried: list[FitResult] = []
-    starts: list[dict[str, float]] = []
-    for start in _minima(rig, records, values, sought):
-        starts.append(start)
-        tried.append(rough.whole(start))
-        if rough.explains(tried[-1]):
+    best: FitResult | None = None
+    for is_close, start in _minima(rig, records, values, sought):
+        found = rough.whole(start)
+        if is_close and not rough.explains(found):
+            pieces, whole = rough.lengthening(start)
+            if pieces is not None and not rough.explains(whole):
+                # The motion is chaotic: no search finds values that a simulation of the whole could follow any better.
+                best = pieces
+                break
+            found = min(found, whole, key=lambda fit: fit.cost)
+        best = found if best is None else min(best, found, key=lambda fit: fit.cost)
+        if rough.explains(best):
             break
-    best = min(tried, key=lambda fit: fit.cost)
-    if not rough.explains(best):
-        ways = [starts[0]] if best is tried[0] else [starts[0], dict(best.values)]
-        best = min([best, *map(rough.lengthening, ways)], key=lambda fit: fit.cost)
+    assert best is not None
     return {p.name: float(best.values[p.name]) for p in rig.parameters}
 
 
 def _minima(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], sought: Sequence[Parameter]
-) -> Iterator[dict[str, float]]:
-    """Yield values from which simulations may start: of the equations' error, then of the linearization's."""
+) -> Iterator[tuple[bool, dict[str, float]]]:
+    """Yield values from which simulations may start, and whether they are worth more than one look.
+
+    Those are the lowest of each error. They come from few searches first, from many if nothing explains the records.
+    """
     equations, names = equations_of(rig), [p.name for p in sought]
     rng = np.random.default_rng(_SEED)
-
-    def named(found: Floats) -> dict[str, float]:
-        return {**values, **dict(zip(names, map(float, found), strict=True))}
-
     weak = WeakEquations(equations, records, values, names)
     space = balanced(sought, weak.term_sizes)
+
+    def ends(errors: Callable[[Floats], Floats], agreeing: int) -> Iterator[tuple[bool, dict[str, float]]]:
+        found = ends_of_search(space, errors, rng, agreeing)[:_LIKELY]
+        for rank, (_, own) in enumerate(found):
+            numbers = dict(zip(names, map(float, own), strict=True))
+            yield rank == 0 and agreeing != PERSISTENT, {**values, **numbers}
+
     if weak.n_records:
-        for _, found in ends_of_search(space, weak.errors, rng)[:_LIKELY]:
-            yield named(found)
-    expected = named(space.values(space.start()))
+        yield from ends(weak.errors, AGREEING)
+    expected = {**values, **dict(zip(names, map(float, space.values(space.start())), strict=True))}
     middle = [rig_state(equations, record, expected, resting=record.n_samples) for record in records]
     linear = LinearizedResponses(equations, records, values, names, middle)
-    for _, found in ends_of_search(space, linear.errors, rng)[:_LIKELY]:
-        yield named(found)
+    yield from ends(linear.errors, AGREEING)
+    yield from ends(linear.errors, PERSISTENT)
+    if weak.n_records:
+        yield from ends(weak.errors, PERSISTENT)
 
 
 class _Rough:
@@ -128,20 +145,27 @@ class _Rough:
 
     def whole(self, start: Mapping[str, float]) -> FitResult:
         """Fit the records as they are."""
-        return self._fitted(1, start)
+        return self._fitted(1, start, scales_at_places(self._rig, self._records, start))
 
-    def lengthening(self, start: Mapping[str, float]) -> FitResult:
+    def lengthening(self, start: Mapping[str, float]) -> tuple[FitResult | None, FitResult]:
         """Fit pieces of the records, of double length each time, then the whole.
 
         Over a short piece no motion is far from the one that was measured, however unstable or chaotic it is.
-        """
-        values = start
-        for count in _PIECES:
-            in_pieces = self._fitted(count, values)
-            values = in_pieces.values if np.isfinite(in_pieces.cost) else values
-        return self._fitted(1, values)
 
-    def _fitted(self, count: int, start: Mapping[str, float]) -> FitResult:
+        Returns
+        -------
+        The fit of the longest pieces that it explains, None if they are short, and the one of the whole.
+        """
+        explained: FitResult | None = None
+        values, scales = start, scales_at_places(self._rig, self._records, start)
+        for count in _PIECES:
+            in_pieces = self._fitted(count, values, scales)
+            values = in_pieces.values if np.isfinite(in_pieces.cost) else values
+            if count <= _LONG_PIECES and self.explains(in_pieces):
+                explained = in_pieces
+        return explained, self._fitted(1, values, scales)
+
+    def _fitted(self, count: int, start: Mapping[str, float], scales: Mapping[str, float]) -> FitResult:
         pieces = []
         for record in self._records:
             edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
@@ -149,21 +173,44 @@ class _Rough:
         # Each has an initial state of its own: of many, some say enough.
         if count > 1:
             pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
-        scales = scales_at_places(self._rig, self._records, start)
         problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
-        return problem.fit(
-            start, self._free, None, _ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False
-        )
+        told = _told(problem.information(start, self._free), self._free)
+        return problem.fit(start, told, None, _ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False)
+
+
+def _told(information: Floats, free: Sequence[str]) -> list[str]:
+    """Return parameters that the records tell if the others are held: as many as they tell combinations."""
+    if not np.all(np.isfinite(information)):
+        return list(free)
+    values, vectors = np.linalg.eigh(information)
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    triangle, order = qr(root, mode="r", pivoting=True)
+    rank = int(np.count_nonzero(np.abs(np.diag(triangle)) > _TOLD))
+    return [name for index, name in enumerate(free) if index in order[:rank]]
 
 
 def _noise(name: str, records: Sequence[Record]) -> float:
-    """Return the standard deviation of what is rough in a sensor."""
-    signals = [record[name] for record in records if name in record]
-    if not signals:
+    """Return the standard deviation of what is rough in a sensor: what a spline leaves, or the end of its spectrum.
+
+    The larger of the two: fast motion leaves the spline little to smooth.
+    """
+    held = [record for record in records if name in record]
+    if not held:
         return 1.0
-    rough = [r[name] - smooth_motion(r[name], r.dt)[0] for r in records if name in r]
-    size = float(np.sqrt(np.mean(np.concatenate(rough) ** 2)))
-    return max(size, _LEAST_NOISE * size_of_signal(signals)) or 1.0
+    rough = [record[name] - smooth_motion(record[name], record.dt)[0] for record in held]
+    left = float(np.sqrt(np.mean(np.concatenate(rough) ** 2)))
+    ends = [_end_of_spectrum(record[name]) for record in held]
+    size = size_of_signal([record[name] for record in held])
+    return max(left, float(np.median(ends)), _LEAST_NOISE * size) or 1.0
+
+
+def _end_of_spectrum(signal: Floats) -> float:
+    """Return the standard deviation of white noise whose spectrum is that at the signal's highest frequencies."""
+    window = np.hanning(signal.size)
+    power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
+    # The median of a line's power is log 2 of its mean.
+    highest = np.median(power[int(_HIGHEST * power.size) :]) / np.log(2.0)
+    return float(np.sqrt(highest / max(float(window @ window), 1e-300)))
 
 
 def _check_moves(rig: Rig, records: Sequence[Record]) -> None:

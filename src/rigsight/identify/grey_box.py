@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from rigsight.errors import SimulationError
 from rigsight.identify.coordinates import Coordinates
 from rigsight.identify.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.identify.fit_data import FitData, RecordData
 from rigsight.identify.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit_problem import MOST_SUBSTEPS, Problem
@@ -29,16 +28,14 @@ from rigsight.identify.fit_result import FitResult
 from rigsight.identify.idle_threads import IdleThreads
 from rigsight.identify.search import FINE_TOLERANCE, off_kinks, searched
 from rigsight.identify.separate_states import SeparateStates
-from rigsight.identify.settled_states import settled_state
+from rigsight.identify.settled_states import guessed_states
 from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
     Substeps,
-    parameter_vector,
     record_input,
     record_values,
     simulate_outputs,
-    simulate_sets,
 )
 from rigsight.units import characteristic_value
 
@@ -50,10 +47,6 @@ _WORTH_A_ROUND = 1e-3
 """Share of the cost that a round must have removed for another one."""
 _STATE_RANGE = 20.0
 """How far an initial state may move from its guess, in units of its size."""
-_FIRST_SUBSTEPS = 4
-_FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
-"""Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
-
 _Outcome = tuple[NDArray[np.float64], bool, str]
 """Coordinates and places where a search ended, whether it converged, and the optimizer's words."""
 
@@ -253,6 +246,35 @@ class GreyBoxFit:
         together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
         return self._result(together, *outcome, finish=True)
 
+    def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
+        """Return what the records say of parameters at their start, with all initial states as unknown as they are.
+
+        The Fisher information of relative changes, of changes in units of their size where a value is zero; NaN where the start
+        cannot be simulated.
+
+        Parameters
+        ----------
+        start, free
+            As of `fit`.
+
+        Returns
+        -------
+        Shape (n_free, n_free).
+        """
+        begin, n = self._begin(start, free, None), len(free)
+        problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
+        problem.choose_substeps(begin.theta)
+        normal = problem.at(begin.theta).normal
+        if not np.all(np.isfinite(normal)):
+            return np.full((n, n), np.nan)
+        own = (
+            normal[:n, :n] - normal[:n, n:] @ np.linalg.pinv(normal[n:, n:], hermitian=True) @ normal[n:, :n]
+        )
+        sizes = np.array([abs(start[name]) for name in free])
+        sizes = np.where(sizes > 0.0, sizes, begin.coordinates.scale)
+        relative = sizes / np.diag(begin.coordinates.jacobian(begin.theta[:n]))
+        return np.asarray(own * np.outer(relative, relative))
+
     def _recalled(self, key: str, problem: Problem, search: Callable[[], _Outcome]) -> _Outcome:
         """Return the outcome of a search, from memory if it was done before."""
         known = None if self.memory is None else self.memory.recall(key)
@@ -276,7 +298,7 @@ class GreyBoxFit:
         initial_states: Sequence[NDArray[np.float64]] | None,
     ) -> _Begin:
         coordinates = Coordinates.of(self.structure, free, start, self.scales)
-        states = list(initial_states) if initial_states is not None else self._first_states(start)
+        states = list(initial_states) if initial_states is not None else guessed_states(self.data, start)
         own = coordinates.from_values(start)
         sizes = self.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
         limited = self.data.limited
@@ -300,33 +322,6 @@ class GreyBoxFit:
             return ""
         values = [float(start[name]) for name in self.structure.names]
         return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
-
-    def _first_states(self, start: Mapping[str, float]) -> list[NDArray[np.float64]]:
-        """Return each record's guess; of several for states with a range, and of moving and resting, the best.
-
-        On a rig of more than one motion it is fitted to the beginning of the record.
-        """
-        guesses = [first_state(self.structure, d.record, start) for d in self.data.records]
-        p = parameter_vector(self.structure, start)
-        if not (self.structure.rig.has_one_motion or np.any(self.data.limited)):
-            pairs = list(zip(self.data.records, guesses, strict=True))
-            return self.data.of_each_record(lambda i: settled_state(self.data, pairs[i][0], p, pairs[i][1]))
-        if not np.any(self.data.limited):
-            return guesses
-        ranges = np.where(self.data.limited, self.data.state_sizes(p[:, None])[:, 0], 0.0)
-        found = []
-        for data, guess in zip(self.data.records, guesses, strict=True):
-            at_rest = state_at_rest(self.structure, data.record, guess, start)
-            lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
-            n_samples = data.record.n_samples
-            with np.errstate(all="ignore"):
-                sets = np.repeat(data.parameters(p)[:, None], lanes.shape[1], axis=1)
-                out = simulate_sets(self.structure, data.held, sets, lanes, n_samples, _FIRST_SUBSTEPS)
-                errors = (data.measured[:, :, None] - out) * data.weights[:, None]
-                costs = np.nansum(errors**2, axis=(0, 1))
-            costs[~np.all(np.isfinite(out), axis=(0, 1))] = np.inf
-            found.append(lanes[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else guess)
-        return found
 
     def _failed(self, problem: Problem, theta: NDArray[np.float64], message: str) -> FitResult:
         coordinates = problem.coordinates

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 _ACCURACY = 1e-4
 """Relative accuracy of the simulation: sizes need less."""
-_PIECES = (1, 10, 100)
+_PIECES = (1, 20)
 """Into how many pieces a record is cut, each of which starts anew where it was measured, until the motion can be computed and
 stays of the size that was measured: a rig that is unstable, or rolls away, leaves it sooner or later."""
 _BEYOND = 3.0

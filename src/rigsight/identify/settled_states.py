@@ -6,11 +6,14 @@ descent that begins with the whole record would not come back from a guess that 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.identify.fit_data import FitData, RecordData, weighted
-from rigsight.simulate import simulate_sets
+from rigsight.simulate import parameter_vector, simulate_sets
 
 Floats = NDArray[np.float64]
 
@@ -24,9 +27,55 @@ _DAMPINGS = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step that are tried side by side."""
 _PULL = 1e-3
 """Weight of the guess against an error of size one: it decides what the stretch does not tell."""
+_LARGEST = 1e9
+"""Error at which a motion has left the range of numbers, or may as well have."""
 _SUBSTEPS = 4
+_FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
+"""Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
 _LOST = 2.0
 """Growth of the error per sample at which a longer stretch is not followed: the parameters are not good enough for it."""
+
+
+def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
+    """Return each record's initial state; of several for states with a range, and of moving and resting, the best.
+
+    On a rig of more than one motion it is fitted to the beginning of the record.
+
+    Parameters
+    ----------
+    data
+        What is fitted.
+    values
+        Value of every parameter of the structure.
+
+    Returns
+    -------
+    Shape (n_states,) each.
+    """
+    guesses = [first_state(data.structure, d.record, values) for d in data.records]
+    p = parameter_vector(data.structure, values)
+    if np.any(data.limited):
+        return [_placed(data, *pair, p, values) for pair in zip(data.records, guesses, strict=True)]
+    if data.structure.rig.has_one_motion:
+        return guesses
+    return data.of_each_record(lambda i: settled_state(data, data.records[i], p, guesses[i]))
+
+
+def _placed(
+    data: FitData, record: RecordData, guess: Floats, p: Floats, values: Mapping[str, float]
+) -> Floats:
+    """Return the best of the guess and the state at rest with limited states at several places of their ranges."""
+    own = record.parameters(p)
+    ranges = np.where(data.limited, data.state_sizes(own[:, None])[:, 0], 0.0)
+    at_rest = state_at_rest(data.structure, record.record, guess, values)
+    lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
+    with np.errstate(all="ignore"):
+        sets = np.repeat(own[:, None], lanes.shape[1], axis=1)
+        out = simulate_sets(data.structure, record.held, sets, lanes, record.record.n_samples, _SUBSTEPS)
+        errors = (record.measured[:, :, None] - out) * record.weights[:, None]
+        costs = np.nansum(errors**2, axis=(0, 1))
+    costs[~np.all(np.isfinite(out), axis=(0, 1))] = np.inf
+    return lanes[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else guess
 
 
 def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -> Floats:
@@ -74,7 +123,7 @@ def _fitted(
             out = simulate_sets(data.structure, beginning.held, sets, lanes, n_samples, _SUBSTEPS)
             first, against = weighted(beginning, out)
             left = np.column_stack([first, first[:, None] + against])
-        return np.vstack([np.nan_to_num(left, nan=1e9, posinf=1e9, neginf=-1e9), _PULL * places])
+        return np.vstack([np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST), _PULL * places])
 
     cost = np.inf
     for _ in range(_STEPS):

@@ -13,15 +13,28 @@ from rigsight.parameters import Parameter
 
 Floats = NDArray[np.float64]
 
-_SPREAD = 2.0
-"""Standard deviation of the starts in natural logarithms, nearly a decade: terms of an equation that matter differ by less."""
+_SPREADS = (1.5, 4.0)
+"""Standard deviations of the starts in natural logarithms, in turn: terms that matter as much as each other differ by less than a
+decade, what hardly matters or moves unseen by two."""
 _REACH = 16.0
 """How far a logarithm may go from where it is expected, seven decades; beyond lies nothing that records tell."""
+_TOLD = 1.0
+"""Change of all errors together, of size one each, that a step of one in a coordinate must make for the records to tell it."""
+_MARGIN = 1e-9
+_DEFAULT = 30.0
+"""Weight of a default beside the wish that a term is as large as others."""
+_BALANCINGS = 5
+_FARTHEST = 40.0
+"""Largest logarithm of any size, in SI units."""
+_WITHIN = 2.3
+"""How far inside its bounds a logarithm is expected, a decade."""
 _PULL = 0.02
 """Weight of the expected size beside one error of size one: it decides what records do not tell, and nothing else."""
-_SCREENED, _FOLLOWED, _AGREEING = 200, 10, 3
+_SCREENED, _FOLLOWED, AGREEING = 300, 12, 3
 """Starts of which the errors are computed, those from which a search goes on, and how many of these must lead to the lowest
 place for it to be taken as the lowest of all."""
+PERSISTENT = _FOLLOWED
+"""Number of agreeing searches for one that follows all its starts: where what was found does not explain the records."""
 _AS_LOW = 1.01
 """Ratio of two costs below which two ends are as low: along what records do not tell they differ in nothing else."""
 _MOST_EVALUATIONS = 60
@@ -53,6 +66,19 @@ class SearchSpace:
         own = np.where(self.logarithmic, sign * np.abs(self.expected) * np.exp(theta), self.expected * theta)
         return np.clip(own, [p.lower for p in self.parameters], [p.upper for p in self.parameters])
 
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Return the lowest and highest coordinates, shape (n_parameters,) each: bounds of parameters, and what is too far."""
+        sign = np.array([-1.0 if p.upper <= 0.0 else 1.0 for p in self.parameters])
+        ends = np.array([[p.lower, p.upper] for p in self.parameters]) / np.abs(self.expected)[:, None]
+        ends = np.sort(np.where(self.logarithmic, sign, 1.0)[:, None] * ends, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.where(self.logarithmic[:, None], np.log(np.maximum(ends, 0.0)), ends)
+        first = self.start()
+        low = np.clip(ends[:, 0], first - _REACH, first)
+        high = np.clip(ends[:, 1], first, first + _REACH)
+        # A start at a bound lies inside by as much as a search needs.
+        return low - _MARGIN, high + _MARGIN
+
     def start(self) -> Floats:
         """Return the coordinates of what is expected; a number that may have either sign is zero, or its default."""
         defaults = [p.default for p in self.parameters]
@@ -74,9 +100,13 @@ def balanced(
         For values of them each term's equation, size and powers of the parameters in it.
     """
     prior = np.array([np.log(abs(p.default)) if p.default else 0.0 for p in parameters])
+    # A default counts more than any other term; without one the size 1 only decides what no equation does.
+    weight = np.array([_DEFAULT if p.default else 1e-3 for p in parameters])
+    low = np.array([np.log(p.lower) + _WITHIN if p.lower > 0.0 else -np.inf for p in parameters])
+    high = np.array([np.log(p.upper) - _WITHIN if 0.0 < p.upper < np.inf else np.inf for p in parameters])
     logs = prior.copy()
-    # Sums of parameters have powers that depend on their sizes.
-    for _ in range(3):
+    # Sums of parameters have powers that depend on their sizes, and a bound moves others with it.
+    for _ in range(_BALANCINGS):
         found = [term for term in terms(np.exp(logs)) if term[1] > 0.0 and np.isfinite(term[1])]
         equations = sorted({equation for equation, _, _ in found})
         rows, right = [], []
@@ -85,22 +115,21 @@ def balanced(
             rows.append(np.concatenate([powers, middle]))
             right.append(float(powers @ logs) - np.log(size))
         n, n_all = len(parameters), len(parameters) + len(equations)
-        # A default is as good as any other term; without one the size 1 only decides what no equation does.
-        weight = np.array([1.0 if p.default else 1e-3 for p in parameters])
         rows += list(np.hstack([np.diag(weight), np.zeros((n, len(equations)))]))
         right += list(weight * prior)
         solved = np.linalg.lstsq(np.array(rows).reshape(-1, n_all), np.array(right), rcond=None)[0]
-        logs = np.clip(solved[:n], -30.0, 30.0)
-    expected = np.exp(logs)
-    low = np.array([p.lower if p.lower > 0.0 else 0.0 for p in parameters])
-    high = np.array([p.upper if p.upper > 0.0 else np.inf for p in parameters])
-    return SearchSpace(tuple(parameters), np.clip(expected, low, high))
+        logs = np.clip(solved[:n], -_FARTHEST, _FARTHEST)
+        beyond = (logs < low) | (logs > high)
+        prior = np.where(beyond, np.clip(logs, low, high), prior)
+        weight = np.where(beyond, 1.0, weight)
+    return SearchSpace(tuple(parameters), np.exp(np.maximum(np.minimum(logs, high), low)))
 
 
 def ends_of_search(
     space: SearchSpace,
     errors: Callable[[Floats], Floats],
     rng: np.random.Generator,
+    agreeing: int = AGREEING,
 ) -> list[tuple[float, Floats]]:
     """Return the local minima of a sum of squared errors that many starts lead to, lowest first: cost and parameter values.
 
@@ -112,15 +141,18 @@ def ends_of_search(
         Errors of size one where noise alone makes them, of parameter values.
     rng
         Source of the starts.
+    agreeing
+        How many searches must lead to the lowest place for it to be taken as the lowest of all.
     """
     first = space.start()
-    thetas = [first, *(first + _SPREAD * rng.standard_normal(first.size) for _ in range(_SCREENED))]
+    spreads = [_SPREADS[i % len(_SPREADS)] for i in range(_SCREENED)]
+    thetas = [first, *(first + spread * rng.standard_normal(first.size) for spread in spreads)]
     costs = [_cost(errors(space.values(theta))) for theta in thetas]
     found: list[tuple[float, Floats]] = []
     for index in np.argsort(costs)[:_FOLLOWED]:
         found.append(_descent(space, errors, thetas[index], first))
         lowest = min(cost for cost, _ in found)
-        if sum(cost <= _AS_LOW * lowest for cost, _ in found) >= _AGREEING:
+        if sum(cost <= _AS_LOW * lowest for cost, _ in found) >= agreeing:
             break
     ends: list[tuple[float, Floats]] = []
     for cost, theta in sorted(found, key=lambda end: end[0]):
@@ -135,17 +167,23 @@ def _descent(
     def pulled(theta: Floats) -> Floats:
         return np.concatenate([errors(space.values(theta)), _PULL * (theta - expected)])
 
-    low, high = expected - _REACH, expected + _REACH
+    bounds = space.bounds()
     found = least_squares(
         pulled,
-        np.clip(start, low + 1e-6, high - 1e-6),
-        bounds=(low, high),
+        np.clip(start, bounds[0] + 1e-10, bounds[1] - 1e-10),
+        bounds=bounds,
         x_scale=1.0,
         max_nfev=_MOST_EVALUATIONS,
         ftol=1e-4,
         xtol=1e-4,
     )
-    return float(np.sum(found.fun**2)), found.x
+    # A descent ends where nothing is gained; what records do not tell is then still where it began.
+    own = np.asarray(found.jac)[: -start.size]
+    _, sizes, directions = np.linalg.svd(own, full_matrices=False)
+    untold = directions[sizes < _TOLD]
+    back = np.clip(found.x - untold.T @ (untold @ (found.x - expected)), *bounds)
+    cost, cost_back = float(np.sum(found.fun**2)), float(np.sum(pulled(back) ** 2))
+    return (cost_back, back) if cost_back <= cost + _TOLD else (cost, found.x)
 
 
 def _cost(errors: Floats) -> float:
