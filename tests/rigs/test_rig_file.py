@@ -15,6 +15,14 @@ from rigsight.rigs.rig_file import rig_of_text
 TRAIN = rig_file_text("drive_train")
 
 
+def test_units_are_checked_although_the_same_rig_was_read_without() -> None:
+    wrong = changed('unit = "N m s/rad"', 'unit = "N m/rad"')
+    first = rig_of_text(wrong, check_units=False)
+    with pytest.raises(InputError, match=r"joints\.shaft\.damping"):
+        rig_of_text(wrong)
+    assert rig_of_text(wrong, check_units=False) is first
+
+
 @pytest.mark.parametrize("name", list(RIGS))
 def test_units_of_built_in_rigs_add_up(name: str) -> None:
     assert rig_of_text(rig_file_text(name), name).name == name

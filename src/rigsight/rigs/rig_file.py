@@ -86,6 +86,8 @@ def rig_of_tables(tables: Mapping[str, Any], source: str) -> Rig:
 
 _read: dict[str, Rig] = {}
 """Rigs by their declaration: the same one is the same object, whichever file holds it, so that its equations are made once."""
+_with_checked_units: set[str] = set()
+"""Declarations whose units are known to add up."""
 
 
 def _rig_of(
@@ -96,12 +98,14 @@ def _rig_of(
     except (TypeError, ValueError, RecursionError):
         # Dates, or what is no table at all: the reader says so.
         key = ""
-    if key not in _read:
-        rig = _checked(Declaration(dict(tables), places, source), check_units)
-        if not key:
-            return rig
-        _read[key] = rig
-    return _read[key]
+    if key in _read and (key in _with_checked_units or not check_units):
+        return _read[key]
+    rig = _checked(Declaration(dict(tables), places, source), check_units)
+    if not key:
+        return rig
+    if check_units:
+        _with_checked_units.add(key)
+    return _read.setdefault(key, rig)
 
 
 def _checked(declaration: Declaration, check_units: bool) -> Rig:
