@@ -205,7 +205,7 @@ def _frictions(
 
 def is_zero(expression: sp.Expr) -> bool:
     """Return True for an expression that vanishes at some place of no meaning; sympy would simplify for seconds."""
-    expression = expression.replace(absolute, sp.Abs)
+    expression = expression.replace(absolute, sp.Abs).replace(positive_part, lambda e: sp.Max(e, 0))
     symbols = sorted(expression.free_symbols, key=str)
     place = {symbol: sp.sqrt(sp.prime(5 + i)) / (3 + i % 7) for i, symbol in enumerate(symbols)}
     value = expression.evalf(_DIGITS, subs=place)
