@@ -141,9 +141,7 @@ PLANS: dict[str, _Plan] = {effect.name: _Plan("running_gear", (effect.name,)) fo
         "drive_train", ("coulomb_friction@motor_bearing", "coulomb_friction@load_bearing"),
         values={"coulomb_friction@motor_bearing.T_c": 0.01, "coulomb_friction@load_bearing.T_c": 0.02},
     ),
-    "friction between a wheel and a body": _Plan(
-        "quarter_car", ("coulomb_friction@suspension",), values={"T_c": 300.0}, amplitude=0.02
-    ),
+    "two masses with delays": _Plan("drive_train", ("input_delay@motor", "sensor_delay@motor_angle")),
     "a saturated control law": _Plan("servo", amplitude=1.5),
     "a control law behind lags": _Plan("servo", ("sensor_lag@angle", "actuator_lag@motor"), first=0.4, amplitude=0.5),
     "a mass matrix of coordinates": _Plan("two_link_arm", ("input_dead_zone@elbow_motor",), first=0.1, amplitude=0.3),

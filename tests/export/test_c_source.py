@@ -128,3 +128,12 @@ def test_a_delay_longer_than_the_history_is_told(case_named, tmp_path: Path):
     run = subprocess.run([program], input="0,0\n0.01,0\n", capture_output=True, text=True, check=False)
     assert run.returncode == 1
     assert "status 3" in run.stderr
+
+
+def test_a_start_that_friction_would_hold_is_refused_with_a_status_of_its_own(case_named, tmp_path: Path):
+    case = case_named("friction at two joints")
+    written(case, tmp_path)
+    program = compiled(tmp_path, "-DRIG_MAIN", "rig.c")
+    run = subprocess.run([program], input="0,0.2\n0.01,0.2\n", capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert "status 5" in run.stderr

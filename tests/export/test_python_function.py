@@ -11,6 +11,10 @@ import numpy as np
 import pytest
 
 from rigsight.export import export_model
+from rigsight.records import Record
+from rigsight.simulate import rest_state
+from rigsight.simulate import simulate as simulate_engine
+from rigsight.simulate.input_hold import hold_input
 
 SEVERAL = "friction at two joints"
 
@@ -81,3 +85,28 @@ def test_the_head_tells_source_equations_and_units(case_named):
 def test_unequal_times_are_refused(case_named):
     with pytest.raises(ValueError, match="equally spaced"):
         exported(case_named("linear axis"))["simulate"]([0.0, 1.0, 1.5], [0.0, 0.0, 0.0])
+
+
+def test_where_friction_holds_what_the_inputs_left_a_start_under_load_is_asked_for(case_named):
+    case = case_named("friction at a load")
+    simulate, structure = exported(case)["simulate"], case.model.structure
+    pushed = case.inputs[0] + 0.2
+    with pytest.raises(ValueError, match=r"known for inputs of zero alone.*initial_state"):
+        simulate(case.t, pushed)
+    start = [0.02, 0.005, 0.0, 0.0]
+    record = Record("pushed", case.t[1], {"u": pushed}, {"u": "A"}, hold=case.model.hold)
+    truth = simulate_engine(structure, case.model.values, record, np.array(start), accuracy=1e-9)
+    simulated = simulate(case.t, pushed, initial_state=start)
+    for name in case.outputs:
+        assert np.linalg.norm(simulated[name] - truth[name]) <= 1e-6 * np.linalg.norm(truth[name])
+
+
+def test_an_equilibrium_under_load_is_that_of_the_engine(case_named):
+    case = case_named("a saturated control law")
+    structure, first = case.model.structure, 0.3
+    p = np.array([case.model.values[name] for name in structure.names])
+    expected = rest_state(structure, p, hold_input(np.full(2, first), 1.0, "foh"))
+    module = exported(case)
+    assert module["_rest"](module["PARAMETERS"], [first]) == pytest.approx(
+        expected.tolist(), rel=1e-9, abs=1e-12
+    )

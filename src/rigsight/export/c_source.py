@@ -10,6 +10,7 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import Balance
+from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.kernel_equations import FUNCTIONS, KernelEquations
 from rigsight.simulate.kernel_source import accurate_integrator
 from rigsight.simulate.printing.c import C
@@ -83,6 +84,12 @@ static void rest(const parameters *given, const double *u, double *x) {{
 _REST_CALL = """    parameters numbers;
     if (p) numbers = *p; else {name}_defaults(&numbers);
     rest(&numbers, u, x);
+"""
+_BALANCE_CALL = """    parameters numbers;
+    int status;
+    if (p) numbers = *p; else {name}_defaults(&numbers);
+    status = rest(&numbers, u, x);
+    if (status != OK) return status;
 """
 _HELD = {
     "zoh": "    c.c[{i}][0] = u[{at}];",
@@ -178,7 +185,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     kernel = "\n".join(
         [equations.text("const parameters *p", list(names.values())), accurate_integrator(equations)]
     )
-    rest = _rest(exported, names)
+    rest = _rest(exported, names).replace("<<UPPER>>", upper)
     fragments = {
         "HEADER": "\n".join(
             f" * {line}".rstrip() for line in header_lines(exported, source, with_parameters=False)
@@ -212,7 +219,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
         "FUNCTIONS": _missing_functions(kernel, rest),
         "STANDING": "\n".join(f"    c.c[{i}][0] = u[{at}];" for i, at in enumerate(_places(exported))),
         "REST": rest,
-        "REST_CALL": _REST_CALL.format(name=name) if rest else "    (void)p; (void)u;\n",
+        "REST_CALL": _rest_call(exported).format(name=name),
         "DEFAULTS": "\n".join(
             f"    p->{q.name} = {value!r};"
             for q, value in zip(exported.parameters, exported.values, strict=True)
@@ -282,6 +289,12 @@ def _missing_functions(kernel: str, rest: str) -> str:
     return "".join(f"{text}\n" for text in lacking)
 
 
+def _rest_call(exported: Exported) -> str:
+    if exported.rest is None:
+        return "    (void)p; (void)u;\n"
+    return _BALANCE_CALL if isinstance(exported.rest, Balance) else _REST_CALL
+
+
 def _rest(exported: Exported, names: Mapping[sp.Symbol, str]) -> str:
     """Return the functions that find the equilibrium at the first inputs; nothing for a model without a state of its own."""
     rest = exported.rest
@@ -324,5 +337,11 @@ def _balance(exported: Exported, rest: Balance, parameters: Mapping[sp.Symbol, s
             "START": "\n".join(f"    {line}" for line in starts),
             "UNKNOWN": ", ".join(map(str, rest.unknown)),
             "N_UNKNOWN": len(rest.unknown),
+            "BALANCED": repr(BALANCED),
+            "VALUES": ", ".join(map(str, _places(exported))) or "0",
+            "ROOM_INPUTS": max(1, len(exported.inputs)),
+            "UNDER_INPUT": "    return <<UPPER>>_NO_START;"
+            if rest.remembers
+            else "    balance(p, u, x);\n    return OK;",
         },
     )

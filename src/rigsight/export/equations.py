@@ -234,7 +234,7 @@ def _state_units(structure: Structure) -> dict[sp.Symbol, str]:
 
 
 def _rest(structure: Structure, names: dict[str, str]) -> Rest | Balance | None:
-    if not structure.rig.has_one_motion:
+    if not structure.rig.has_one_motion or structure.rig.mechanism.initial:
         return balance(structure)
     motion = structure.rig.motion
     if motion.inertia is None:

@@ -6,8 +6,13 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from rigsight.effects.symbols import clamp
+from rigsight.simulate.kinks import freeze, is_zero
 from rigsight.simulate.linear_forms import slope
 from rigsight.simulate.structure import TIME, Structure, input_symbols
+
+NO_START = "with friction or hysteresis the start is known for inputs of zero alone: begin with these, or give initial_state"
+"""What a file says that is asked for another one."""
 
 
 @dataclass(frozen=True)
@@ -17,23 +22,26 @@ class Balance:
     Attributes
     ----------
     unknown
-        Indices of the states that are sought: all but the velocities.
+        Indices of the states that are sought: all but the velocities and those that the rig's file gives.
     residuals
-        Rates of all states but the coordinates, at rest.
+        For each of them what has to vanish at rest.
     slopes
-        Their derivatives by the unknown states, row by row.
+        Derivatives of the residuals by the unknown states, row by row.
     start
-        Expression of parameters at which the search starts, or that a velocity has, by index of the state; 0 where none is given.
+        Expression of parameters of each state that is given, by its index; the others start at 0.
+    remembers
+        True where friction or hysteresis holds what the way of the inputs left: then only that without input is known.
     """
 
     unknown: tuple[int, ...]
     residuals: tuple[sp.Expr, ...]
     slopes: tuple[tuple[sp.Expr, ...], ...]
     start: dict[int, sp.Expr]
+    remembers: bool
 
 
 def balance(structure: Structure) -> Balance | None:
-    """Return what is zero at the equilibrium of a rig; None where it has no state.
+    """Return what is zero at the equilibrium of a rig, as `rigsight.simulate.equilibrium` has it; None without a state.
 
     Parameters
     ----------
@@ -41,26 +49,53 @@ def balance(structure: Structure) -> Balance | None:
         Rig and effects.
     """
     motion, states = structure.tree.motion, structure.states
-    unknown = tuple(i for i, symbol in enumerate(states) if symbol not in motion.velocities)
-    if not unknown:
+    if not states:
         return None
-    still = dict.fromkeys((*motion.velocities, TIME), sp.Integer(0))
-    for index in range(len(structure.rig.inputs)):
-        still |= dict.fromkeys(input_symbols(index)[1:], sp.Integer(0))
-    residuals = tuple(
-        equation.rate.xreplace(still)
-        for equation in structure.equations
-        if equation.symbol not in motion.coordinates
-    )
     own = dict(zip(structure.names, structure.parameter_symbols, strict=True))
-    initial = structure.rig.mechanism.initial
+    start = {
+        states.index(symbol): value.xreplace({s: own[s.name] for s in value.free_symbols})
+        for symbol, value in structure.rig.mechanism.initial.items()
+        if symbol in states
+    }
+    n = len(motion.coordinates)
+    unknown = tuple(i for i in (*range(n), *range(2 * n, len(states))) if i not in start)
+    residuals = {i: _residual(structure, i, start) for i in unknown}
+    memories = [i for i in unknown if i >= n and _is_memory(structure, i)]
     return Balance(
         unknown,
-        residuals,
-        tuple(tuple(slope(residual, states[i]) for i in unknown) for residual in residuals),
-        {
-            states.index(symbol): value.xreplace({s: own[s.name] for s in value.free_symbols})
-            for symbol, value in initial.items()
-            if symbol in states
-        },
+        tuple(residuals.values()),
+        tuple(tuple(slope(residual, states[i]) for i in unknown) for residual in residuals.values()),
+        start,
+        bool(memories or freeze(structure).frictions),
     )
+
+
+def _at_rest(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
+    rising = [symbol for i in range(len(structure.rig.inputs)) for symbol in input_symbols(i)[1:]]
+    return dict.fromkeys((*rising, TIME), sp.S.Zero)
+
+
+def _still(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
+    return {**_at_rest(structure), **dict.fromkeys(structure.tree.motion.velocities, sp.S.Zero)}
+
+
+def _is_memory(structure: Structure, index: int) -> bool:
+    """Return True for a state that nothing moves at rest: it holds what the way to rest left."""
+    return is_zero(structure.equations[index].rate.xreplace(_still(structure)))
+
+
+def _residual(structure: Structure, index: int, start: dict[int, sp.Expr]) -> sp.Expr:
+    """Return what vanishes at rest: the acceleration of a coordinate, the rate of a state, or what a memory has of the way."""
+    motion = structure.tree.motion
+    n = len(motion.coordinates)
+    if index < n:
+        return structure.equations[n + index].rate.xreplace(_still(structure))
+    equation = structure.equations[index]
+    if not _is_memory(structure, index):
+        return equation.rate.xreplace(_still(structure))
+    gone = {
+        velocity: coordinate - start.get(i, sp.S.Zero)
+        for i, (coordinate, velocity) in enumerate(zip(motion.coordinates, motion.velocities, strict=True))
+    }
+    reached = start.get(index, sp.S.Zero) + equation.rate.xreplace({**_at_rest(structure), **gone})
+    return equation.symbol - (reached if equation.limit is None else clamp(reached, equation.limit))

@@ -9,10 +9,11 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
-from rigsight.export.equilibrium import Balance
+from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.precomputed import equations_of
 from rigsight.export.python_function import min_steps
+from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.matlab import MATLAB
 from rigsight.simulate.structure import TIME, input_symbols
 
@@ -374,6 +375,8 @@ def _balance(exported: Exported, rest: Balance) -> str:
             "START": "\n".join(starts),
             "UNKNOWN": ", ".join(str(i + 1) for i in rest.unknown),
             "N_UNKNOWN": n,
+            "BALANCED": repr(BALANCED),
+            "UNDER_INPUT": f"  error('{NO_START}');" if rest.remembers else "  x = balanced(p, first, x);",
             "N_STATES": len(exported.states),
         },
     )

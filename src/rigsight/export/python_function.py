@@ -9,10 +9,11 @@ import sympy as sp
 
 from rigsight.export.description import filled, header_lines, hold_text, indented
 from rigsight.export.equations import Exported
-from rigsight.export.equilibrium import Balance
+from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.internal_step import is_linear
 from rigsight.export.precomputed import equations_of
+from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.python import PYTHON
 from rigsight.simulate.structure import TIME, input_symbols
 
@@ -267,5 +268,9 @@ def _balance(exported: Exported, rest: Balance) -> str:
             "UNBALANCED": indented([*numbers, *unpacked_states(exported), *lines, result]),
             "START": indented([*(numbers if starts else ()), *starts]),
             "UNKNOWN": ", ".join(map(str, rest.unknown)),
+            "BALANCED": repr(BALANCED),
+            "UNDER_INPUT": f"        raise ValueError({NO_START!r})"
+            if rest.remembers
+            else "        x = _balanced(numbers, given, x)",
         },
     )
