@@ -136,8 +136,8 @@ def _of_view(view: LinearView) -> list[str]:
     if beside:
         told.append(
             f"The linearized equations leave more than noise explains{where}, as multiples of it: {', '.join(beside)}. Either "
-            "the motion is too large for one linear picture, or something is missing. The fit over time, which is not "
-            "linearized, tells which; 'rigsight diagnose' looks for what is missing."
+            "the motion is too large for one linear picture, or something is missing. The fit over time, which is not linear, "
+            "tells which; 'rigsight diagnose' looks for what is missing."
         )
     return told
 
