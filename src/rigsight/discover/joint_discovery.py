@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from rigsight.discover.regression import information_criterion
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import STRONG, independent_samples
 from rigsight.discover.task import Task
+from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start
@@ -36,6 +37,8 @@ _CONTRADICTED = 3.0
 """Factor over the least contradiction of the sensors at which a joint is ruled out: its law is not polished."""
 _FLOOR = 1.5
 """Noise floors from which on something is missing still."""
+_NO_WORSE = 1.05
+"""Factor of the held-out error up to which an equation with fewer terms is worth shortening further."""
 _VAGUE = 3.0
 """Standard errors below which a coefficient cannot be told from zero."""
 
@@ -91,7 +94,42 @@ def discover_at_joints(
             start = {**known, **force.parameters}
             found.append(polisher.polished(force.law.terms, start))
             say(", ".join(term.effect.name for term in force.law.terms))
+    found += _shorter(polisher, min(found, key=lambda one: one.excess), say)
     return _assembled(task, polisher, found, joints)
+
+
+def _shorter(polisher: _Polisher, best: _Polished, say: Callable[[str], None]) -> list[_Polished]:
+    """Polish equations with a term less, or with a special case of a term in its place, for as long as they are no worse."""
+    found: list[_Polished] = []
+    while best.terms:
+        values = {**best.fit.values}
+        tried = [polisher.polished(terms, values) for terms in _simpler(best) if terms]
+        found += tried
+        say("fewer terms")
+        good = [one for one in tried if one.excess <= _NO_WORSE * best.excess]
+        if not good:
+            break
+        best = min(good, key=lambda one: one.excess)
+    return found
+
+
+def _simpler(one: _Polished) -> list[tuple[LawTerm, ...]]:
+    fitted = [
+        replace(term, values={**term.values, **one.fit.structure.values_of(term.effect, one.fit.values)})
+        for term in one.terms
+    ]
+    found = [tuple(term for term in fitted if term is not out) for out in fitted]
+    for term in fitted:
+        for name in term.effect.parents:
+            parent = placed(effect_named(kind_of(name)), str(term.effect.at))
+            own = [p.name for p in parent.parameters]
+            taken = any(other.effect.name == parent.name for other in fitted)
+            if not taken and all(n in term.values for n in own):
+                values, units = {n: term.values[n] for n in own}, {n: term.units[n] for n in own}
+                found.append(
+                    tuple(LawTerm(parent, values, {}, units) if other is term else other for other in fitted)
+                )
+    return found
 
 
 class _Polisher:
@@ -142,6 +180,9 @@ def _assembled(
     ordered = sorted(found, key=criterion)
     close = [one for one in ordered if criterion(one) <= criterion(ordered[0]) + STRONG]
     chosen = min(close, key=lambda one: (len(one.fit.free), criterion(one)))
+    # The joint of the equation comes first, whatever the linearized responses say.
+    own_joints = {str(term.effect.at) for term in chosen.terms}
+    joints = tuple(sorted(joints, key=lambda force: force.joint not in own_joints))
     structure, values = chosen.fit.structure, chosen.fit.values
     constants = {p.name for p in rig.constants}
     numbers = {n: v for n, v in values.items() if n not in chosen.fit.free and n not in constants}

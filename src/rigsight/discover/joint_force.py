@@ -23,10 +23,12 @@ from rigsight.simulate import compose, simulate
 
 Floats = NDArray[np.float64]
 
-_ROUNDS = 2
-"""Rounds of law and motion for every joint."""
-_MORE_ROUNDS = 5
-"""Further rounds for the first of them, until it is settled."""
+_ROUNDS = 7
+"""Rounds of law and motion; numbers that were identified without the force are far off at first."""
+_FOR_ALL = 3
+"""Rounds for every joint; further ones are for those that are not ruled out."""
+_RULED_OUT = 3.0
+"""Factor over the least contradiction of the sensors (RMS) at which a joint is ruled out."""
 _SETTLED = 0.01
 """Relative change of parameters and coefficients from which another round changes nothing."""
 _LARGE = 98.0
@@ -177,14 +179,16 @@ def missing_forces(
     found = joint_motions(rig, records, values, noise)
     before = _free_run_square(rig, records, values, floors, found[0].followed)
     laws: dict[str, RegressedLaw] = {}
-    for _ in range(_ROUNDS):
-        found, _ = _improved(rig, found, records, noise, laws)
-    first = min(found, key=lambda one: laws[one.joint.name].criterion)
-    for _ in range(_MORE_ROUNDS):
-        (first,), change = _improved(rig, [first], records, noise, laws)
-        if change < _SETTLED:
-            break
-    found = tuple(first if one.joint is first.joint else one for one in found)
+    open_joints = found
+    for number in range(_ROUNDS):
+        open_joints, change = _improved(rig, open_joints, records, noise, laws)
+        found = tuple(next((new for new in open_joints if new.joint is old.joint), old) for old in found)
+        if number + 1 >= _FOR_ALL:
+            least = min(one.left for one in open_joints)
+            open_joints = tuple(one for one in open_joints if one.left <= _RULED_OUT**2 * least)
+            if change < _SETTLED:
+                break
+    first = min(open_joints, key=lambda one: laws[one.joint.name].criterion)
     n_measured = sum(
         int(np.count_nonzero(m.residual == m.residual)) for m in first.followed.linearized(records)
     )
@@ -199,7 +203,8 @@ def missing_forces(
         )
         for one in found
     ]
-    return tuple(sorted(forces, key=lambda force: force.criterion))
+    still_open = {one.joint.name for one in open_joints}
+    return tuple(sorted(forces, key=lambda force: (force.joint not in still_open, force.criterion)))
 
 
 def _improved(

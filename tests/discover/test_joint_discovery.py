@@ -1,0 +1,86 @@
+"""Does a discovery on a rig of several joints complete its equations at the right place, with honest numbers?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from rigsight.discover import Discovery, Task, discover
+from rigsight.effects import effect_named, placed
+from rigsight.errors import InputError
+from rigsight.plot import svg_text
+from rigsight.plot.discovery import discovery_figure
+from rigsight.records.record import Record
+from rigsight.report.discovery import discovery_rows
+from rigsight.rigs import Rig
+from rigsight.simulate import compose, simulate
+
+DT, SECONDS = 5e-3, 4.0
+T = DT * np.arange(round(SECONDS / DT))
+TRAIN = {"J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
+DAMPING = 1e-4
+Z_MAX = 4.5
+"""Standard errors by which an estimate may be off: one in 10^5 by chance."""
+
+
+def campaign(rig: Rig, values: Mapping[str, float]) -> Task:
+    structure = compose(rig, [placed(effect_named("quadratic_damping"), "motor_bearing")])
+    rng = np.random.default_rng(0)
+    runs = []
+    for i, (amplitude, role) in enumerate(((0.8, "estimation"), (1.5, "estimation"), (1.1, "validation"))):
+        u = amplitude * np.sin(i + 2.0 * np.pi * (0.5 * T + (0.8 if i < 2 else 0.5) * T**2))
+        runs.append(
+            simulate(
+                structure, values, Record(f"run {i}", DT, {"u": u}, {}, hold="foh", role=role), accuracy=1e-6
+            )  # type: ignore[arg-type]
+        )
+    noise = {s.name: 1e-3 * max(float(np.std(r[s.name])) for r in runs) for s in rig.outputs}
+    noisy = tuple(
+        r.with_signals(**{n: r[n] + rng.normal(scale=std, size=r.n_samples) for n, std in noise.items()})
+        for r in runs
+    )
+    return Task("train", rig, {"k_t": 0.05}, noisy, noise)
+
+
+@pytest.fixture(scope="module")
+def found(drive_train: Rig) -> Discovery:
+    return discover(campaign(drive_train, {**TRAIN, "k_t": 0.05, "c_2": DAMPING}))
+
+
+def test_the_law_stands_in_the_equations_at_its_joint(found: Discovery) -> None:
+    (term,) = found.kept
+    assert (term.name, term.where) == ("quadratic_damping", "motor_bearing")
+    assert term.inclusion > 0.9
+    assert any("c_2" in equation for equation in found.equations)
+    assert found.held_out_error < 1.1
+
+
+def test_its_numbers_are_as_far_off_as_they_say(found: Discovery) -> None:
+    numbers = {**found.rig_parameters, **found.kept[0].coefficients}
+    for name, value in {**TRAIN, "c_2": DAMPING}.items():
+        assert abs(numbers[name].value - value) < Z_MAX * numbers[name].std, name
+    assert numbers["c_2"].value == pytest.approx(DAMPING, rel=0.02)
+
+
+def test_results_say_where(found: Discovery) -> None:
+    content = json.loads(json.dumps(found.to_json()))
+    assert content["terms"][0]["where"] == "motor_bearing"
+    first, *others = content["joints"]
+    assert first["where"] == "motor_bearing"
+    assert {other["where"] for other in others} == {"shaft", "load_bearing"}
+    assert found.model["effects"] == ["quadratic_damping@motor_bearing"]
+    assert {run.output for run in found.runs} == {"motor_angle", "load_angle"}
+    subjects = [subject for subject, _ in discovery_rows(found)]
+    assert "quadratic_damping at motor_bearing" in subjects
+    assert "missing at motor_bearing" in subjects
+    assert "Missing at motor bearing" in svg_text(discovery_figure(found), "discovery.svg")
+
+
+@pytest.mark.parametrize(("method", "pointwise"), [("full", False), ("discrepancy", True)])
+def test_a_form_that_it_does_not_have_is_refused(drive_train: Rig, method: str, pointwise: bool) -> None:
+    task = Task("train", drive_train, {"k_t": 0.05}, (), {})
+    with pytest.raises(InputError, match="has several joints"):
+        discover(task, method, pointwise)  # type: ignore[arg-type]
