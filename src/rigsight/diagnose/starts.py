@@ -137,8 +137,9 @@ def _evaluated(
         canonical.time_size: sizes["time"],
     }
     inertia = joint.inertia if joint.inertia is not None else bench.rig.mechanism.inertia_along(joint.motion)
-    if inertia is not None and not inertia.free_symbols & _moving(bench.rig):
-        numbers[canonical.m] = evaluated(inertia, values)
+    if inertia is not None:
+        # Of an inertia that changes with the motion its size will do: that where all coordinates are zero.
+        numbers[canonical.m] = evaluated(inertia, {**dict.fromkeys(_moving(bench.rig), 0.0), **values})
     result = {}
     for name, formula in formulas.items():
         own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}
@@ -151,5 +152,5 @@ def _evaluated(
     return result
 
 
-def _moving(rig: Rig) -> set[sp.Symbol]:
-    return {coordinate.symbol for coordinate in rig.mechanism.coordinates}
+def _moving(rig: Rig) -> list[str]:
+    return [coordinate.name for coordinate in rig.mechanism.coordinates]
