@@ -113,6 +113,8 @@ class GreyBoxFit:
         self._problem: list[Any] = []
         if memory is not None:
             self._problem = [
+                # Bounds and start values stand in no equation.
+                dict(structure.rig.declaration),
                 [str(equation) for equation in (*structure.equations, *structure.outputs)],
                 list(structure.names),
                 sorted(self.scales.items()),

@@ -1,0 +1,46 @@
+"""A fit that was remembered serves again for the very same problem alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import rig_file_text
+from rigsight.rigs.rig_file import rig_of_text
+from rigsight.simulate import compose, simulate
+
+
+class Kept:
+    def __init__(self) -> None:
+        self.known: dict[str, Mapping[str, Any]] = {}
+        self.recalled = 0
+
+    def recall(self, key: str) -> Mapping[str, Any] | None:
+        self.recalled += key in self.known
+        return self.known.get(key)
+
+    def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
+        self.known[key] = outcome
+
+
+def test_a_rig_file_with_other_bounds_is_another_problem() -> None:
+    text = rig_file_text("axis").replace('name = "axis"', 'name = "stage"')
+    other = text.replace(
+        '[parameters.m]\nunit = "kg"\nlower = 1e-15', '[parameters.m]\nunit = "kg"\nlower = 1e-3'
+    )
+    assert other != text
+    values = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+    push = Record("push", 0.01, {"u": np.sin(np.linspace(0.0, 60.0, 300) ** 1.3)}, {})
+    memory = Kept()
+    for rig, recalled in ((rig_of_text(text), 0), (rig_of_text(text), 1), (rig_of_text(other), 1)):
+        structure = compose(rig)
+        record = simulate(structure, values, push)
+        fit = GreyBoxFit(
+            structure, [record], characteristic_scales(rig, [record], values), {"x": 1e-5}, memory=memory
+        )
+        fit.fit({**values, "m": 2.2}, ["m"])
+        assert memory.recalled == recalled
