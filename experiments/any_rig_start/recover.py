@@ -26,7 +26,7 @@ T = DT * np.arange(N)
 NOISE = 5e-3
 REACHED = 1.05
 HERE = Path(__file__).parent
-FILES = HERE.parents[1] / "tests" / "rigs" / "files"
+BUILT_IN = HERE.parents[1] / "src" / "rigsight" / "rigs" / "files"
 BAND = (0.3, 25.0)
 LARGEST_ANGLE = 100.0
 
@@ -45,16 +45,16 @@ class Case:
 
 
 CASES = {
-    "drive_train": Case(FILES / "drive_train.toml", {
+    "drive_train": Case(BUILT_IN / "drive_train.toml", {
         "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}),
-    "drive_train, second record without the load's angle": Case(FILES / "drive_train.toml", {
+    "drive_train, second record without the load's angle": Case(BUILT_IN / "drive_train.toml", {
         "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}, lacks="load_angle"),
-    "servo": Case(FILES / "servo.toml", {"J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.2}, 0.5, offset="angle_off"),
-    "cart_pendulum": Case(FILES / "cart_pendulum.toml", {
+    "servo": Case(BUILT_IN / "servo.toml", {"J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.2}, 0.5, offset="angle_off"),
+    "cart_pendulum": Case(BUILT_IN / "cart_pendulum.toml", {
         "m_c": 0.5, "m_p": 0.2, "s": 0.04, "I_p": 0.012, "k_u": 2.0, "d_c": 3.0, "d_p": 0.002}, 2.0),
-    "two_link_arm": Case(FILES / "two_link_arm.toml", {
+    "two_link_arm": Case(BUILT_IN / "two_link_arm.toml", {
         "I_1": 0.05, "I_2": 0.02, "m_2": 0.6, "s_1": 0.12, "s_2": 0.08, "d_1": 0.05, "d_2": 0.02}, 0.5),
-    "quarter_car": Case(FILES / "quarter_car.toml", {
+    "quarter_car": Case(BUILT_IN / "quarter_car.toml", {
         "m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 50.0}, 0.02),
     "hydraulic_lift": Case(HERE / "hydraulic_lift.toml", {
         "m": 20.0, "k": 1e4, "d": 200.0, "capacity": 1e-10, "leak": 1e-9}, 1e-4),

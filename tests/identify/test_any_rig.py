@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +12,12 @@ from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.first_states import first_state, state_at_rest
 from rigsight.records.record import Record
-from rigsight.rigs import RUNNING_GEAR, Rig, read_rig_file
+from rigsight.rigs import RIGS, RUNNING_GEAR, Rig
 from rigsight.rigs.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3
 T = DT * np.arange(2000)
-FILES = Path(__file__).parents[1] / "rigs" / "files"
 TRAIN = {"k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
 SERVO = {"m": 1.0, "l": 0.15, "k_p": 2.0, "J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.05}
 NOISE = 2e-3
@@ -50,7 +48,7 @@ unit = "rad"
 
 
 def rig_of(name: str) -> Rig:
-    return read_rig_file(FILES / f"{name}.toml")
+    return RIGS[name]
 
 
 def made(

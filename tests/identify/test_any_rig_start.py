@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from rigsight.identify import linear_start
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.weak_equations import WeakEquations
 from rigsight.records.record import Record
-from rigsight.rigs import Rig, read_rig_file
+from rigsight.rigs import RIGS, Rig
 from rigsight.rigs.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
@@ -22,7 +21,6 @@ DT = 5e-3
 T = DT * np.arange(2000)
 SHARE = 5e-3
 """Noise over the size of what is measured."""
-FILES = Path(__file__).parents[1] / "rigs" / "files"
 TRAIN = {"J_m": 1e-4, "J_l": 5e-4, "k_s": 2.0, "d_s": 1e-3, "d_m": 1e-3, "d_l": 1e-3, "k_l": 0.5}
 CAR = {"m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 100.0}
 SERVO = {"J": 0.02, "k_v": 3.0, "d": 0.2, "angle_off": 0.15}
@@ -58,7 +56,7 @@ unit = "rad"
 
 
 def rig_of(name: str) -> Rig:
-    return read_rig_file(FILES / f"{name}.toml")
+    return RIGS[name]
 
 
 def measured(

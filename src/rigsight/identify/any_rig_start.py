@@ -44,6 +44,8 @@ _TOLD = 1.0
 """Error that changing a parameter to its double must make, of size one for noise, for the records to tell it; else it is held."""
 _LONG_PIECES = 8
 """Pieces of a record that are long: free initial states make up for many a wrong number in shorter ones."""
+_GROWN = 2.0
+"""Ratio of the residuals of the whole and of long pieces up to which nothing is gained by a search elsewhere."""
 _MOST_PIECES = 16
 _MOST_SAMPLES = 10000
 """Samples of all records together that are simulated for a start."""
@@ -83,9 +85,13 @@ def any_rig_start(
     values = {**constants, **known}
     rough = _Rough(rig, records, values, [p.name for p in sought])
     best: FitResult | None = None
-    for is_close, start in _minima(rig, records, values, sought):
+    for is_weak, is_close, start in _minima(rig, records, values, sought):
         found = rough.whole(start)
         if is_close and not rough.explains(found):
+            if is_weak and rough.holds_at_any_length(found):
+                # Equations that agree with all states of the records, and errors that do not grow: the rig lacks something.
+                best = found
+                break
             pieces, whole = rough.lengthening(start)
             if pieces is not None and not rough.explains(whole):
                 # The motion is chaotic: no search finds values that a simulation of the whole could follow any better.
@@ -101,31 +107,33 @@ def any_rig_start(
 
 def _minima(
     rig: Rig, records: Sequence[Record], values: Mapping[str, float], sought: Sequence[Parameter]
-) -> Iterator[tuple[bool, dict[str, float]]]:
-    """Yield values from which simulations may start, and whether they are worth more than one look.
+) -> Iterator[tuple[bool, bool, dict[str, float]]]:
+    """Yield values from which simulations may start: whether the equations' own error led there, whether to look twice.
 
-    Those are the lowest of each error. They come from few searches first, from many if nothing explains the records.
+    That is where the lowest of an error is. They come from few searches first, from many if nothing explains the records.
     """
     equations, names = equations_of(rig), [p.name for p in sought]
     rng = np.random.default_rng(_SEED)
     weak = WeakEquations(equations, records, values, names)
     space = balanced(sought, weak.term_sizes)
 
-    def ends(errors: Callable[[Floats], Floats], agreeing: int) -> Iterator[tuple[bool, dict[str, float]]]:
+    def ends(
+        errors: Callable[[Floats], Floats], agreeing: int, is_weak: bool
+    ) -> Iterator[tuple[bool, bool, dict[str, float]]]:
         found = ends_of_search(space, errors, rng, agreeing)[:_LIKELY]
         for rank, (_, own) in enumerate(found):
             numbers = dict(zip(names, map(float, own), strict=True))
-            yield rank == 0 and agreeing != PERSISTENT, {**values, **numbers}
+            yield is_weak, rank == 0 and agreeing != PERSISTENT, {**values, **numbers}
 
     if weak.n_records:
-        yield from ends(weak.errors, AGREEING)
+        yield from ends(weak.errors, AGREEING, True)
     expected = {**values, **dict(zip(names, map(float, space.values(space.start())), strict=True))}
     middle = [rig_state(equations, record, expected, resting=record.n_samples) for record in records]
     linear = LinearizedResponses(equations, records, values, names, middle)
-    yield from ends(linear.errors, AGREEING)
-    yield from ends(linear.errors, PERSISTENT)
+    yield from ends(linear.errors, AGREEING, False)
+    yield from ends(linear.errors, PERSISTENT, False)
     if weak.n_records:
-        yield from ends(weak.errors, PERSISTENT)
+        yield from ends(weak.errors, PERSISTENT, True)
 
 
 class _Rough:
@@ -146,6 +154,14 @@ class _Rough:
     def whole(self, start: Mapping[str, float]) -> FitResult:
         """Fit the records as they are."""
         return self._fitted(1, start, scales_at_places(self._rig, self._records, start))
+
+    def holds_at_any_length(self, whole: FitResult) -> bool:
+        """Return True if a fit of the whole is not much worse than one of pieces, each with a state of its own."""
+        if not np.isfinite(whole.cost):
+            return False
+        scales = scales_at_places(self._rig, self._records, whole.values)
+        pieces = self._fitted(_LONG_PIECES, whole.values, scales)
+        return whole.cost / whole.n_samples <= _GROWN**2 * pieces.cost / max(1, pieces.n_samples)
 
     def lengthening(self, start: Mapping[str, float]) -> tuple[FitResult | None, FitResult]:
         """Fit pieces of the records, of double length each time, then the whole.
