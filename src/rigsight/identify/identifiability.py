@@ -29,7 +29,7 @@ POORLY_KNOWN = 0.5
 _NO_INFLUENCE = 100.0
 """Standard error over the value, with all other parameters known, from which a parameter is said to do nothing."""
 _TAKES_PART = 0.05
-"""Share of the largest influence from which a parameter takes part in a direction."""
+"""Share of the largest change, or influence, from which a parameter takes part in a direction."""
 _LARGEST_POWER = 3
 _STEP = 1.5
 """Factor of the step that tests a combination: far enough that a sum and a product part."""
@@ -373,7 +373,7 @@ def _undetermined(root: Floats) -> Floats:
 def _sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
     """Return the direction with the fewest members among those of a reduced row echelon form, and the indices of these.
 
-    What counts is what a member's part does to the outputs: a small number changes much, relatively, for a little of a large one.
+    A member changes much itself, or changes the outputs much: a small number takes a little of a large one with it.
     """
     rows = (free * influence[:, None]).T
     for place in range(rows.shape[0]):
@@ -383,9 +383,16 @@ def _sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]
         rows[place] /= rows[place, column]
         others = np.arange(rows.shape[0]) != place
         rows[others] -= np.outer(rows[others, column], rows[place])
-    members = [np.flatnonzero(np.abs(row) >= _TAKES_PART * np.max(np.abs(row))) for row in rows]
+    directions = rows / influence
+    members = [
+        np.flatnonzero(
+            (np.abs(row) >= _TAKES_PART * np.max(np.abs(row)))
+            | (np.abs(direction) >= _TAKES_PART * np.max(np.abs(direction)))
+        )
+        for row, direction in zip(rows, directions, strict=True)
+    ]
     best = min(range(len(members)), key=lambda i: members[i].size)
-    return np.asarray(rows[best] / influence), members[best]
+    return directions[best], members[best]
 
 
 def _small_fraction(ratio: float) -> Fraction | None:
