@@ -328,3 +328,17 @@ def test_a_method_for_one_input_is_refused() -> None:
     campaign = make_campaign(rig, [recorded("one", rig, TRAIN, {"u": multisine(rng, 0.3, 200.0)}, rng)])
     with pytest.raises(InputError, match="Allowed: 'local_polynomial', 'local_rational'"):
         identify_campaign(campaign, checked_wishes("h1", None))
+
+
+def test_poles_are_those_of_the_place_that_the_records_show(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = DECAY.replace('"-m*g*l*cos(phi)"', '"m*g*l*cos(phi)"')
+    (tmp_path / "swing.toml").write_text(text, "utf-8")
+    rig, rng = read_rig_file(tmp_path / "swing.toml"), np.random.default_rng(8)
+    truth = {"g": 9.81, "m": 1.0, "l": 0.7, "c": 0.2}
+    # Counted from above: the start that the file declares, zero, is where no pendulum stays.
+    records = [recorded("decay", rig, truth, {}, rng, start=np.array([2.7, 0.0]))]
+    (view,) = identified(rig, records, {}, truth, monkeypatch).views
+    assert view.linearization.stability == "stable"
+    assert view.linearization.at_state[0] == pytest.approx(np.pi)

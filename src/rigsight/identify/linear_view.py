@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.frequency import ResponsesOfInputs, responses_of_inputs
+from rigsight.identify.first_states import rig_state
 from rigsight.identify.identifiability import POORLY_KNOWN
 from rigsight.identify.information import Information
 from rigsight.identify.record_response import Method
+from rigsight.identify.rig_equations import equations_of
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
@@ -123,6 +125,38 @@ def by_constants(records: Sequence[Record]) -> list[list[Record]]:
     return list(groups.values())
 
 
+def near_rest(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> Linearization:
+    """Return the linearization about the equilibrium under the mean inputs next to the mean of what sensors show.
+
+    Where records lie next to different ones it is that to which the rig comes back best: it stays at no other by itself.
+
+    Parameters
+    ----------
+    structure
+        The rig without effects.
+    values
+        Value of every parameter.
+    records
+        Where the rig was.
+
+    Raises
+    ------
+    SimulationError
+        If the equations have no slope there.
+    """
+    inputs = {
+        signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
+    }
+    equations = equations_of(structure.rig)
+    found = [
+        linearize(
+            structure, values, inputs, near=rig_state(equations, record, values, resting=record.n_samples)
+        )
+        for record in records
+    ]
+    return min(found, key=lambda linear: float(np.max(linear.poles.real, initial=-np.inf)))
+
+
 def linear_view(
     structure: Structure,
     values: Mapping[str, float],
@@ -151,14 +185,13 @@ def linear_view(
         If the equations have no slope there.
     """
     constants = dict(records[0].constants)
-    inputs = {
-        signal.name: _mean([record[signal.name] for record in records]) for signal in structure.rig.inputs
-    }
+    found = near_rest(structure, {**values, **constants}, records)
+    inputs = dict(zip(found.inputs, map(float, found.at_inputs), strict=True))
 
     def at(moved: Mapping[str, float]) -> Linearization:
-        return linearize(structure, {**values, **constants, **moved}, inputs)
+        return linearize(structure, {**values, **constants, **moved}, inputs, near=found.at_state)
 
-    found, neighbors = at({}), list(_neighbors(known, at))
+    neighbors = list(_neighbors(known, at))
     model = {}
     for (source, response), curve in (measured.found if measured is not None else {}).items():
         column, row = found.inputs.index(source), found.outputs.index(response)

@@ -157,8 +157,9 @@ def linearize(
     values: Mapping[str, float],
     inputs: Mapping[str, float] | None = None,
     state: Floats | None = None,
+    near: Floats | None = None,
 ) -> Linearization:
-    """Return the linear system close to the equilibrium under constant inputs that is nearest to the start that the rig declares.
+    """Return the linear system close to an equilibrium under constant inputs.
 
     Parameters
     ----------
@@ -170,6 +171,8 @@ def linearize(
         Constant value of each input; those left out are zero.
     state
         Where to linearize instead, shape (n_states,).
+    near
+        Of several equilibria that next to this state is taken, shape (n_states,); by default to the start that the rig declares.
 
     Raises
     ------
@@ -181,7 +184,7 @@ def linearize(
     p = parameter_vector(structure, values)
     functions = slope_functions(structure)
     if state is None:
-        at_state = functions.resting(declared_start(structure, p), at_inputs, p)
+        at_state = functions.resting(declared_start(structure, p) if near is None else near, at_inputs, p)
     else:
         at_state = np.asarray(state, dtype=np.float64)
     try:

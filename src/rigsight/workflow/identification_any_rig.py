@@ -21,14 +21,14 @@ from rigsight.identify.identification import (
     RecordIdentification,
 )
 from rigsight.identify.information import Information, information
-from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses
+from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
 from rigsight.identify.physical import PhysicalEstimates
 from rigsight.identify.record_identification import Wishes, input_peak
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate import Structure, compose
-from rigsight.simulate.linearization import Linearization, linearize
+from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign import Campaign
 from rigsight.workflow.identification_joint import fit_any_rig_jointly, parent
@@ -172,21 +172,21 @@ def _window_length(
 ) -> float | None:
     """Return how long a free run may be [s]; None where every record may be run as a whole."""
     try:
-        near_rest = linearize(structure, values)
+        linear = near_rest(structure, values, records)
     except SimulationError:
         return None
-    if near_rest.stability == "unstable":
-        growth = float(np.max(near_rest.poles.real))
+    if linear.stability == "unstable":
+        growth = float(np.max(linear.poles.real))
         return min(window_length(structure.rig, records), _GROWTHS / growth)
-    return window_length(structure.rig, records) if _drifts_in_sight(near_rest, records) else None
+    return window_length(structure.rig, records) if _drifts_in_sight(linear, records) else None
 
 
-def _drifts_in_sight(near_rest: Linearization, records: Sequence[Record]) -> bool:
+def _drifts_in_sight(linear: Linearization, records: Sequence[Record]) -> bool:
     """Return True if what nothing holds shows in a sensor: of a shaft without a spring the angle drifts, the speed does not."""
-    seen = [name for name in near_rest.outputs if any(name in record for record in records)]
-    return near_rest.stability == "drifts" and any(
-        np.any(near_rest.transfer_function(source, response).poles == 0.0)
-        for source in near_rest.inputs
+    seen = [name for name in linear.outputs if any(name in record for record in records)]
+    return linear.stability == "drifts" and any(
+        np.any(linear.transfer_function(source, response).poles == 0.0)
+        for source in linear.inputs
         for response in seen
     )
 
