@@ -11,6 +11,10 @@ from rigsight.identify.symmetric_eigen import symmetric_eigen
 
 _DEPENDENT = 1e-14
 """Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
+_MARGIN = 3.0
+"""By how much an error of the derivatives is multiplied before a direction that stands out of it is believed."""
+_MIXED = 30.0
+"""The same for the part that a coordinate takes in such a direction: errors of the derivatives mix it with the nearest others."""
 _TAKES_PART = 1e-9
 SMOOTHED = 15
 """Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
@@ -21,6 +25,7 @@ def colored_covariance(
     sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
     n_common: int,
     n_outputs: Sequence[int] | None = None,
+    derivative_error: float = 0.0,
 ) -> NDArray[np.float64]:
     """Return the covariance of the common coordinates, allowing for colored residuals.
 
@@ -37,6 +42,8 @@ def colored_covariance(
         Number of common coordinates.
     n_outputs
         Per record how many outputs of equal length stand one after the other in its residuals; by default one.
+    derivative_error
+        Relative error of the derivatives: dependent columns differ by as much.
 
     Returns
     -------
@@ -58,10 +65,13 @@ def colored_covariance(
         first += n_own
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
         filling[np.ix_(columns, columns)] += _spectral_product(residual, derivative, count)
-    return sandwich_covariance(bread, filling)[:n_common, :n_common]
+    covariance = sandwich_covariance(bread, filling, derivative_error)
+    return np.asarray(covariance[:n_common, :n_common])
 
 
-def sandwich_covariance(bread: NDArray[np.float64], filling: NDArray[np.float64]) -> NDArray[np.float64]:
+def sandwich_covariance(
+    bread: NDArray[np.float64], filling: NDArray[np.float64], derivative_error: float = 0.0
+) -> NDArray[np.float64]:
     """Return ``bread^-1 filling bread^-1`` with infinite variances of coordinates that the bread does not determine.
 
     Parameters
@@ -70,6 +80,8 @@ def sandwich_covariance(bread: NDArray[np.float64], filling: NDArray[np.float64]
         J^T J of the weighted residuals, shape (n, n).
     filling
         Covariance of J^T r, shape (n, n); the bread itself where the residuals are independent with variance 1.
+    derivative_error
+        Relative error of the derivatives in the bread.
 
     Returns
     -------
@@ -80,12 +92,14 @@ def sandwich_covariance(bread: NDArray[np.float64], filling: NDArray[np.float64]
     size = np.sqrt(np.diag(bread))
     size[size == 0.0] = 1.0
     eigenvalues, vectors = symmetric_eigen(bread / np.outer(size, size))
-    seen = eigenvalues > _DEPENDENT * max(float(eigenvalues[-1]), 1e-300)
+    dependent = max(_DEPENDENT, (_MARGIN * derivative_error) ** 2)
+    seen = eigenvalues > dependent * max(float(eigenvalues[-1]), 1e-300)
     known = vectors[:, seen]
     inverse = (known / eigenvalues[seen]) @ known.T
     covariance = inverse @ (filling / np.outer(size, size)) @ inverse / np.outer(size, size)
     # A coordinate that takes part in an unseen direction may be anything, however well its share in the seen ones is known.
-    undetermined = np.sum(vectors[:, ~seen] ** 2, axis=1) > _TAKES_PART
+    takes_part = max(_TAKES_PART, (_MIXED * derivative_error) ** 2)
+    undetermined = np.sum(vectors[:, ~seen] ** 2, axis=1) > takes_part
     covariance[undetermined, :] = 0.0
     covariance[:, undetermined] = 0.0
     covariance[undetermined, undetermined] = np.inf

@@ -77,6 +77,9 @@ class Problem:
         self.upper = upper
         has_events = bool(np.any(data.limited)) or differs_at_events(data.structure)
         self.steps = np.full(upper.size, STEP if has_events else FINE_STEP)
+        self.derivative_error = (
+            0.0 if carries_tangents(data.structure) else float(np.max(self.steps, initial=0.0))
+        )
         self.n_free = len(coordinates.free)
         self.n_evaluations = 0
         self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
