@@ -14,6 +14,7 @@ from scipy.optimize import lsq_linear
 
 from rigsight import rigs
 from rigsight.effects import effect_named, placed
+from rigsight.errors import InputError
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.simulate import (
@@ -235,8 +236,22 @@ def test_sets_side_by_side_come_nearer_with_more_substeps(train: Rig, levels: di
         np.testing.assert_array_equal(found[:, 0], alone)
         return float(np.max(np.abs(found[:, 0] - exact)) / np.ptp(exact))
 
-    assert error(1) < 2e-3
-    assert error(32) < 2e-6
+    assert error(1) < 2e-4
+    assert error(16) < 1e-8
+
+
+@pytest.mark.parametrize("levels", [TWO, THREE], ids=["bearings", "bearings and shaft"])
+def test_a_fit_sees_no_jumps_as_joints_let_go(train: Rig, levels: dict[str, float]) -> None:
+    """A joint lets go when it must, not at the next substep: differences by a level are as steady as a derivative."""
+    structure, values = with_friction(train, levels, TRAIN)
+    changed = next(name for name in values if name.endswith("T_c"))
+    steps = 1e-4 * np.arange(-4, 5)
+    sets = [{**values, changed: values[changed] * (1.0 + step)} for step in steps]
+    p = np.column_stack([parameter_vector(structure, own) for own in sets])
+    held = record_input(structure, driven({"u": CURRENT}))
+    found = simulate_sets(structure, held, p, np.zeros((4, steps.size)), N, 1)[:, 0]
+    slopes = np.diff(found, axis=1) / np.diff(steps)
+    assert np.max(np.ptp(slopes, axis=1)) < 1e-2 * np.max(np.abs(slopes))
 
 
 def test_what_holds_joints_at_rest_moves_nothing(train: Rig) -> None:
@@ -260,6 +275,15 @@ def test_a_record_starts_where_frictions_hold_a_slow_rise(
     found = simulate(*with_friction(train, TWO, TRAIN), driven({"u": np.full(N, u)}))
     for name, angle in zip(("motor_angle", "load_angle"), angles, strict=True):
         np.testing.assert_allclose(found[name], angle, rtol=1e-9, atol=1e-15)
+
+
+def test_more_frictions_than_can_be_tried_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "train.toml"
+    joints = "".join(f'[joints.j{i}]\nmotion = "phi_m + {i + 2}*phi_l"\n' for i in range(9))
+    path.write_text((FILES / "drive_train.toml").read_text("utf-8") + joints, "utf-8")
+    structure, values = with_friction(read_rig_file(path), {f"j{i}": 0.01 for i in range(9)}, TRAIN)
+    with pytest.raises(InputError, match="dry friction at 9 motions; at most 8"):
+        simulate(structure, values, driven({"u": CURRENT}), np.zeros(4))
 
 
 def test_a_sensor_shows_the_force_that_friction_holds_with(tmp_path: Path) -> None:
