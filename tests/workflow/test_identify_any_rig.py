@@ -342,3 +342,43 @@ def test_poles_are_those_of_the_place_that_the_records_show(
     (view,) = identified(rig, records, {}, truth, monkeypatch).views
     assert view.linearization.stability == "stable"
     assert view.linearization.at_state[0] == pytest.approx(np.pi)
+
+
+def test_a_sensor_that_nobody_recorded_is_named_if_it_would_help(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = STAGE.replace(
+        "[coordinates.position]", '[parameters.span]\nunit = "1"\nlog = true\n[coordinates.position]'
+    )
+    text = text.replace('reads = "position"', 'reads = "span*position"')
+    for name, sensor in (("laser", "position"), ("tachometer", "span*d(position)")):
+        unit = "m" if name == "laser" else "m/s"
+        text += f'[sensors.{name}]\nreads = "{sensor}"\nunit = "{unit}"\n'
+    (tmp_path / "stage.toml").write_text(text, "utf-8")
+    rig, rng = read_rig_file(tmp_path / "stage.toml"), np.random.default_rng(9)
+    truth = {"force_constant": 12.0, "carriage": 0.8, "friction": 3.0, "leaf": 400.0, "span": 1.1}
+    whole = recorded("sweep", rig, truth, {"current": linear_sweep(T, 0.5, 2.0, 60.0)}, rng)
+    kept = {name: whole[name] for name in ("current", "scale")}
+    told = identified(rig, [replace(whole, signals=kept)], {}, truth, monkeypatch).identifiability
+    assert told is not None
+    assert told.determined == ()
+    # The tachometer scales as the scale does.
+    assert told.remedies == ("With 'laser' recorded as well these inputs would determine all parameters.",)
+    assert told.sentence.endswith(told.remedies[0])
+
+
+def test_a_servo_is_identified_without_any_start_values() -> None:
+    rng, rig = np.random.default_rng(10), RIGS["servo"]
+    records = [
+        recorded(str(size), rig, SERVO, {"goal": multisine(rng, size, 40.0)}, rng) for size in (0.05, 0.1)
+    ]
+    found = identify_campaign(make_campaign(rig, records), checked_wishes("local_rational", None))
+    fit = found.joint.fit.fit
+    for parameter in rig.parameters:
+        error = fit.standard_errors[parameter.name]
+        assert (
+            abs(fit.values[parameter.name] - SERVO[parameter.name])
+            < 4.0 * error
+            < 0.1 * SERVO[parameter.name]
+        )
+    assert found.changing == ()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
+_LARGEST_POWER = 3
 ONE = 0.03
 """Distance from one at which a factor of two numbers with the same unit is left out, and from a small fraction a power is one."""
 
@@ -35,6 +37,13 @@ def sum_text(first: str, weight: float, second: str, same_unit: bool) -> str:
     """
     factor = "" if same_unit and abs(abs(weight) - 1.0) < ONE else f"{abs(weight):.3g} "
     return f"{first} {'-' if weight < 0.0 else '+'} {factor}{second}"
+
+
+def small_fraction(ratio: float) -> Fraction | None:
+    """Return the fraction of small numbers that a ratio is, None where it is none; a step along it then decides."""
+    nearest = Fraction(ratio).limit_denominator(_LARGEST_POWER)
+    close = nearest != 0 and abs(float(nearest) - ratio) <= ONE * abs(ratio)
+    return nearest if close and abs(nearest.numerator) <= _LARGEST_POWER else None
 
 
 def listed(names: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ a finite step along it leaves the outputs as they are: derivatives at one place 
 References
 ----------
 T. J. Rothenberg, Econometrica 39 (1971) 577, for local identifiability. R. N. Gutenkunst et al., PLoS Comput. Biol. 3 (2007)
-e189, for the eigenvalues in relative units.
+e189, for eigenvalues in relative units.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.identify.combination_text import ONE, listed, percent, product_text, sum_text
+from rigsight.identify.combination_text import listed, percent, product_text, small_fraction, sum_text
 from rigsight.identify.information import Information
 
 Floats = NDArray[np.float64]
@@ -30,7 +30,6 @@ _NO_INFLUENCE = 100.0
 """Standard error over the value, with all other parameters known, from which a parameter is said to do nothing."""
 _TAKES_PART = 0.05
 """Share of the largest change, or influence, from which a parameter takes part in a direction."""
-_LARGEST_POWER = 3
 _STEP = 1.5
 """Factor of the step that tests a combination: far enough that a sum and a product part."""
 _ROUNDING = 1e-9
@@ -81,6 +80,8 @@ class Identifiability:
         What they do not determine, a sentence each.
     free_directions
         How many independent changes of parameters leave the outputs within the noise.
+    remedies
+        What would determine more, a sentence each.
     """
 
     relative_errors: dict[str, float]
@@ -88,6 +89,7 @@ class Identifiability:
     combinations: tuple[Combination, ...]
     statements: tuple[str, ...]
     free_directions: int
+    remedies: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -100,9 +102,8 @@ class Identifiability:
             error = percent(self.relative_errors[worst])
             return f"The records determine all parameters; the least certain is {worst} ({error})."
         known = f"The records determine {listed(self.determined)}." if self.determined else ""
-        return " ".join(
-            filter(None, [known or "The records determine no parameter by itself.", *self.statements])
-        )
+        first = known or "The records determine no parameter by itself."
+        return " ".join([first, *self.statements, *self.remedies])
 
 
 def identifiability(found: Information) -> Identifiability:
@@ -120,8 +121,13 @@ def identifiability(found: Information) -> Identifiability:
         determined=tuple(name for name, error in errors.items() if error < POORLY_KNOWN),
         combinations=tuple(search.combinations()),
         statements=statements,
-        free_directions=_undetermined(found.root).shape[1],
+        free_directions=free_directions(found),
     )
+
+
+def free_directions(found: Information) -> int:
+    """Return how many independent relative changes of parameters leave the outputs within the noise."""
+    return int(_undetermined(found.root).shape[1])
 
 
 def relative_errors(found: Information) -> dict[str, float]:
@@ -242,7 +248,7 @@ class _Search:
         name = f"{first.text} and {second.text}"
         # A number that may be zero is no factor.
         plain = all(quantity.size == quantity.value for quantity in (first, second))
-        power = _small_fraction(along_second / along_first) if plain and along_first else None
+        power = small_fraction(along_second / along_first) if plain and along_first else None
         change = self._change([first, second], [along_first, along_second], power is not None)
         if power is not None and change <= _UNCHANGED:
             a, b = power.numerator, -power.denominator
@@ -269,7 +275,7 @@ class _Search:
         direction, taking_part = _sparsest(free, np.linalg.norm(self._root(), axis=0))
         members = [self._quantities[i] for i in taking_part]
         along = [float(entry) for entry in direction[taking_part] / np.max(np.abs(direction))]
-        powers = [p for entry in along if (p := _small_fraction(entry)) is not None]
+        powers = [p for entry in along if (p := small_fraction(entry)) is not None]
         if (
             len(powers) == len(members)
             and self._change(members, list(map(float, powers)), True) <= _UNCHANGED
@@ -393,9 +399,3 @@ def _sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]
     ]
     best = min(range(len(members)), key=lambda i: members[i].size)
     return directions[best], members[best]
-
-
-def _small_fraction(ratio: float) -> Fraction | None:
-    nearest = Fraction(ratio).limit_denominator(_LARGEST_POWER)
-    close = nearest != 0 and abs(float(nearest) - ratio) <= ONE * abs(ratio)
-    return nearest if close and abs(nearest.numerator) <= _LARGEST_POWER else None

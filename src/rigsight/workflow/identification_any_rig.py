@@ -13,6 +13,7 @@ from rigsight.diagnose.windows import cut, window_length
 from rigsight.errors import SimulationError, check_option
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
 from rigsight.identify.amplitude_dependence import amplitude_dependence
+from rigsight.identify.helpful_sensors import helpful_sensors
 from rigsight.identify.identifiability import POORLY_KNOWN, identifiability, relative_errors
 from rigsight.identify.identification import (
     Identification,
@@ -94,7 +95,12 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
     units = {p.name: p.unit for p in structure.parameters}
     units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
     statement, changing = amplitude_dependence(found, units, units.get(found[0].source, ""))
-    told = None if known is None else identifiability(known)
+    told = None
+    if known is not None:
+        fit, windows = joint.fit, cut(records, length)
+        scales = characteristic_scales(rig, windows, fit.fit.values)
+        remedies = helpful_sensors(structure, windows, scales, fit.noise, fit.fit)
+        told = replace(identifiability(known), remedies=remedies)
     identification = Identification(
         title=campaign.title,
         rig=rig.name,

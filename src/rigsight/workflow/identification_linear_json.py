@@ -41,6 +41,7 @@ def identifiability_json(found: Identifiability) -> dict[str, Any]:
         ],
         "not_determined": list(found.statements),
         "free_directions": found.free_directions,
+        "would_help": list(found.remedies),
     }
 
 

@@ -1,0 +1,63 @@
+"""Which sensors of the rig that nobody recorded would tell parameters apart? Asked of the fitted model itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rigsight.errors import SimulationError
+from rigsight.identify.fit_result import FitResult
+from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.identifiability import free_directions
+from rigsight.identify.information import information
+from rigsight.records.record import Record
+from rigsight.simulate import Structure, record_values, simulate
+
+_NOISE = 0.01
+"""Noise of a sensor that nobody has seen, over the RMS of what it would show: an assumption, of no good sensor."""
+
+
+def helpful_sensors(
+    structure: Structure,
+    records: Sequence[Record],
+    scales: Mapping[str, float],
+    noise: Mapping[str, float],
+    result: FitResult,
+) -> tuple[str, ...]:
+    """Return a sentence for each sensor in no record that would leave fewer directions of the parameters free.
+
+    Parameters
+    ----------
+    structure
+        The rig.
+    records
+        What was fitted.
+    scales, noise
+        As the fit had them.
+    result
+        The fit.
+    """
+    lacking = [s.name for s in structure.rig.outputs if not any(s.name in record for record in records)]
+    before = free_directions(information(GreyBoxFit(structure, records, scales, noise), result))
+    if not lacking or not before:
+        return ()
+    try:
+        shown = [
+            simulate(structure, record_values(structure, result.values, record), record, state)
+            for record, state in zip(records, result.initial_states, strict=True)
+        ]
+    except SimulationError:
+        return ()
+    told = []
+    for name in lacking:
+        with_it = [record.with_signals(**{name: s[name]}) for record, s in zip(records, shown, strict=True)]
+        size = float(np.std(np.concatenate([s[name] for s in shown])))
+        if size == 0.0:
+            continue
+        fit = GreyBoxFit(structure, with_it, scales, {**noise, name: _NOISE * size})
+        left = free_directions(information(fit, result))
+        if left < before:
+            much = "all parameters" if left == 0 else "more of them"
+            told.append(f"With '{name}' recorded as well these inputs would determine {much}.")
+    return tuple(told)
