@@ -62,9 +62,10 @@ def equation_lines(exported: Exported) -> list[str]:
 def _as_shown(exported: Exported) -> list[str]:
     """Return the equations as people are shown them: solved for the accelerations nobody would read them."""
     shown, own = shown_equations(exported.structure), exported.names()
-    names = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()} | own
-    for state in exported.structure.states:
-        names[rate_symbol(state)] = f"{own[state]}'"
+    names = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()}
+    names |= {rate_symbol(state): f"{own[state]}'" for state in exported.structure.states}
+    # The rate of a coordinate is a state itself, and has the name of one.
+    names |= own
     return [text_equation(equation, names) for equation in shown.equations]
 
 
