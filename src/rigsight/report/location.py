@@ -71,10 +71,23 @@ def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
     for number, output in enumerate(diagnosis.gap, start=1):
         figures = _figures(diagnosis, output, f"where-{number}")
         if figures:
-            maps.append(
-                OutputMaps(f"where-{number}", sentence_case(output_label(diagnosis, output)), figures)
-            )
+            label = output_label(diagnosis, output)
+            # A bare name of a column is written as it is.
+            title = label if label == output else sentence_case(label)
+            maps.append(OutputMaps(f"where-{number}", title, figures))
     return maps
+
+
+def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return each place of a rig that has several, the share of the gap that a push there takes away, and when it was looked at."""
+    return [
+        (
+            place.name,
+            percent(place.share),
+            "first" if place.looked_at else "only if the others explain too little",
+        )
+        for place in diagnosis.places
+    ]
 
 
 def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
