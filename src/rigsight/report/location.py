@@ -79,7 +79,7 @@ def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
 
 
 def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return each place of a rig that has several, the share of the gap that a push there takes away, and when it was looked at."""
+    """Return each place of a rig that has several, what share of the gap a push there takes away, and when it was looked at."""
     return [
         (
             place.name,
