@@ -87,7 +87,7 @@ def any_rig_start(
     best: FitResult | None = None
     for is_weak, is_close, start in _minima(rig, records, values, sought):
         found = rough.whole(start)
-        if is_close and not rough.explains(found):
+        if is_close and np.isfinite(found.cost) and not rough.explains(found):
             if is_weak and rough.holds_at_any_length(found):
                 # Equations that agree with all states of the records, and errors that do not grow: the rig lacks something.
                 best = found
