@@ -226,10 +226,11 @@ def check_all_used(declaration: Declaration) -> None:
             if name not in read:
                 declaration.refuse((key, name), f"no equation reads '{name}'; take it out, or use it")
     for name in table.drives:
-        if name not in expressions["drives", name, "force"].reads:
+        # The force may follow from a state that the drive moves: a current, a pressure.
+        if not any(name in e.reads for path, e in expressions.items() if path != ("drives", name, "signal")):
             declaration.refuse(
                 ("drives", name, "force"),
-                f"it does not read '{name}', the signal of its drive behind the effects; write '{name}' in it",
+                f"neither it nor another equation reads '{name}', the signal of its drive behind the effects; write '{name}' in it",
             )
     for name in table.alternatives:
         if name not in expressions["alternatives", name, "value"].reads:
