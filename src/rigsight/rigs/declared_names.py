@@ -230,7 +230,7 @@ def check_all_used(declaration: Declaration) -> None:
         if not any(name in e.reads for path, e in expressions.items() if path != ("drives", name, "signal")):
             declaration.refuse(
                 ("drives", name, "force"),
-                f"neither it nor another equation reads '{name}', the signal of its drive behind the effects; write '{name}' in it",
+                f"neither it nor another equation reads '{name}', the drive's signal behind the effects; write '{name}' in it",
             )
     for name in table.alternatives:
         if name not in expressions["alternatives", name, "value"].reads:
