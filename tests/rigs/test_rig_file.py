@@ -98,7 +98,7 @@ WRONG = {
     ),
     "log of zero": (changed("lower = 1e-9", "lower = 0.0"), "line 15, column 9.*above 0, got 0"),
     "default": (changed("lower = 0.0", "lower = 0.0\ndefault = -1.0"), "-1 is not within"),
-    "drive without its signal": (changed('"k_t*motor"', '"k_t*u"'), "does not read 'motor'"),
+    "drive without its signal": (changed('"k_t*motor"', '"k_t*u"'), "nor another equation reads 'motor'"),
     "number in quotes": (changed("default = 0.05", 'default = "0.05"'), "line 11, column 11.*got '0.05'"),
     "function as a name": (changed("[inputs.u]", "[inputs.sin]"), "'sin' is a function"),
     "rate of a number": (
