@@ -10,7 +10,7 @@ from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.errors import SimulationError
 from rigsight.records.record import Record
-from rigsight.simulate import record_input, simulate_outputs
+from rigsight.simulate import parameter_vector, record_input, record_values, simulate_outputs
 
 PREDICTABLE = 3.0
 """Growth of a disturbance, beside what it does to the linear rig, up to which free run is a fair test; an assumption."""
@@ -74,7 +74,7 @@ def _change(
 ) -> float:
     """Return the RMS change of an output that a disturbance beside the input makes."""
     structure = model.fit.structure
-    p = np.array([model.fit.values[name] for name in structure.names])
+    p = parameter_vector(structure, record_values(structure, model.fit.values, record))
     calm, disturbed = (
         simulate_outputs(
             structure,
