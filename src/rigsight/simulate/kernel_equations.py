@@ -109,6 +109,9 @@ class KernelEquations:
             "VELOCITY": (structure.velocity_index or 0) if single is None else single.velocity,
             "HAS_DELAY": int(structure.delay is not None),
             "N_LATE": len(structure.histories),
+            "READS_LATE_RATE": int(
+                any(slope.free_symbols & set(self._late_rates) for slope in self._groups["switch_slopes"])
+            ),
             "SIGNALS": function_body(
                 ("now", "x", "q", "w"), elements("w", n_late), self._groups["signals"], names
             ),
