@@ -191,8 +191,10 @@ def outcome_like() -> Callable[..., Outcome]:
     def like(**changes: Any) -> Outcome:
         content: dict[str, Any] = {
             "design": "small", "seed": 1, "trial": "000", "fingerprint": "", "version": "1.0",
-            "kind": "single", "effects": ("backlash",), "rig": "axis", "noise": "low", "gap": 12.0, "tier": "clear",
-            "verdict": "effect", "named": ("backlash",), "right": True, "right_within_set": True, "place_right": True,
+            "kind": "single", "effects": ("backlash",), "places": ("dynamics",),
+            "rig": "axis", "noise": "low", "gap": 12.0, "tier": "clear",
+            "verdict": "effect", "named": ("backlash",), "named_places": ("dynamics",), "right": True, "effect_right": True,
+            "right_within_set": True, "place_right": True, "looked_at": None,
             "probability": 0.9, "stated": 0.9, "held_out": 1.02,
             "withheld": (WithheldError("withheld_1", "step", 0.85, 3000, 1.02),),
             "parameters": (ParameterError("g", "backlash", -0.5), ParameterError("k", "rig", 1.5)),
@@ -209,7 +211,8 @@ def wrong_outcome(outcome_like: Callable[..., Outcome]) -> Callable[..., Outcome
 
     def like(**changes: Any) -> Outcome:
         content: dict[str, Any] = {
-            "named": ("free_play",), "right": False, "right_within_set": False, "probability": 0.2, "stated": 0.75,
+            "named": ("free_play",), "right": False, "effect_right": False, "right_within_set": False,
+            "probability": 0.2, "stated": 0.75,
             "parameters": (),
         }  # fmt: skip
         return outcome_like(**(content | changes))

@@ -37,6 +37,24 @@ def diagnosis(
     }
 
 
+def placed_key(*effects: tuple[str, str]) -> dict[str, Any]:
+    names, places = [name for name, _ in effects], tuple(place for _, place in effects)
+    truth = key("pair" if len(effects) > 1 else "single", *names, where=places)
+    return truth | {"schema_version": 2, "rig": "drive_train", "values": {"load_bearing.T_c": 1e-3}}
+
+
+def placed_diagnosis(*effects: tuple[str, str], looked_at: tuple[str, ...] = ("shaft",)) -> dict[str, Any]:
+    names, places = [name for name, _ in effects], [place for _, place in effects]
+    return diagnosis("effect", *names) | {
+        "where": places,
+        "candidates": [{"effects": names, "where": places, "probability": 0.9, "parameters": {}}],
+        "gap_by_place": [
+            {"place": place, "share": 0.5, "looked_at": place in looked_at}
+            for place in ("shaft", "load_bearing", "motor", "load_angle")
+        ],
+    }
+
+
 ESTIMATES = {
     "g": {"value": 1.2e-3, "std": 1e-4, "unit": "rad"},
     "k_c": {"value": 79.0, "std": 2.0, "unit": "N m/rad"},
@@ -126,3 +144,50 @@ def test_the_numbers_of_a_control_are_the_rigs() -> None:
     errors = held(key("none"), diagnosis("none")).parameters
     assert all(isinstance(e, ParameterError) and e.of == "rig" for e in errors)
     assert len(errors) == 2
+
+
+FRICTION, AT_THE_MOTOR = ("coulomb_friction", "load_bearing"), ("coulomb_friction", "motor_bearing")
+PLAY = ("backlash", "shaft")
+
+
+@pytest.mark.parametrize(
+    ("truth", "found", "right", "effect_right", "place_right"),
+    [
+        ((FRICTION,), (FRICTION,), True, True, True),
+        ((FRICTION,), (AT_THE_MOTOR,), False, True, False),
+        ((FRICTION,), (("stribeck_friction", "load_bearing"),), False, False, True),
+        ((FRICTION, PLAY), (PLAY, FRICTION), True, True, True),
+        ((FRICTION, PLAY), (("coulomb_friction", "shaft"), ("backlash", "load_bearing")), False, True, True),
+        ((FRICTION, AT_THE_MOTOR), (FRICTION,), False, False, False),
+    ],
+)
+def test_an_effect_is_right_at_its_own_place_alone(
+    truth: tuple[tuple[str, str], ...],
+    found: tuple[tuple[str, str], ...],
+    right: bool,
+    effect_right: bool,
+    place_right: bool,
+) -> None:
+    got = held(placed_key(*truth), placed_diagnosis(*found))
+    assert (got.right, got.effect_right, got.place_right) == (right, effect_right, place_right)
+    assert got.probability == (pytest.approx(0.9) if right else 0.0)
+    assert sorted(zip(got.effects, got.places, strict=True)) == sorted(truth)
+
+
+def test_the_true_place_was_looked_at_if_it_was_chosen_or_tried_in_the_end() -> None:
+    chosen = held(placed_key(FRICTION), placed_diagnosis(PLAY, looked_at=("load_bearing",)))
+    tried = held(placed_key(FRICTION), placed_diagnosis(FRICTION, looked_at=("shaft",)))
+    missed = held(placed_key(FRICTION), placed_diagnosis(PLAY, looked_at=("shaft",)))
+    assert (chosen.looked_at, tried.looked_at, missed.looked_at) == (True, True, False)
+
+
+def test_where_there_was_nothing_to_choose_no_place_counts_as_looked_at() -> None:
+    assert held(key("single", "backlash"), diagnosis("effect", "backlash")).looked_at is None
+
+
+def test_the_truth_among_what_cannot_be_told_apart_is_at_its_place() -> None:
+    found = placed_diagnosis(AT_THE_MOTOR)
+    alike = found | {"ambiguous_with": [["coulomb_friction@load_bearing"]]}
+    elsewhere = found | {"ambiguous_with": [["coulomb_friction@shaft"]]}
+    assert held(placed_key(FRICTION), alike).right_within_set
+    assert not held(placed_key(FRICTION), elsewhere).right_within_set

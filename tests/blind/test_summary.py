@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from rigsight.blind import Outcome, ParameterError, WithheldError, summary
-from rigsight.blind.summary import confusion, held_out, pairs, parameters, reliability
+from rigsight.blind.summary import WRONG_PLACE, confusion, held_out, pairs, parameters, reliability
 
 Like = Callable[..., Outcome]
 
@@ -53,8 +53,23 @@ def test_a_pair_is_named_whole_in_part_or_not(
     outcome_like: Like, named: tuple[str, ...], verdict: str, what: str
 ) -> None:
     pair = ("backlash", "input_delay")
-    found = outcome_like(kind="pair", effects=pair, named=named, verdict=verdict, right=named == pair)
+    right = named == pair
+    found = outcome_like(
+        kind="pair", effects=pair, named=named, verdict=verdict, right=right, effect_right=right
+    )
     assert pairs([found]) == {what: 1}
+
+
+def test_the_right_effects_at_a_wrong_place_are_a_verdict_of_their_own(wrong_outcome: Like) -> None:
+    single = wrong_outcome(named=("backlash",), effect_right=True, looked_at=True)
+    pair = wrong_outcome(
+        kind="pair", effects=("backlash", "input_delay"), named=("backlash", "input_delay"), effect_right=True
+    )
+    assert confusion([single])["backlash"] == {WRONG_PLACE: 1}
+    assert pairs([pair]) == {WRONG_PLACE: 1}
+    figures = summary([single, pair])["by"]["rig"]["axis"]
+    assert (figures["right"]["count"], figures["effect_right"]["count"]) == (0, 2)
+    assert (figures["looked_at"]["count"], figures["looked_at"]["total"]) == (1, 1)
 
 
 def test_withheld_records_are_grouped_by_kind_and_amplitude(outcome_like: Like) -> None:

@@ -214,6 +214,45 @@ def test_a_key_that_is_no_key_is_told(lab: ExternalBench, text: str, words: list
         assert word in str(told.value)
 
 
+TRAIN = """
+[rig]
+model = "drive_train"
+[[records]]
+file = "score.csv"
+"""
+
+
+def test_on_a_rig_with_several_places_a_key_says_that_of_each_effect(lab: ExternalBench) -> None:
+    (lab.campaign(NAME) / "campaign.toml").write_text(TRAIN, encoding="utf-8")
+    twice = ["coulomb_friction", "coulomb_friction"]
+    there = ["load_bearing", "motor_bearing"]
+    write_key(
+        lab, kind="pair", effects=twice, where=there, parameters={"coulomb_friction@load_bearing.T_c": 1e-3}
+    )
+    key = lab.read_key(NAME)
+    assert (key["effects"], key["where"], key["schema_version"]) == (twice, there, 2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, ["where", "several places", "1 of", "shaft"]),
+        ({"where": ["motor"]}, ["where", "'motor'", "shaft"]),
+        ({"where": ["shaft", "motor_bearing"]}, ["where", "several places"]),
+        ({"where": ["motor_bearing"]}, ["cubic_stiffness@motor_bearing", "makes no sense"]),
+        ({"kind": "pair", "effects": ["backlash"] * 2, "where": ["shaft"] * 2}, ["exactly two"]),
+    ],
+)
+def test_a_place_at_which_an_effect_cannot_be_is_told(
+    lab: ExternalBench, changes: dict[str, Any], words: list[str]
+) -> None:
+    (lab.campaign(NAME) / "campaign.toml").write_text(TRAIN, encoding="utf-8")
+    write_key(lab, **changes)
+    with pytest.raises(InputError) as told:
+        lab.read_key(NAME)
+    assert all(word in str(told.value) for word in words)
+
+
 def test_folders_that_cannot_be_a_bench_are_told(lab: ExternalBench) -> None:
     with pytest.raises(InputError, match=r"no folder.*--campaigns"):
         replace(lab, campaigns=lab.path / "gone").names()

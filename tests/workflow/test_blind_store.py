@@ -25,7 +25,8 @@ import json, sys
 from pathlib import Path
 from rigsight.blind import Outcome
 from rigsight.workflow.blind_store import TrialStore
-content = json.loads(sys.argv[2]) | {{"effects": ("backlash",), "named": (), "withheld": (), "parameters": ()}}
+lists = {{"places": (), "named": (), "named_places": (), "withheld": (), "parameters": ()}}
+content = json.loads(sys.argv[2]) | {{"effects": ("backlash",)}} | lists
 with TrialStore(Path(sys.argv[1])) as store:
     done = store.scored()
     for number in range({total}):

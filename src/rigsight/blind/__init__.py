@@ -1,14 +1,15 @@
 """Rigs whose effect is withheld: drawn, simulated by an integrator of their own, and scored by a key."""
 
+from rigsight.blind.designs import Design as Design
+from rigsight.blind.designs import draw_trial as draw_trial
+from rigsight.blind.designs import n_trials as n_trials
 from rigsight.blind.draw import Trial as Trial
-from rigsight.blind.draw import draw_trial as draw_trial
 from rigsight.blind.outside import OUTSIDE as OUTSIDE
 from rigsight.blind.parameter_errors import ParameterError as ParameterError
 from rigsight.blind.plant import Plant as Plant
 from rigsight.blind.score import Outcome as Outcome
 from rigsight.blind.score import WithheldError as WithheldError
 from rigsight.blind.score import outcome as outcome
-from rigsight.blind.subjects import Design as Design
-from rigsight.blind.subjects import n_trials as n_trials
+from rigsight.blind.score import rig_of as rig_of
 from rigsight.blind.subjects import subject_of as subject_of
 from rigsight.blind.summary import summary as summary

@@ -33,11 +33,11 @@ class LinearRig:
     Attributes
     ----------
     rig
-        Running gear or axis.
+        The rig.
     values
         Constants and parameters by name.
     omega
-        Natural frequency [rad/s].
+        Lowest natural frequency [rad/s]; 0 where nothing vibrates.
     """
 
     rig: Rig

@@ -15,9 +15,9 @@ from rigsight.blind.campaign import DT, Experiment, LinearRig, draw_experiments,
 from rigsight.blind.plant import Plant
 from rigsight.blind.strength import draw_shape, scaled, strength_for
 from rigsight.blind.subjects import (
+    NOISE_SIZES,
     TIERS,
-    Design,
-    Noise,
+    CatalogueDesign,
     Subject,
     hidden_effects,
     needs_running_gear,
@@ -32,8 +32,6 @@ from rigsight.rigs import RUNNING_GEAR, evaluated
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 
-_NOISE: dict[Noise, float] = {"low": 5e-4, "high": 2e-3}
-"""Sensor noise in units of the size of the displacement."""
 _REST_TIME = 2.0
 """Time before each record [s] during which the plant is left to the disturbance alone."""
 _SPACING = 0.02
@@ -74,7 +72,7 @@ class Trial:
     key: dict[str, Any]
 
 
-def draw_trial(design: Design, seed: int, trial: int) -> Trial:
+def draw_trial(design: CatalogueDesign, seed: int, trial: int) -> Trial:
     """Draw and measure one trial.
 
     Parameters
@@ -99,7 +97,7 @@ def draw_trial(design: Design, seed: int, trial: int) -> Trial:
     raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reason}")
 
 
-def _drawn(design: Design, seed: int, trial: int, attempt: int) -> Trial:
+def _drawn(design: CatalogueDesign, seed: int, trial: int, attempt: int) -> Trial:
     subject = subject_of(design, seed, trial)
     streams = [np.random.default_rng(s) for s in np.random.SeedSequence([seed, trial, attempt]).spawn(6)]
     of_rig, of_effect, of_strength, of_noise, of_disturbance, of_given = streams
@@ -110,7 +108,7 @@ def _drawn(design: Design, seed: int, trial: int, attempt: int) -> Trial:
         swings_wide="gravity_pendulum" in subject.effects,
     )
     experiments = draw_experiments(linear, of_rig)
-    bench = _Bench(linear, experiments, _NOISE[subject.noise] * math.exp(of_noise.uniform(-0.2, 0.2)))
+    bench = _Bench(linear, experiments, NOISE_SIZES[subject.noise] * math.exp(of_noise.uniform(-0.2, 0.2)))
     wished = None if subject.tier is None else math.exp(of_strength.uniform(*np.log(TIERS[subject.tier])))
     values, strengths = bench.truth(effects, wished, of_effect)
     records = bench.measure(effects, values, of_noise, of_disturbance)

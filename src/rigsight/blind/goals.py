@@ -61,6 +61,10 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "singles_place_right": share_of(
             [o for o in singles if o.place_right is not None], lambda o: bool(o.place_right)
         ),
+        "singles_effect_right": share_of(singles, lambda o: o.effect_right),
+        "looked_at": share_of(
+            [o for o in (*singles, *pairs) if o.looked_at is not None], lambda o: bool(o.looked_at)
+        ),
         "pairs_right": share_of(pairs, lambda o: o.right),
         "pairs_right_within_set": share_of(pairs, lambda o: o.right_within_set),
         "controls_right": share_of(controls, lambda o: o.right),

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.effects import effect_named
-from rigsight.rigs import RIGS
+from rigsight.effects import effect_named, kind_of, placed
+from rigsight.rigs import Rig
 from rigsight.simulate import compose
 
 OF_RIG = "rig"
@@ -34,8 +34,8 @@ class ParameterError:
 
 
 def parameter_errors(
-    rig: str,
-    effects: Sequence[str],
+    rig: Rig,
+    effects: Sequence[tuple[str, str]],
     estimates: Mapping[str, Mapping[str, Any]],
     truth: Mapping[str, float],
 ) -> tuple[ParameterError, ...]:
@@ -46,18 +46,24 @@ def parameter_errors(
     Parameters
     ----------
     rig
-        Name of the rig.
+        The rig.
     effects
-        The effects that were hidden and named, all of the catalogue.
+        The effects that were hidden and named, all of the catalogue, each with its place; "" where the rig has one for it.
     estimates
         By parameter: ``value`` and ``std``, which is None where the records do not determine it.
     truth
         True values by parameter [SI].
     """
-    named = [effect_named(name) for name in effects]
-    structure = compose(RIGS[rig], named)
+    several = not rig.has_one_motion
+    named = [
+        placed(effect_named(name), place) if place and several else effect_named(name)
+        for name, place in effects
+    ]
+    structure = compose(rig, named)
     owners = {
-        structure.parameter_name(effect, p.name): effect.name for effect in named for p in effect.parameters
+        structure.parameter_name(effect, p.name): kind_of(effect.name)
+        for effect in named
+        for p in effect.parameters
     }
     found = []
     for name, estimate in estimates.items():

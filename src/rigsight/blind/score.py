@@ -9,7 +9,12 @@ from typing import Any
 
 from rigsight.blind.parameter_errors import ParameterError, parameter_errors
 from rigsight.blind.subjects import TIERS
+from rigsight.effects import AT
+from rigsight.errors import InputError
+from rigsight.rigs import Rig, declared_rig
 
+_BY_PLACE = 2
+"""Schema of keys from which on `where` holds the place of each effect; before, it was the set of places."""
 FAILED = "failed"
 """Verdict of a diagnosis that ended with an error."""
 BELOW = "below"
@@ -52,20 +57,26 @@ class Outcome:
         Of the files of a campaign written by somebody else and of its key; empty where design, seed and number say all.
     version
         The rigsight that scored it.
-    kind, effects, rig, noise
-        From the key: kind of subject, hidden effects, rig, noise level.
+    kind, effects, places, rig, noise
+        From the key: kind of subject, hidden effects, the place of each (empty where the key does not say it effect by effect),
+        rig, noise level.
     gap
         What the re-identified equations leave on validation records, in units of the true noise floor; None if not known.
     tier
         Strength by that gap; "below" where it is smaller than the faintest, "" where nothing is hidden.
-    verdict, named
-        Verdict and named effects; verdict "failed" where the diagnosis ended with an error.
+    verdict, named, named_places
+        Verdict, named effects, and the place of each; verdict "failed" where the diagnosis ended with an error.
     right
-        The verdict is the truth: the very effects, or none, parameters, and unknown for an effect from outside.
+        The verdict is the truth: the very effects, each at its place, or none, or parameters, or unknown for an effect from
+        outside.
+    effect_right
+        The same, wherever the diagnosis puts the effects.
     right_within_set
         Right, or the truth is among those that the diagnosis cannot tell from what it names.
     place_right
         The places named are those of the hidden effects; None where nothing is hidden or the key does not say where.
+    looked_at
+        All these places are among those at which the diagnosis tried effects; None as above, and where it did not have to choose.
     probability
         On the truth; for an effect from outside, what is left beside all candidates.
     stated
@@ -90,15 +101,19 @@ class Outcome:
     version: str
     kind: str
     effects: tuple[str, ...]
+    places: tuple[str, ...]
     rig: str
     noise: str
     gap: float | None
     tier: str
     verdict: str
     named: tuple[str, ...]
+    named_places: tuple[str, ...]
     right: bool
+    effect_right: bool
     right_within_set: bool
     place_right: bool | None
+    looked_at: bool | None
     probability: float
     stated: float
     held_out: float | None
@@ -145,12 +160,14 @@ def outcome(
         "candidates": [],
     }
     kind = str(key["kind"])
-    truth, named = frozenset(key["effects"]), frozenset(found["effects"])
+    by_place = key.get("schema_version", 1) >= _BY_PLACE
+    truth, named = _at_places(key, by_place), _at_places(found, by_place)
     verdict = str(found["verdict"])
     expected = {"none": "none", "parameters": "parameters", "outside": "unknown"}.get(kind, "effect")
     right = verdict == expected and (expected != "effect" or named == truth)
-    within = expected == "effect" and truth in [frozenset(rival) for rival in found["ambiguous_with"]]
-    candidates = {frozenset(c["effects"]): float(c["probability"] or 0.0) for c in found["candidates"]}
+    effect_right = verdict == expected and (expected != "effect" or _kinds(named) == _kinds(truth))
+    within = expected == "effect" and _is_among(truth, found["ambiguous_with"])
+    candidates = {_at_places(c, by_place): float(c["probability"] or 0.0) for c in found["candidates"]}
     left = max(0.0, 1.0 - sum(candidates.values()))
     probability = left if kind == "outside" else candidates.get(truth, 0.0)
     stated = left if verdict == "unknown" else candidates.get(named, 0.0)
@@ -165,16 +182,20 @@ def outcome(
         fingerprint=str(key.get("fingerprint", "")),
         version=version,
         kind=kind,
-        effects=tuple(sorted(truth)),
+        effects=_kinds(truth),
+        places=_places(truth),
         rig=str(key["rig"]),
         noise=str(key["noise"]),
         gap=gap,
         tier=_tier(gap) if truth else "",
         verdict=verdict,
-        named=tuple(sorted(named)),
+        named=_kinds(named),
+        named_places=_places(named),
         right=right,
+        effect_right=effect_right,
         right_within_set=right or within,
         place_right=frozenset(found["where"]) == frozenset(key["where"]) if hides_a_place else None,
+        looked_at=_looked_at(key, found) if hides_a_place else None,
         probability=probability,
         stated=stated,
         held_out=_over_all(withheld),
@@ -183,6 +204,50 @@ def outcome(
         seconds=seconds,
         message=message,
     )
+
+
+def rig_of(key: Mapping[str, Any]) -> Rig:
+    """Return the rig of a key: the one that it declares, else the built-in one of its name."""
+    rig = declared_rig(str(key["rig"]), key.get("declaration") or {})
+    if rig is None:
+        raise InputError(
+            f"The key of trial {key['trial']} names the rig {key['rig']} and does not declare it."
+        )
+    return rig
+
+
+def _at_places(said: Mapping[str, Any], by_place: bool) -> frozenset[tuple[str, str]]:
+    """Return effects with their places; with none where the key does not say them effect by effect."""
+    effects = [str(name) for name in said["effects"]]
+    places = (
+        said["where"] if by_place and len(said.get("where") or ()) == len(effects) else [""] * len(effects)
+    )
+    return frozenset(zip(effects, places, strict=True))
+
+
+def _kinds(effects: frozenset[tuple[str, str]]) -> tuple[str, ...]:
+    return tuple(name for name, _ in sorted(effects))
+
+
+def _places(effects: frozenset[tuple[str, str]]) -> tuple[str, ...]:
+    return tuple(place for _, place in sorted(effects) if place)
+
+
+def _is_among(truth: frozenset[tuple[str, str]], rivals: Sequence[Sequence[str]]) -> bool:
+    """Return True if the truth is one of the sets of names; a rig with several places has them in its names."""
+    plain = frozenset(name for name, _ in truth)
+    named = frozenset(f"{name}{AT}{place}" for name, place in truth)
+    return any(frozenset(rival) in (plain, named) for rival in rivals)
+
+
+def _looked_at(key: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:
+    """Return whether all true places are among those that were chosen, or the truth is among what was tried in the end."""
+    places = found.get("gap_by_place") or []
+    if not places:
+        return None
+    chosen = {place["place"] for place in places if place["looked_at"]}
+    tried = {place for candidate in found["candidates"] for place in candidate.get("where", ())}
+    return frozenset(key["where"]) <= chosen | tried
 
 
 def _tier(gap: float | None) -> str:
@@ -201,8 +266,9 @@ def _over_all(withheld: Sequence[WithheldError]) -> float | None:
 
 
 def _parameter_errors(key: Mapping[str, Any], found: Mapping[str, Any]) -> tuple[ParameterError, ...]:
-    effects = sorted(key["effects"])
-    named = next((c for c in found["candidates"] if sorted(c["effects"]) == effects), None)
+    by_place = key.get("schema_version", 1) >= _BY_PLACE
+    truth = _at_places(key, by_place)
+    named = next((c for c in found["candidates"] if _at_places(c, by_place) == truth), None)
     if named is None:
         return ()
-    return parameter_errors(str(key["rig"]), effects, named["parameters"], key["values"])
+    return parameter_errors(rig_of(key), sorted(truth), named["parameters"], key["values"])

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rigsight.effects import Effect
+from rigsight.effects import Effect, placed_dimension
 from rigsight.errors import SimulationError
 from rigsight.units import characteristic_value
 
@@ -33,7 +33,7 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
         spread = math.exp(rng.uniform(-0.4, 0.4))
         if p.starts and p.fitted:
             start = p.starts[int(rng.integers(len(p.starts)))]
-            shape[p.name] = start * characteristic_value(p.dimension, scales) * spread
+            shape[p.name] = start * _unit(effect, p.dimension, scales) * spread
         else:
             assert p.default is not None
             shape[p.name] = p.default
@@ -46,7 +46,7 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
             )
     for pair in effect.searched_as:
         dimension = next(p.dimension for p in effect.parameters if p.name == pair.first)
-        unit = characteristic_value(dimension, scales)
+        unit = _unit(effect, dimension, scales)
         total = unit * math.exp(rng.uniform(math.log(1.5), math.log(12.0)))
         difference = unit * math.exp(rng.uniform(math.log(1.5), math.log(20.0)))
         shape[pair.first], shape[pair.second] = 0.5 * (total + difference), 0.5 * (total - difference)
@@ -69,9 +69,14 @@ def scaled(
         elif p.null == 1.0:
             values[p.name] = max(1.0 - strength * (1.0 - shape[p.name]), 0.02)
         else:
-            limit = _LIMITS.get(p.dimension, math.inf) * characteristic_value(p.dimension, scales)
+            limit = _LIMITS.get(p.dimension, math.inf) * _unit(effect, p.dimension, scales)
             values[p.name] = min(strength * shape[p.name], limit)
     return values
+
+
+def _unit(effect: Effect, dimension: str, scales: Mapping[str, float]) -> float:
+    """Return the size of a quantity of an effect, at its place if it has one."""
+    return characteristic_value(placed_dimension(effect, dimension), scales)
 
 
 def strength_for(gap: Callable[[float], float], wished: float) -> float:

@@ -14,12 +14,15 @@ from rigsight.errors import check_option
 Kind = Literal["single", "pair", "none", "parameters", "outside"]
 Tier = Literal["faint", "clear", "strong"]
 Noise = Literal["low", "high"]
-Design = Literal["small", "standard"]
+CatalogueDesign = Literal["small", "standard"]
+"""Lists of cells that hold every effect of the catalogue, on the running gear or an axis."""
 
 TIERS: dict[Tier, tuple[float, float]] = {"faint": (1.5, 5.0), "clear": (5.0, 20.0), "strong": (20.0, 80.0)}
 """Gap that the re-identified equations leave, in units of the noise floor."""
 NOISES: tuple[Noise, ...] = ("low", "high")
-_COUNTS: dict[Design, dict[str, int]] = {
+NOISE_SIZES: dict[Noise, float] = {"low": 5e-4, "high": 2e-3}
+"""Sensor noise in units of the size of what the sensor shows."""
+_COUNTS: dict[CatalogueDesign, dict[str, int]] = {
     "small": {"pair": 24, "none": 8, "parameters": 8, "outside": 3},
     "standard": {"pair": 40, "none": 16, "parameters": 16, "outside": 4},
 }
@@ -49,7 +52,7 @@ class Subject:
     noise: Noise
 
 
-def subject_of(design: Design, seed: int, trial: int) -> Subject:
+def subject_of(design: CatalogueDesign, seed: int, trial: int) -> Subject:
     """Return what a trial hides; every pass over the list of cells is shuffled anew.
 
     Raises
@@ -67,7 +70,7 @@ def subject_of(design: Design, seed: int, trial: int) -> Subject:
     return cell
 
 
-def n_trials(design: Design) -> int:
+def n_trials(design: CatalogueDesign) -> int:
     """Return the number of trials of one pass."""
     return len(_cells(design))
 
@@ -78,8 +81,8 @@ def hidden_effects(subject: Subject) -> tuple[Effect, ...]:
     return tuple(outside[name] if name in outside else effect_named(name) for name in subject.effects)
 
 
-def _cells(design: Design) -> list[Subject]:
-    counts = _COUNTS[check_option("The design", design, get_args(Design))]  # type: ignore[index]
+def _cells(design: CatalogueDesign) -> list[Subject]:
+    counts = _COUNTS[check_option("The design", design, get_args(CatalogueDesign))]  # type: ignore[index]
     tiers: tuple[Tier, ...] = tuple(TIERS)
     cells = [
         Subject("single", (effect.name,), tier, noise)

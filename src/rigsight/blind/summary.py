@@ -15,6 +15,8 @@ from rigsight.blind.parameter_errors import OF_RIG, ParameterError
 from rigsight.blind.score import FAILED, Outcome, WithheldError
 from rigsight.blind.shares import mean, median, quantile, share_of
 
+WRONG_PLACE = "wrong place"
+"""Verdict that names the effects that are hidden, one at least at another place."""
 _BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
 _AMPLITUDES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Edges between groups of amplitudes [unit of the input]."""
@@ -54,6 +56,8 @@ def truth_label(found: Outcome) -> str:
 
 def verdict_label(found: Outcome) -> str:
     """Return what a diagnosis said, in words."""
+    if found.named and found.effect_right and not found.right:
+        return WRONG_PLACE
     return " + ".join(found.named) or found.verdict
 
 
@@ -83,6 +87,8 @@ def pairs(outcomes: Sequence[Outcome]) -> dict[str, int]:
 def _of_pair(found: Outcome) -> str:
     if found.right:
         return "both"
+    if found.effect_right:
+        return WRONG_PLACE
     hit = set(found.effects) & set(found.named)
     if not found.named:
         return found.verdict
@@ -194,8 +200,10 @@ def _figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     placed = [o for o in outcomes if o.place_right is not None]
     return {
         "right": share_of(outcomes, lambda o: o.right),
+        "effect_right": share_of(outcomes, lambda o: o.effect_right),
         "right_within_set": share_of(outcomes, lambda o: o.right_within_set),
         "place_right": share_of(placed, lambda o: bool(o.place_right)),
+        "looked_at": share_of([o for o in outcomes if o.looked_at is not None], lambda o: bool(o.looked_at)),
         "mean_probability": mean([o.probability for o in outcomes]),
         "held_out_median": median([_endless(o.held_out) for o in outcomes if o.withheld]),
         "seconds_median": median([o.seconds for o in outcomes]),

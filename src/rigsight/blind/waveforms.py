@@ -86,6 +86,28 @@ class Step:
         return lambda _: level
 
 
+@dataclass(frozen=True)
+class Doublet:
+    """Zero, then `amplitude` for `length` [s] from `start` [s] on, its opposite for as long, and zero again.
+
+    What nothing brings back is at rest again behind it, not too far from where it was.
+    """
+
+    amplitude: float
+    start: float
+    length: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The three jumps."""
+        return tuple(self.start + i * self.length for i in range(3))
+
+    def piece(self, index: int) -> Signal:
+        """Return the level before, between or after the jumps."""
+        level = (0.0, self.amplitude, -self.amplitude, 0.0)[index]
+        return lambda _: level
+
+
 @dataclass(frozen=True, eq=False)
 class Multisine:
     """A sum of sines that fades in over `rise` [s], as a generator that protects a rig does it.

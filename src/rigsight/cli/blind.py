@@ -29,7 +29,10 @@ def blind(
         ),
     ] = None,
     design: Annotated[
-        Literal["small", "standard"], typer.Option(help="Which list of cells is drawn from.")
+        Literal["small", "standard", "rigs"],
+        typer.Option(
+            help="Which list of cells is drawn from; rigs has every built-in rig with effects at all its places."
+        ),
     ] = "standard",
     seed: Seed = 0,
     campaigns: Annotated[

@@ -11,7 +11,8 @@ from rigsight.report.wording import effect_label
 OUTSIDE = "outside: "
 """What stands before an effect from outside the catalogue."""
 _SEVERAL = "several effects"
-_LAST = ("none", "parameters", "unknown", _SEVERAL, "failed")
+_WRONG_PLACE = "wrong place"
+_LAST = (_WRONG_PLACE, "none", "parameters", "unknown", _SEVERAL, "failed")
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ def pair_rows(content: Mapping[str, Any]) -> list[tuple[str, int]]:
     """Return what became of pairs, and how often."""
     words = {
         "both": "both named",
+        _WRONG_PLACE: "both named, one at least at a wrong place",
         "both and another": "both named, and another effect",
         "one alone": "one of them named alone",
         "one with another": "one of them named, with another effect",

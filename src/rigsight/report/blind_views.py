@@ -13,7 +13,9 @@ NOTHING = "-"
 SHARES = {
     "singles_right": "single effects right, gap of 5 x floor and more",
     "singles_right_within_set": "  or among those named alike",
+    "singles_effect_right": "  effect right, at any place",
     "singles_place_right": "  place right",
+    "looked_at": "true places among those looked at, gap of 5 x floor and more",
     "pairs_right": "pairs, both right, gap of 5 x floor and more",
     "pairs_right_within_set": "  or among those named alike",
     "controls_right": "controls right (none, parameters)",
@@ -39,6 +41,8 @@ _GOALS = {
     "held_out_median": "error on withheld records, median",
 }
 _BESIDE = {
+    "singles_effect_right": "single effects named, at whatever place",
+    "looked_at": "singles and pairs whose true places were looked at, on rigs with several places",
     "singles_right_within_set": "single effects named, or among those that the records cannot tell apart",
     "pairs_right_within_set": "pairs named, or among those that the records cannot tell apart",
     "faint_right": "faint single effects named (gap of 1.5 to 5 noise floors)",
@@ -78,7 +82,8 @@ class GroupView:
 
 
 GROUP_HEADS = (
-    "Trials", "Right", "95 % interval", "Right or not to be told apart", "Place right", "Mean probability on the truth",
+    "Trials", "Right", "95 % interval", "Effect right", "Right or not to be told apart", "Place right", "Place looked at",
+    "Mean probability on the truth",
     "Withheld error, median", "Seconds, median",
 )  # fmt: skip
 
@@ -276,8 +281,10 @@ def _group_cells(row: Mapping[str, Any]) -> list[str]:
         counts.rpartition(" ")[2],
         share,
         interval,
+        share_cells(row["effect_right"])[0],
         share_cells(row["right_within_set"])[0],
         share_cells(row["place_right"])[0],
+        share_cells(row["looked_at"])[0],
         number(row["mean_probability"]),
         number(row["held_out_median"]),
         number(row["seconds_median"]),
@@ -298,12 +305,21 @@ def trial_text(content: Mapping[str, Any], trial: Mapping[str, Any]) -> str:
 def hidden_text(trial: Mapping[str, Any]) -> str:
     """Return what a trial hid."""
     prefix = OUTSIDE if trial["kind"] == "outside" else ""
-    return prefix + (" + ".join(map(effect_label, trial["effects"])) or trial["kind"])
+    return prefix + (_at_places(trial["effects"], trial["places"]) or trial["kind"])
 
 
 def named_text(trial: Mapping[str, Any]) -> str:
     """Return what the diagnosis said."""
-    return " + ".join(map(effect_label, trial["named"])) or trial["verdict"]
+    return _at_places(trial["named"], trial["named_places"]) or trial["verdict"]
+
+
+def _at_places(effects: Sequence[str], where: Sequence[str]) -> str:
+    """Return effects with their places, where these are known effect by effect."""
+    places = where if len(where) == len(effects) else [""] * len(effects)
+    return " + ".join(
+        f"{effect_label(name)} at {place}" if place else effect_label(name)
+        for name, place in zip(effects, places, strict=True)
+    )
 
 
 def _wrong_row(trial: Mapping[str, Any], name: str) -> WrongRow:

@@ -9,6 +9,7 @@ folders, and beside it the records that are withheld from the diagnosis::
      "gap": 7.5,                                                  # in noise floors; without it, what the diagnosis finds
      "where": ["yaw_dynamics"], "noise": "low",                   # place of an effect from outside; any label
      "withheld": [{"file": "step.csv", "kind": "step", "hold": "zoh"}]}   # as [[records]] of a campaign; begin at rest
+On a rig with several places, `where` holds the joint, drive, sensor or state of each effect, in their order.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from rigsight.blind.subjects import Kind
-from rigsight.effects import CATALOGUE, effect_named
+from rigsight.effects import CATALOGUE, Effect, Place, effect_named, placed
 from rigsight.errors import InputError, nearest
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -156,8 +157,10 @@ class ExternalBench(BenchFolder):
             "trial": trial,
             "kind": table.kind,
             "effects": table.effects,
+            "schema_version": 1 if rig.has_one_motion else 2,
             "where": _places(table, rig) if table.where is None else table.where,
             "rig": rig.name,
+            "declaration": dict(rig.declaration),
             "noise": table.noise,
             "gap": table.gap,
             "values": table.parameters,
@@ -201,7 +204,10 @@ def _check_effects(path: Path, table: KeyTable, rig: Rig) -> None:
     least, most, words = _COUNTS[table.kind]
     got = ", ".join(table.effects) or "an empty list"
     foreign = [name for name in table.effects if name not in known]
-    wrong_count = not least <= len(table.effects) <= most or len(set(table.effects)) < len(table.effects)
+    # One effect at two places is two effects.
+    named = list(zip(table.effects, table.where or (), strict=False)) or table.effects
+    distinct = len(set(table.effects if rig.has_one_motion else named))
+    wrong_count = not least <= len(table.effects) <= most or distinct < len(table.effects)
     if wrong_count or (table.kind == "outside" and not foreign):
         raise InputError(f'{path.name}: effects: got {got}; kind "{table.kind}" asks for {words}.')
     if table.kind != "outside" and foreign:
@@ -210,17 +216,38 @@ def _check_effects(path: Path, table: KeyTable, rig: Rig) -> None:
             f'Write kind = "outside" for an effect that is not, or one of: {", ".join(known)}.'
         )
     of_catalogue = [known[name] for name in table.effects if name in known]
+    if rig.has_one_motion:
+        of_rig = tuple(rig.place_name(effect.place) for effect in CATALOGUE if rig.offers(effect))
+        allowed = [of_rig] * len(table.where or ())
+    else:
+        allowed = _allowed_places(path, table, rig, known)
+        if not foreign:
+            of_catalogue = [placed(e, at) for e, at in zip(of_catalogue, table.where or (), strict=True)]
+    for place, places in zip(table.where or (), allowed, strict=True):
+        if place not in places:
+            listed = ", ".join(dict.fromkeys(places))
+            raise InputError(f"{path.name}: where: is '{place}'.{nearest(place, places)} Allowed: {listed}.")
     for effect in of_catalogue:
         if not rig.offers(effect):
             raise InputError(f"{path.name}: effects: {effect.name} makes no sense on the rig {rig.name}.")
     _check_names(path, "parameters", table.parameters, compose(rig, of_catalogue).names, bool(foreign))
     outputs = [signal.name for signal in rig.outputs]
     _check_names(path, "noise_floor", table.noise_floor, outputs, False)
-    places = [rig.place_name(effect.place) for effect in CATALOGUE if rig.offers(effect)]
-    for place in table.where or ():
-        if place not in places:
-            listed = ", ".join(dict.fromkeys(places))
-            raise InputError(f"{path.name}: where: is '{place}'.{nearest(place, places)} Allowed: {listed}.")
+
+
+def _allowed_places(
+    path: Path, table: KeyTable, rig: Rig, known: Mapping[str, Effect]
+) -> list[tuple[str, ...]]:
+    """Return the places that each entry of `where` may name, on a rig with several of them."""
+    anywhere = tuple(dict.fromkeys(name for kind in Place for name in rig.places(kind)))
+    if table.kind == "outside":
+        return [anywhere] * len(table.where or ())
+    if len(table.where or ()) != len(table.effects):
+        raise InputError(
+            f"{path.name}: where: got {', '.join(table.where or ()) or 'nothing'}; {rig.name} has several places, so the key "
+            f"says that of each effect in their order: {len(table.effects)} of {', '.join(anywhere)}."
+        )
+    return [rig.places(known[name].place) for name in table.effects]
 
 
 def _check_names(

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.blind import Outcome, WithheldError, outcome
+from rigsight.blind import Outcome, WithheldError, outcome, rig_of
 from rigsight.effects import Place
 from rigsight.errors import SimulationError
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import RIGS
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
 from rigsight.workflow.blind_execution import source_version
@@ -43,7 +42,7 @@ def score_trial(folder: BenchFolder, name: str) -> Outcome:
         key["noise_floor"] = {**measured, **key["noise_floor"]}
         if key["gap"] is None:
             key["gap"] = _reidentified_gap(diagnosis)
-    rig = RIGS[str(key["rig"])]
+    rig = rig_of(key)
     withheld = [
         WithheldError(
             name=record.name,

@@ -19,7 +19,7 @@ from typing import Any, get_type_hints
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.errors import InputError, MachineError
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 _PATIENCE = 60.0
 """Time [s] to wait for another process that writes."""
 _OF_THE_DISK = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY")
@@ -33,7 +33,9 @@ _TYPES: dict[Any, str] = {
 }
 _FROM_TEXT: dict[str, Callable[[list[Any]], tuple[Any, ...]]] = {
     "effects": tuple,
+    "places": tuple,
     "named": tuple,
+    "named_places": tuple,
     "withheld": lambda rows: tuple(WithheldError(**row) for row in rows),
     "parameters": lambda rows: tuple(ParameterError(**row) for row in rows),
 }

@@ -1,0 +1,132 @@
+"""What is hidden in which trial of design ``rigs``? Every rig with effects at every kind of its places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TypeVar
+
+import numpy as np
+
+from rigsight.blind.outside import OUTSIDE
+from rigsight.blind.subjects import NOISES, Kind, Noise, Tier
+from rigsight.diagnose.candidates import candidates_on
+from rigsight.effects import CATALOGUE, Effect, Place, kind_of, placed
+from rigsight.rigs import RIGS, Rig
+
+Item = TypeVar("Item")
+
+_TIERS: tuple[Tier, ...] = ("clear", "strong")
+"""A faint effect shows neither its law nor its place."""
+
+
+@dataclass(frozen=True)
+class PlacedSubject:
+    """What one trial of a rig of any shape hides.
+
+    Attributes
+    ----------
+    rig
+        Name of the built-in rig.
+    kind
+        As of `Subject`.
+    place
+        Kind of place of the effects; None where any will do, or there is none.
+    tier
+        Strength that is aimed for; None where there is no effect.
+    noise
+        Noise level.
+    """
+
+    rig: str
+    kind: Kind
+    place: Place | None
+    tier: Tier | None
+    noise: Noise
+
+
+@cache
+def placed_cells() -> tuple[PlacedSubject, ...]:
+    """Return all cells: singles at each kind of place and of each strength, and for each rig a control and something harder.
+
+    The control is in turn no gap and wrong parameters, what is harder in turn two effects and one from outside.
+    """
+    cells: list[PlacedSubject] = []
+    for number, name in enumerate(RIGS):
+        offered = candidates_on(RIGS[name], CATALOGUE)
+        kinds = [place for place in Place if any(effect.place is place for effect in offered)]
+        rows: list[tuple[Kind, Place | None, Tier | None]] = [
+            ("single", place, tier) for place in kinds for tier in _TIERS
+        ]
+        rows.append(("none" if number % 2 else "parameters", None, None))
+        rows.append(("outside", Place.DYNAMICS, "strong") if number // 2 % 2 else ("pair", None, "strong"))
+        cells += [
+            PlacedSubject(name, kind, place, tier, NOISES[(number + i) % 2])
+            for i, (kind, place, tier) in enumerate(rows)
+        ]
+    return tuple(cells)
+
+
+def placed_subject_of(seed: int, trial: int) -> PlacedSubject:
+    """Return what a trial hides; every pass over the list of cells is shuffled anew."""
+    cells = placed_cells()
+    cycle, place = divmod(trial, len(cells))
+    return cells[int(np.random.default_rng([seed, cycle]).permutation(len(cells))[place])]
+
+
+def draw_effects(rig: Rig, subject: PlacedSubject, rng: np.random.Generator) -> tuple[Effect, ...]:
+    """Draw the effects of a trial, each with its place.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    subject
+        What is asked for.
+    rng
+        Source of randomness.
+    """
+    if subject.kind in ("none", "parameters"):
+        return ()
+    offered = candidates_on(rig, CATALOGUE)
+    if subject.kind == "outside":
+        return (_any_of(_outside_on(rig), rng),)
+    if subject.kind == "single":
+        return (_drawn_kind([e for e in offered if e.place is subject.place], rng),)
+    # Two laws at one place of a motion are told apart by their forms alone; two places are the harder question.
+    first = _drawn_kind(offered, rng)
+    others = [e for e in offered if kind_of(e.name) != kind_of(first.name) and _elsewhere(rig, first, e)]
+    others = others or [e for e in offered if kind_of(e.name) != kind_of(first.name)]
+    return tuple(sorted((first, _drawn_kind(others, rng)), key=lambda effect: effect.name))
+
+
+def _drawn_kind(effects: list[Effect], rng: np.random.Generator) -> Effect:
+    """Draw the law first and then its place: a law that can stand anywhere is not drawn more often for that."""
+    law = _any_of(sorted({kind_of(effect.name) for effect in effects}), rng)
+    return _any_of([effect for effect in effects if kind_of(effect.name) == law], rng)
+
+
+def _any_of(items: list[Item], rng: np.random.Generator) -> Item:
+    return items[int(rng.integers(len(items)))]
+
+
+def _elsewhere(rig: Rig, one: Effect, other: Effect) -> bool:
+    return rig.where(one) != rig.where(other)
+
+
+def _outside_on(rig: Rig) -> list[Effect]:
+    """Return the effects from outside at the joints at which they do something: one of a spring needs a spring."""
+    found = []
+    for effect in OUTSIDE:
+        if effect.place is not Place.DYNAMICS:
+            continue
+        if rig.has_one_motion:
+            found.append(effect)
+            continue
+        reads_spring = effect.torque is not None and "k" in {s.name for s in effect.torque.free_symbols}
+        found += [
+            placed(effect, joint.name)
+            for joint in rig.mechanism.joints
+            if joint.stiffness != 0 or not reads_spring
+        ]
+    return [effect for effect in found if rig.offers(effect)]

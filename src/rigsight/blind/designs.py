@@ -1,0 +1,49 @@
+"""Which lists of trials are there, and who draws a trial of each?"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from rigsight.blind import draw, subjects
+from rigsight.blind.any_rig_subjects import placed_cells
+from rigsight.blind.any_rig_trial import draw_placed_trial
+from rigsight.blind.draw import Trial
+from rigsight.errors import check_option
+
+Design = Literal["small", "standard", "rigs"]
+"""Two with the whole catalogue on the running gear or an axis, one with effects at all places of every built-in rig."""
+
+
+def n_trials(design: Design) -> int:
+    """Return the number of trials of one pass.
+
+    Raises
+    ------
+    InputError
+        If there is no such design.
+    """
+    check_option("The design", design, get_args(Design))
+    return len(placed_cells()) if design == "rigs" else subjects.n_trials(design)
+
+
+def draw_trial(design: Design, seed: int, trial: int) -> Trial:
+    """Draw and measure one trial.
+
+    Parameters
+    ----------
+    design
+        List of cells to draw from.
+    seed
+        Seed of the whole bench.
+    trial
+        Number of the trial.
+
+    Raises
+    ------
+    InputError
+        If there is no such design.
+    SimulationError
+        If no rig that was drawn can be integrated and re-identified.
+    """
+    check_option("The design", design, get_args(Design))
+    return draw_placed_trial(seed, trial) if design == "rigs" else draw.draw_trial(design, seed, trial)
