@@ -60,16 +60,22 @@ def is_a_delay(effect: Effect) -> bool:
     return effect.delay is not None or effect.measured_late is not None
 
 
+def one_place_each(rig: str) -> list[tuple[str, tuple[str, ...]]]:
+    """Every effect at one place of a rig, the next effect at the next place."""
+    found = []
+    for number, effect in enumerate(CATALOGUE):
+        at = [p for p in RIGS[rig].places(effect.place) if RIGS[rig].offers(placed(effect, p))]
+        if at and not is_a_delay(effect):
+            found.append((rig, (f"{effect.name}@{at[number % len(at)]}",)))
+    return found
+
+
 AT_PLACES = [
     *((rig, ()) for rig in _LARGER),
-    *((rig, (f"{effect.name}@{place}",))
-      for rig in _LARGER
-      for effect in CATALOGUE
-      for place in RIGS[rig].places(effect.place)
-      if RIGS[rig].offers(placed(effect, place)) and not is_a_delay(effect)),
+    *(case for rig in _LARGER for case in one_place_each(rig)),
     *((rig, names) for rig, *names in _TOGETHER_AT_PLACES),
-]  # fmt: skip
-"""Every effect at every place; a delay on these rigs is refused by the simulation itself."""
+]
+"""Every effect on every rig, the places in turn; delays have a memory of their own and their own tests."""
 KERNELS = [*CASES, *(case for case in AT_PLACES if len(case[1]) != 1)]
 _INSTANTS = 12
 _MOMENT = 1e-6
