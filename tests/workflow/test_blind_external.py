@@ -239,7 +239,10 @@ def test_on_a_rig_with_several_places_a_key_says_that_of_each_effect(lab: Extern
         ({}, ["where", "several places", "1 of", "shaft"]),
         ({"where": ["motor"]}, ["where", "'motor'", "shaft"]),
         ({"where": ["shaft", "motor_bearing"]}, ["where", "several places"]),
-        ({"where": ["motor_bearing"]}, ["cubic_stiffness@motor_bearing", "makes no sense"]),
+        (
+            {"effects": ["backlash"], "where": ["motor_bearing"]},
+            ["backlash@motor_bearing", "makes no sense"],
+        ),
         ({"kind": "pair", "effects": ["backlash"] * 2, "where": ["shaft"] * 2}, ["exactly two"]),
     ],
 )
