@@ -26,6 +26,8 @@ MOVED = {
     "experiments/engine_accuracy/README.md": "experiments/engine_accuracy.md",
     "experiments/rounding/README.md": "experiments/rounding.md",
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",
+    "experiments/places/README.md": "experiments/places.md",
+    "experiments/any_rig_start/README.md": "experiments/any_rig_start.md",
     "experiments/thesis/README.md": "experiments/thesis.md",
 }
 """Files outside docs/ that are pages: their path in the repository -> that on the site."""
