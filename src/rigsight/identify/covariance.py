@@ -12,9 +12,12 @@ from rigsight.identify.symmetric_eigen import symmetric_eigen
 _DEPENDENT = 1e-14
 """Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
 _MARGIN = 3.0
-"""By how much an error of the derivatives is multiplied before a direction that stands out of it is believed."""
+"""By how much an error of the derivatives is multiplied before a direction that stands out of it is believed; an assumption."""
 _MIXED = 30.0
-"""The same for the part that a coordinate takes in such a direction: errors of the derivatives mix it with the nearest others."""
+"""The same for the part that a coordinate takes in such a direction, as errors of the derivatives mix it with others.
+
+An assumption: ten times as much as for the direction itself; an arm with three undetermined numbers was looked at.
+"""
 _TAKES_PART = 1e-9
 SMOOTHED = 15
 """Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the

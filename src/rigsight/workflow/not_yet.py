@@ -10,7 +10,7 @@ from rigsight.rigs import RIGS, Rig
 
 _BUILT_IN_ONLY = frozenset({"discover"})
 """Commands that know the parameters of built-in rigs of one motion by their names; one that does not is taken out here."""
-_SAME_CONSTANTS_ONLY = frozenset({"discover", "identify"})
+_SAME_CONSTANTS_ONLY = frozenset({"discover"})
 """Commands that read several records as if they were of one rig; one that tells them apart is taken out here."""
 
 
