@@ -21,19 +21,20 @@ from numpy.typing import NDArray
 
 from rigsight.identify.combination_text import listed, percent, product_text, small_fraction, sum_text
 from rigsight.identify.information import Information
+from rigsight.identify.undetermined import (
+    POORLY_KNOWN,
+    conditional_errors,
+    marginal_errors,
+    sparsest,
+    undetermined,
+)
 
 Floats = NDArray[np.float64]
 
-POORLY_KNOWN = 0.5
-"""Relative standard error from which a parameter is not determined: its 95 % interval holds zero, or twice the value."""
 _NO_INFLUENCE = 100.0
 """Standard error over the value, with all other parameters known, from which a parameter is said to do nothing."""
-_TAKES_PART = 0.05
-"""Share of the largest change, or influence, from which a parameter takes part in a direction."""
 _STEP = 1.5
 """Factor of the step that tests a combination: far enough that a sum and a product part."""
-_ROUNDING = 1e-9
-"""Entry of a unit direction below which it is rounding."""
 _UNCHANGED = 0.005
 """Change of the outputs along a combination, over that by one of its members alone, below which the outputs stay."""
 
@@ -127,7 +128,7 @@ def identifiability(found: Information) -> Identifiability:
 
 def free_directions(found: Information) -> int:
     """Return how many independent relative changes of parameters leave the outputs within the noise."""
-    return int(_undetermined(found.root).shape[1])
+    return int(undetermined(found.root).shape[1])
 
 
 def relative_errors(found: Information) -> dict[str, float]:
@@ -138,10 +139,10 @@ def relative_errors(found: Information) -> dict[str, float]:
     found
         What the records say.
     """
-    errors = _conditional_errors(found.root)
+    errors = conditional_errors(found.root)
     # What does next to nothing is held: that it may be anything is no reason to doubt the others.
     held = errors >= POORLY_KNOWN
-    errors[~held] = _marginal_errors(found.root[:, ~held])
+    errors[~held] = marginal_errors(found.root[:, ~held])
     return dict(zip(found.names, map(float, errors), strict=True))
 
 
@@ -190,14 +191,14 @@ class _Search:
 
     def statements(self) -> Iterator[str]:
         """Yield what is not determined, each time with one direction less that nothing is known of."""
-        while self._quantities and (free := _undetermined(self._root())).shape[1]:
+        while self._quantities and (free := undetermined(self._root())).shape[1]:
             yield self._alone() or self._pair() or self._group(free)
 
     def combinations(self) -> Iterator[Combination]:
         """Yield the combinations that were made and are determined."""
         if not self._quantities:
             return
-        errors = _marginal_errors(self._root())
+        errors = marginal_errors(self._root())
         for q, error in zip(self._quantities, map(float, errors), strict=True):
             if error >= POORLY_KNOWN:
                 continue
@@ -213,7 +214,7 @@ class _Search:
 
     def _alone(self) -> str:
         """Name a quantity that the records would not determine if all others were known, and leave it as it is."""
-        errors = _conditional_errors(self._root())
+        errors = conditional_errors(self._root())
         index = int(np.argmax(errors))
         if errors[index] < POORLY_KNOWN:
             return ""
@@ -272,7 +273,7 @@ class _Search:
 
     def _group(self, free: Floats) -> str:
         """Name quantities that change together without a trace, and hold one of them."""
-        direction, taking_part = _sparsest(free, np.linalg.norm(self._root(), axis=0))
+        direction, taking_part = sparsest(free, np.linalg.norm(self._root(), axis=0))
         members = [self._quantities[i] for i in taking_part]
         along = [float(entry) for entry in direction[taking_part] / np.max(np.abs(direction))]
         powers = [p for entry in along if (p := small_fraction(entry)) is not None]
@@ -350,52 +351,3 @@ class _Search:
             if number == 0:
                 alone += step
         return moved, alone
-
-
-def _marginal_errors(root: Floats) -> Floats:
-    """Return the standard error of each coordinate, infinite where it takes part in what nothing is known of."""
-    _, singular, right = np.linalg.svd(root, full_matrices=True)
-    sizes = np.zeros(root.shape[1])
-    sizes[: singular.size] = singular
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.where(np.abs(right) > _ROUNDING, np.abs(right) / sizes[:, None], 0.0)
-    return np.asarray(np.sqrt(np.sum(parts**2, axis=0)))
-
-
-def _conditional_errors(root: Floats) -> Floats:
-    """Return the standard error of each coordinate if all others were known."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.linalg.norm(root, axis=0))
-
-
-def _undetermined(root: Floats) -> Floats:
-    """Return an orthonormal basis of the directions of which less is known than of a poorly known parameter."""
-    _, singular, right = np.linalg.svd(root, full_matrices=True)
-    sizes = np.zeros(root.shape[1])
-    sizes[: singular.size] = singular
-    return np.asarray(right[sizes * POORLY_KNOWN < 1.0].T)
-
-
-def _sparsest(free: Floats, influence: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the direction with the fewest members among those of a reduced row echelon form, and the indices of these.
-
-    A member changes much itself, or changes the outputs much: a small number takes a little of a large one with it.
-    """
-    rows = (free * influence[:, None]).T
-    for place in range(rows.shape[0]):
-        pivot = np.unravel_index(np.argmax(np.abs(rows[place:])), rows[place:].shape)
-        row, column = place + int(pivot[0]), int(pivot[1])
-        rows[[place, row]] = rows[[row, place]]
-        rows[place] /= rows[place, column]
-        others = np.arange(rows.shape[0]) != place
-        rows[others] -= np.outer(rows[others, column], rows[place])
-    directions = rows / influence
-    members = [
-        np.flatnonzero(
-            (np.abs(row) >= _TAKES_PART * np.max(np.abs(row)))
-            | (np.abs(direction) >= _TAKES_PART * np.max(np.abs(direction)))
-        )
-        for row, direction in zip(rows, directions, strict=True)
-    ]
-    best = min(range(len(members)), key=lambda i: members[i].size)
-    return directions[best], members[best]

@@ -20,6 +20,7 @@ from rigsight.identify.transfer_fit import TransferFit
 from rigsight.identify.transfer_form import Order
 from rigsight.identify.transfer_function import fit_frequency_response
 from rigsight.identify.transfer_step import fit_step
+from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 from rigsight.rigs import Rig, evaluated
 
@@ -28,8 +29,6 @@ _SURE = 0.1
 _PEAK = 1.1
 """Height over the lowest lines from which a largest magnitude counts as a resonance."""
 _LOWEST = 10
-_POORLY_KNOWN = 0.5
-"""Relative standard error from which a parameter is not determined."""
 MISFIT = 3.0
 """Residuals in units of the noise from which a form is not the whole of the rig."""
 _LONGEST_DELAY = 0.5 * math.pi
@@ -273,13 +272,13 @@ def _judged(
     if not fit.success and not of_velocity:
         return replace(path, problem=fit.message)
     gain = fit.values["gain"]
-    if not of_velocity and not fit.standard_errors["gain"] < _POORLY_KNOWN * abs(gain):
+    if not of_velocity and not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
         # Its sign would be blamed on a sensor.
         return replace(path, problem=_undetermined(["the gain"]))
     # The break frequency of a velocity is often too low to be seen; mass and damping show in the slope all the same.
     found = physical(fit)
     errors = found.standard_errors
-    poor = [name for name in found.names if not errors[name] < _POORLY_KNOWN * abs(found.values[name])]
+    poor = [name for name in found.names if not errors[name] < POORLY_KNOWN * abs(found.values[name])]
     if len(poor) > 1 or (poor and fit.form.order == "pt1"):
         # A damping near zero alone is a result; the others are positive by nature.
         return replace(path, problem=_undetermined(poor))

@@ -22,6 +22,7 @@ from rigsight.frequency import FrequencyResponse
 from rigsight.identify.covariance import propagated_covariance, sandwich_covariance
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.identify.transfer_form import Order, TransferForm
+from rigsight.identify.undetermined import POORLY_KNOWN
 
 Weighting = Literal["variance", "uniform", "relative"]
 
@@ -36,8 +37,6 @@ _DAMPING_RANGE = (1e-4, 1e3)
 _STANDS_OUT = 4.0
 """Power of a line over its variance from which it tells something (two standard deviations)."""
 _COHERENT = 0.05
-_POORLY_KNOWN = 0.5
-"""Relative standard error of a break frequency from which the band does not show it."""
 _MISFIT = 3.0
 
 
@@ -296,7 +295,7 @@ def _check_informative(measured: FrequencyResponse, form: TransferForm) -> None:
 
 def _band_notes(measured: FrequencyResponse, omega_b: float, errors: NDArray[np.float64]) -> list[str]:
     low, high = float(measured.omega[0]), float(measured.omega[-1])
-    if np.all(np.isfinite(errors)) and errors[1] < _POORLY_KNOWN * omega_b and low <= omega_b <= high:
+    if np.all(np.isfinite(errors)) and errors[1] < POORLY_KNOWN * omega_b and low <= omega_b <= high:
         return []
     return [
         f"The band from {low:.4g} to {high:.4g} rad/s does not show the break frequency, fitted as {omega_b:.4g} rad/s: "

@@ -20,6 +20,7 @@ from rigsight.identify.covariance import propagated_covariance
 from rigsight.identify.step_residuals import step_covariance
 from rigsight.identify.transfer_fit import TransferFit
 from rigsight.identify.transfer_form import Order, TransferForm
+from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 
 _GRID_FREQUENCIES = 17
@@ -29,7 +30,6 @@ _STARTS = 2
 _DAMPING_RANGE = (1e-4, 1e3)
 _LEAST_AFTER = 20
 _STEP_OVER_NOISE = 10.0
-_POORLY_KNOWN = 0.5
 _DIFFERENCE = 1e-5
 
 
@@ -92,7 +92,7 @@ def fit_step(
     poor = [
         name
         for name, value, error in zip(names[:2], values, errors, strict=False)
-        if not error < _POORLY_KNOWN * abs(value)
+        if not error < POORLY_KNOWN * abs(value)
     ]
     notes = [] if best.status > 0 else [str(best.message)]
     if poor:

@@ -14,7 +14,7 @@ from rigsight.errors import SimulationError, check_option
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.helpful_sensors import helpful_sensors
-from rigsight.identify.identifiability import POORLY_KNOWN, identifiability, relative_errors
+from rigsight.identify.identifiability import identifiability, relative_errors
 from rigsight.identify.identification import (
     Identification,
     JointIdentification,
@@ -25,6 +25,7 @@ from rigsight.identify.information import Information, information
 from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
 from rigsight.identify.physical import PhysicalEstimates
 from rigsight.identify.record_identification import Wishes, input_peak
+from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
 from rigsight.rigs import RIGS, Rig
