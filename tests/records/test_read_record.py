@@ -54,6 +54,14 @@ def test_second_output_may_be_missing_but_not_the_first(write_csv: WriteCsv) -> 
         read_record(write_csv(header="t,u,angle,y"), INPUTS, OUTPUTS)
 
 
+def test_a_column_called_nearly_like_a_missing_output_is_told(write_csv: WriteCsv) -> None:
+    height = (OUTPUTS[0], Named("height", "m"))
+    record = read_record(write_csv(header="t,u,psi,hight"), INPUTS, height)
+    assert "height" not in record
+    assert any("no column 'height'" in note and "mean 'hight'" in note for note in record.notes)
+    assert not any("height" in n for n in read_record(write_csv(header="t,u,psi,oil"), INPUTS, height).notes)
+
+
 def test_a_second_output_that_was_mapped_must_be_there(write_csv: WriteCsv) -> None:
     with pytest.raises(InputError, match="no column 'lateral' for signal 'y'"):
         read_record(write_csv(), INPUTS, OUTPUTS, columns={"y": ColumnMapping("lateral")})

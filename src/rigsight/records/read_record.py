@@ -144,6 +144,7 @@ def read_record(
         must_move = [] if still_inputs or role != "estimation" else [signal.name for signal in recorded]
         raw, found = _moving(path, raw, table, must_move, needed, outputs)
     found += _clipping_notes(path, raw, table)
+    found += _alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
     # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
     raw = raw or {TIME: table.values[TIME]}
@@ -218,6 +219,16 @@ def _check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free:
             f"{path.name} has no column '{signal}' for signal '{signal}'.{hint} Its columns: {_listed(path)}. Map it under "
             f"columns; if it was constant and not recorded, give its value with the record: inputs = {{ {signal} = 0.0 }}."
         )
+
+
+def _alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]:
+    """Tell of a column that was not read although it is called nearly like an output that is missing: a slip of the pen."""
+    unread = [name for name in _names(path) if name not in table.labels.values()] if missing else []
+    return [
+        f"{path.name}: has no column '{signal}', so {signal} is taken as not recorded there.{hint} Map it under columns if it is."
+        for signal in missing
+        if (hint := nearest(signal, unread))
+    ]
 
 
 def _names(path: Path) -> list[str]:
