@@ -25,11 +25,11 @@ from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.campaigns.campaign import read_campaign
 from rigsight.workflow.compare import run_compare
+from rigsight.workflow.files.model_file import MODEL_FILE, read_model
+from rigsight.workflow.files.results import json_text
 from rigsight.workflow.identify import run_identify
-from rigsight.workflow.model_file import MODEL_FILE, read_model
-from rigsight.workflow.results import json_text
 from rigsight.workflow.virtual_rig import VirtualRig
 
 EVALUATION = "evaluation"

@@ -23,14 +23,14 @@ from declarations import DECLARATIONS, effect_of
 
 from rigsight.errors import InputError
 from rigsight.records import channel_file, read_record
-from rigsight.records.channel import ChannelFile
+from rigsight.records.formats.channel import ChannelFile
 from rigsight.rigs import RIGS
-from rigsight.workflow import own_effects
-from rigsight.workflow.blind_external import ExternalBench
-from rigsight.workflow.campaign import read_campaign
-from rigsight.workflow.inspect import run_inspect
-from rigsight.workflow.model_file import read_model
-from rigsight.workflow.results import json_text
+from rigsight.workflow.blind_bench.external import ExternalBench
+from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaigns.inspect import run_inspect
+from rigsight.workflow.files.model_file import read_model
+from rigsight.workflow.files.results import json_text
+from rigsight.workflow.own import own_effects
 
 Plain = Callable[[bytes, int], bytes]
 """libFuzzer's own mutation of bytes up to a size."""

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose import candidates_on
-from rigsight.diagnose.characterize import fit_linear
-from rigsight.diagnose.places import search_places
-from rigsight.diagnose.starts import start_values
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.candidates.starts import start_values
+from rigsight.diagnose.places.search import search_places
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import RigsightError

@@ -19,9 +19,9 @@ import numpy as np
 
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.excitation import log_sweep
-from rigsight.identify import fit_problem
-from rigsight.identify.coordinates import FINE_STEP, STEP, Coordinates
-from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.fit import fit_problem
+from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
+from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.records import Record
 from rigsight.records.record import Hold
 from rigsight.rigs import RUNNING_GEAR
@@ -32,11 +32,11 @@ from rigsight.simulate import (
     kernel_cache,
     record_input,
 )
-from rigsight.simulate.compiler import c_compilers, library
-from rigsight.simulate.kernel import Kernel
-from rigsight.simulate.kernel_source import KernelEquations, kernel_source
+from rigsight.simulate.compiled.compiler import c_compilers, library
+from rigsight.simulate.compiled.kernel import Kernel
+from rigsight.simulate.compiled.kernel_source import KernelEquations, kernel_source
 from rigsight.units import characteristic_value
-from rigsight.workflow import effect_promises
+from rigsight.workflow.own import effect_promises
 
 N_SAMPLES, DT = 1500, 5e-3
 CENTRAL = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)

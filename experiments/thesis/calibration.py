@@ -27,7 +27,7 @@ from rigsight.effects import effect_named
 from rigsight.excitation import step
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify import JointFit, characteristic_scales, fit_jointly
-from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.hysteresis import (
     SpectralRatio,
     SweptResponse,

@@ -24,7 +24,7 @@ from rigsight.identify import (
     offsets,
     yaw_parameters,
 )
-from rigsight.identify.record_response import record_response
+from rigsight.identify.transfer.record_response import record_response
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.rigs import ROLLING, evaluated

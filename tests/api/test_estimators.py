@@ -18,7 +18,7 @@ from rigsight.effects import effect_named
 from rigsight.workflow.compare import run_compare
 from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.discover import run_discover
-from rigsight.workflow.identification_json import identification_json
+from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import run_identify
 
 ESTIMATORS = (rs.Diagnoser, rs.EquationDiscoverer, rs.LinearIdentifier)

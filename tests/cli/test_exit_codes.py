@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from rigsight.workflow.files.results import write_together
 from rigsight.workflow.progress import Stage
 from rigsight.workflow.progress_display import listening
-from rigsight.workflow.results import write_together
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")
 Run = Callable[..., tuple[int, str, str]]
@@ -141,7 +141,7 @@ def test_who_does_not_want_to_be_ended_by_a_terminal_is_not(
         signal.raise_signal(signal.SIGHUP)
         return ()
 
-    monkeypatch.setattr("rigsight.workflow.own_effects.own_effects", listed)
+    monkeypatch.setattr("rigsight.workflow.own.own_effects.own_effects", listed)
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         assert run("effects")[0] == 0
@@ -184,7 +184,7 @@ def test_a_disk_that_takes_or_gives_nothing_is_no_defect(
     def fails(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("rigsight.workflow.own_effects.own_effects", fails)
+    monkeypatch.setattr("rigsight.workflow.own.own_effects.own_effects", fails)
     code, stdout, stderr = run("effects")
     assert (code, stdout, stderr.count("\n")) == (2, "", 1)
     assert expected in stderr

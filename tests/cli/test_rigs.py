@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from rigsight.rigs import RIGS, rig_file_text
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 
 
 def test_rigs_are_listed(run) -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.bands import band_edges, band_powers, dominant_frequency, spectrum
+from rigsight.diagnose.location.bands import band_edges, band_powers, dominant_frequency, spectrum
 from rigsight.excitation import linear_sweep
 
 DT = 0.01

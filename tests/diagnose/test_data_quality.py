@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.characterize import fit_candidate, fit_linear
-from rigsight.diagnose.data_quality import data_quality, with_best_model
+from rigsight.diagnose.candidates.characterize import fit_candidate, fit_linear
+from rigsight.diagnose.data.data_quality import data_quality, with_best_model
+from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.data.sensor_faults import sensor_faults
 from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.finding import DataQuality
-from rigsight.diagnose.sensor_faults import sensor_faults
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
@@ -24,7 +24,7 @@ from rigsight.identify import characteristic_scales, linear_start
 from rigsight.records import Hold, Record
 from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.campaigns.campaign import read_campaign
 
 CONSTANTS = {"gain": 1.0}
 VALUES = {**CONSTANTS, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}

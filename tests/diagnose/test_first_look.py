@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.first_look import look_at
+from rigsight.diagnose.candidates.first_look import look_at
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep

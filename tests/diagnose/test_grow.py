@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.diagnose.grow import pruned
+from rigsight.diagnose.candidates.grow import pruned
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from rigsight.diagnose.characterize import fit_linear
-from rigsight.diagnose.grow_in_windows import pairs_in_windows
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.windows import Windowing
 from rigsight.diagnose.workbench import Workbench, liveliest
 from rigsight.effects import effect_named

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.lateral_leg import fit_lateral_leg
+from rigsight.diagnose.location.lateral_leg import fit_lateral_leg
 from rigsight.diagnose.workbench import Workbench
 from rigsight.metrics import rms
 from rigsight.records import Record

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rigsight.diagnose.characterize import fit_linear
-from rigsight.diagnose.gap_parts import Localization
-from rigsight.diagnose.localize import localize
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.location.gap_parts import Localization
+from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.result import STAGES, NoiseFloor, Trace
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import effect_named

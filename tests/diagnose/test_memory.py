@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.diagnose.starts import restart_values
+from rigsight.diagnose.candidates.starts import restart_values
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records.record import Record

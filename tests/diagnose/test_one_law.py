@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.one_law import is_linear, is_one_law, told_apart
+from rigsight.diagnose.candidates.one_law import is_linear, is_one_law, told_apart
 from rigsight.effects import CATALOGUE
 
 SPRINGS = ("bouc_wen_hysteresis", "cubic_stiffness")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, candidates_on, diagnose
-from rigsight.diagnose.characterize import fit_linear
-from rigsight.diagnose.places import search_places
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.places.search import search_places
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import effect_named, placed
 from rigsight.identify import characteristic_scales

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.diagnose.probes import (
+from rigsight.diagnose.places.probes import (
     PUSH_SIZE,
     STIFFNESS,
     alone,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover.driven_states import is_filter, states_along
-from rigsight.discover.library import offered_effects
 from rigsight.discover.motion import Motion
+from rigsight.discover.terms.driven_states import is_filter, states_along
+from rigsight.discover.terms.library import offered_effects
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.effects.effect import State
 from rigsight.effects.symbols import u

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 import sympy as sp
 
-from rigsight.discover.equations import equations
+from rigsight.discover.terms.equations import equations
 from rigsight.effects import effect_named
 from rigsight.effects.iwan_hysteresis import N_ELEMENTS
 from rigsight.rigs import AXIS, RIGS, Rig

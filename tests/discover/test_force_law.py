@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rigsight.discover.force_law import ForceLaw, force_equation
-from rigsight.discover.hysteresis import is_loop
 from rigsight.discover.motion import Motion
+from rigsight.discover.terms.force_law import ForceLaw, force_equation
+from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.effects.symbols import deflection_rate

@@ -15,8 +15,8 @@ from rigsight.errors import InputError
 from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
 from rigsight.units import parse_dimension
-from rigsight.workflow.effect_declaration import declaration_faults
-from rigsight.workflow.effect_promises import (
+from rigsight.workflow.own.effect_declaration import declaration_faults
+from rigsight.workflow.own.effect_promises import (
     FULL,
     PER_PERIOD,
     PROMISES,

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from rigsight.export import export_model
-from rigsight.simulate.compiler import c_compilers
-from rigsight.simulate.kernel_cache import kernel_options
-from rigsight.simulate.kernel_equations import KernelEquations
-from rigsight.simulate.kernel_source import accurate_integrator
+from rigsight.simulate.compiled.compiler import c_compilers
+from rigsight.simulate.compiled.kernel_cache import kernel_options
+from rigsight.simulate.compiled.kernel_equations import KernelEquations
+from rigsight.simulate.compiled.kernel_source import accurate_integrator
 
 STRICT = ("-O2", "-Wall", "-Wextra", "-Werror", "-std=c99", "-pedantic")
 TO_ROUNDING = 1e-11

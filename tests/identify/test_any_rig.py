@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales
-from rigsight.identify.first_states import first_state, state_at_rest
+from rigsight.identify.fit.first_states import first_state, state_at_rest
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS, RUNNING_GEAR, Rig
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3

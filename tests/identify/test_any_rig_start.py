@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.identify import linear_start
 from rigsight.identify.rig_equations import equations_of
-from rigsight.identify.weak_equations import WeakEquations
+from rigsight.identify.start.weak_equations import WeakEquations
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS, Rig
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 DT = 5e-3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
-from rigsight.identify.coordinates import Coordinates
+from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.rigs import AXIS, RUNNING_GEAR
 from rigsight.simulate import compose, parameter_vector
 

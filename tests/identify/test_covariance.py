@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from rigsight.identify.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
 
 N = 4000
 

@@ -10,7 +10,7 @@ import numpy as np
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
 from rigsight.rigs import rig_file_text
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep
-from rigsight.identify.record_response import METHODS, driven_band, record_response
+from rigsight.identify.transfer.record_response import METHODS, driven_band, record_response
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate

@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import log_sweep
-from rigsight.identify.coordinates import Coordinates
-from rigsight.identify.fit_problem import Problem
-from rigsight.identify.grey_box import GreyBoxFit
-from rigsight.identify.scales import characteristic_scales
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.fit_problem import Problem
+from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.start.scales import characteristic_scales
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
 from rigsight.simulate import Substeps, carries_tangents, compose, simulate, simulate_outputs
 from rigsight.simulate.kinks import freeze
 from rigsight.units import characteristic_value
-from rigsight.workflow.effect_promises import AXIS_BENCH, GEAR_BENCH
+from rigsight.workflow.own.effect_promises import AXIS_BENCH, GEAR_BENCH
 
 DT, N_SAMPLES = 5e-3, 600
 STEP = 3e-5

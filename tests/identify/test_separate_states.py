@@ -9,9 +9,9 @@ from rigsight.diagnose.windows import Windowing
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
-from rigsight.identify.coordinates import Coordinates
-from rigsight.identify.first_states import first_state
-from rigsight.identify.separate_states import SeparateStates
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.first_states import first_state
+from rigsight.identify.fit.separate_states import SeparateStates
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate

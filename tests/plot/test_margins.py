@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rigsight import plot
-from rigsight.diagnose.gap_parts import BandPart, RecordPart, TimePart
+from rigsight.diagnose.location.gap_parts import BandPart, RecordPart, TimePart
 from rigsight.diagnose.result import Stage
 from rigsight.frequency import FrequencyResponse
 from rigsight.plot.drawing import new_figure

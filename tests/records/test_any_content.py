@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rigsight.errors import InputError
-from rigsight.records.channel_file import SUFFIXES
-from rigsight.workflow.inspect import run_inspect
+from rigsight.records.formats.channel_file import SUFFIXES
+from rigsight.workflow.campaigns.inspect import run_inspect
 
 from .formats import FORMATS
 from .test_damaged_formats import SIGNALS, read
@@ -68,7 +68,7 @@ def test_a_sound_file_with_any_damage(
     tmp_path: Path, name: str, data: st.DataObject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # In this process: what the readers themselves make of it is the question.
-    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
+    monkeypatch.setattr("rigsight.records.formats.channel_file.PACKAGES", {})
     suffix, write = FORMATS[name]
     path = tmp_path / f"run{suffix}"
     t = 0.01 * np.arange(60)

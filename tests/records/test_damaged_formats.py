@@ -159,7 +159,7 @@ def test_a_matlab_file_that_declares_more_than_it_holds_is_refused_unread(
     def load(*_: object, **__: object) -> None:
         pytest.fail("it was read")
 
-    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
+    monkeypatch.setattr("rigsight.records.formats.channel_file.PACKAGES", {})
     monkeypatch.setattr("scipy.io.loadmat", load)
     path = tmp_path / "run.mat"
     path.write_bytes(HEADER + BOMBS[bomb])
@@ -169,8 +169,8 @@ def test_a_matlab_file_that_declares_more_than_it_holds_is_refused_unread(
 def test_a_matlab_file_that_unpacks_to_too_much_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
-    monkeypatch.setattr("rigsight.records.matlab_elements._LARGEST_VARIABLE", 10_000)
+    monkeypatch.setattr("rigsight.records.formats.channel_file.PACKAGES", {})
+    monkeypatch.setattr("rigsight.records.formats.matlab_elements._LARGEST_VARIABLE", 10_000)
     path = tmp_path / "run.mat"
     path.write_bytes(HEADER + element(15, zlib.compress(element(14, bytes(1_000_000)))))
     with pytest.raises(InputError, match="unpacks to more than"):
@@ -197,7 +197,7 @@ def test_a_library_that_does_not_come_back_is_ended_and_told(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, _ = contents(tmp_path, name)
-    monkeypatch.setattr("rigsight.records.isolated_reader.LONGEST_WAIT", 0.0)
+    monkeypatch.setattr("rigsight.records.formats.isolated_reader.LONGEST_WAIT", 0.0)
     message = told(path)
     assert message is not None
     assert "crash, or run in circles" in message

@@ -11,7 +11,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping, Record, read_record
-from rigsight.records.channel_file import open_channels
+from rigsight.records.formats.channel_file import open_channels
 
 from .formats import (
     FORMATS,
@@ -384,6 +384,6 @@ def test_too_many_samples_are_refused_before_they_are_read(
 
 def test_too_large_a_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_matlab(tmp_path / "run.mat", rows(), {})
-    monkeypatch.setattr("rigsight.records.channel_file.LARGEST_FILE", 10)
+    monkeypatch.setattr("rigsight.records.formats.channel_file.LARGEST_FILE", 10)
     with pytest.raises(InputError, match="more than the 1e-08 GB"):
         read(tmp_path / "run.mat")

@@ -14,9 +14,9 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import read_record
-from rigsight.records.channel import MOST_IN_TABLE, Refused, check_total, columns_of, kept_last
-from rigsight.records.csv_channels import open_measurement
-from rigsight.workflow.inspect import run_inspect
+from rigsight.records.formats.channel import MOST_IN_TABLE, Refused, check_total, columns_of, kept_last
+from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.workflow.campaigns.inspect import run_inspect
 
 from .formats import write_matlab_packed, write_parquet
 from .test_damaged_formats import HEADER, Named, element, matrix
@@ -61,7 +61,7 @@ def test_a_line_without_end_is_refused(tmp_path: Path) -> None:
 def test_more_lines_than_samples_are_read_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.text_file._MOST_LINES", 1000)
+    monkeypatch.setattr("rigsight.records.formats.text_file._MOST_LINES", 1000)
     (tmp_path / "run.csv").write_text("t,u\n" + "\n" * 1001, encoding="utf-8")
     with pytest.raises(InputError, match="more than 1000 lines"):
         run_inspect(tmp_path / "run.csv")
@@ -113,7 +113,7 @@ def test_a_sample_time_that_makes_endless_samples_is_refused(tmp_path: Path) -> 
 def test_channels_that_are_too_long_together_are_refused_unread(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.channel.MOST_SAMPLES_IN_ALL", 179)
+    monkeypatch.setattr("rigsight.records.formats.channel.MOST_SAMPLES_IN_ALL", 179)
     write_parquet(tmp_path / "run.parquet", ROWS, {})
     with pytest.raises(InputError, match="180 samples together, more than the 179"):
         run_inspect(tmp_path / "run.parquet")
@@ -159,8 +159,8 @@ def test_packed_variables_that_are_too_large_together_are_refused(
     packed = zlib.compress(matrix(6, (1000, 1), element(9, bytes(8000))))
     one = struct.pack("<II", 15, len(packed)) + packed
     (tmp_path / "run.mat").write_bytes(HEADER + one * 3)
-    monkeypatch.setattr("rigsight.records.channel_file.PACKAGES", {})
-    monkeypatch.setattr("rigsight.records.matlab_elements._MOST_UNPACKED", 20_000)
+    monkeypatch.setattr("rigsight.records.formats.channel_file.PACKAGES", {})
+    monkeypatch.setattr("rigsight.records.formats.matlab_elements._MOST_UNPACKED", 20_000)
     with pytest.raises(InputError, match="together, the most that is read"):
         run_inspect(tmp_path / "run.mat")
 
@@ -195,7 +195,7 @@ def test_signs_that_no_list_can_hold_leave_names_and_the_proposal_is_toml(tmp_pa
 def test_a_process_that_reads_takes_no_more_memory_than_it_may() -> None:
     code = (
         "import numpy as np\n"
-        "from rigsight.records.reader_process import limit_memory\n"
+        "from rigsight.records.formats.reader_process import limit_memory\n"
         "limit_memory(10_000_000)\n"
         "held = np.ones(500_000)\n"
         "try:\n"
@@ -210,7 +210,8 @@ def test_a_process_that_reads_takes_no_more_memory_than_it_may() -> None:
 def test_the_memory_that_a_file_may_take_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_matlab_packed(tmp_path / "run.mat", ROWS, {})
     monkeypatch.setattr(
-        "rigsight.records.isolated_reader.json.loads", lambda _: {"error": "MemoryError", "reason": ""}
+        "rigsight.records.formats.isolated_reader.json.loads",
+        lambda _: {"error": "MemoryError", "reason": ""},
     )
     with pytest.raises(
         InputError, match=r"run.mat needs more memory than the 1 GB that a file of its size may take"

@@ -7,7 +7,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping
-from rigsight.records.read_csv import read_csv
+from rigsight.records.formats.read_csv import read_csv
 
 ROWS = np.array([[0.0, 1.5, -2.25], [0.1, 1e-3, 3.5], [0.2, -7.0, 4.125], [0.3, 0.5, 1.0]])
 BY_NAME = {name: ColumnMapping(name) for name in "tux"}
@@ -159,7 +159,7 @@ def test_missing_file_and_folder_are_told(tmp_path: Path) -> None:
 def test_too_large_a_file_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rigsight.records.text_file.LARGEST_FILE", 10)
+    monkeypatch.setattr("rigsight.records.formats.text_file.LARGEST_FILE", 10)
     with pytest.raises(InputError, match="more than the 1e-08 GB"):
         read(tmp_path, text())
 

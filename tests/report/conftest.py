@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.finding import AmplitudeDependence, DataQuality, Finding
-from rigsight.diagnose.gap_parts import (
+from rigsight.diagnose.data.finding import AmplitudeDependence, DataQuality, Finding
+from rigsight.diagnose.location.gap_parts import (
     AmplitudePart,
     BandPart,
     Localization,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rigsight.blind import Outcome
-from rigsight.report.blind_confusion import confusion, pair_rows
+from rigsight.report.blind_bench.confusion import confusion, pair_rows
 
 from .blind_content import content_of
 

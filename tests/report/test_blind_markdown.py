@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rigsight.blind import Outcome
-from rigsight.report.blind_markdown import blind_markdown
+from rigsight.report.blind_bench.markdown import blind_markdown
 
 from .blind_content import content_of
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rigsight.blind import Outcome
-from rigsight.report.blind_page import render_blind
+from rigsight.report.blind_bench.page import render_blind
 
 from .blind_content import content_of
 from .chromium import BROWSERS, Chromium, find

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.charts import (
+from rigsight.report.drawing.charts import (
     ChartPanel,
     Curve,
     chart_data,

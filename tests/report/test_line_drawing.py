@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from rigsight.report.line_drawing import Area, DrawnPanel, Line, around, line_drawing
+from rigsight.report.drawing.line_drawing import Area, DrawnPanel, Line, around, line_drawing
 
 X = np.linspace(2.0, 4.0, 21)
 

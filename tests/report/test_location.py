@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 
-from rigsight.diagnose.gap_parts import Localization
+from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.result import Diagnosis
 from rigsight.report import render_report
 from rigsight.report.location import output_maps, path_rows

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.result import Diagnosis, Trace
-from rigsight.report.loop_figures import loop_figures
+from rigsight.report.drawing.loop_figures import loop_figures
 
 
 def sine_trace(n_periods: int, worst: int) -> Trace:

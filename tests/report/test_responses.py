@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.result import Diagnosis
-from rigsight.report.response_charts import amplitude_figures
+from rigsight.report.drawing.response_charts import amplitude_figures
 from rigsight.report.responses import record_responses
 
 

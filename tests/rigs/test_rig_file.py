@@ -10,7 +10,7 @@ import sympy as sp
 
 from rigsight.errors import InputError
 from rigsight.rigs import RIGS, read_rig_file, rig_file_text
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 
 TRAIN = rig_file_text("drive_train")
 

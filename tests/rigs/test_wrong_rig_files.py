@@ -6,7 +6,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.rigs import rig_file_text
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 
 TRAIN = rig_file_text("drive_train")
 MISTAKES = [

@@ -17,8 +17,8 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, kernel_cache, simulate
-from rigsight.simulate.compiler import c_compilers, library
-from rigsight.simulate.kernel_source import kernel_source
+from rigsight.simulate.compiled.compiler import c_compilers, library
+from rigsight.simulate.compiled.kernel_source import kernel_source
 
 PROGRAM = """
 import hashlib
@@ -27,7 +27,7 @@ from rigsight.effects import effect_named
 from rigsight.records.record import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
-from rigsight.simulate.kernel_cache import compiled
+from rigsight.simulate.compiled.kernel_cache import compiled
 t = 5e-3 * np.arange(4000)
 record = Record(name="r", dt=5e-3, signals={"u": 0.5 * np.sin(t + 0.6 * t**2)}, units={})
 values = dict(v=1.0, r_0=0.1, b=0.3, k_tau=0.27, J_z=0.56, k_c=81.0, k_d=2.0, l_0=0.25, c_y=0.98, psi_off=1e-3, y_off=1e-3)
@@ -111,7 +111,7 @@ def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):
 def test_source_does_not_depend_on_the_order_of_hashes():
     program = (
         "from rigsight.effects import CATALOGUE; from rigsight.rigs import RUNNING_GEAR\n"
-        "from rigsight.simulate import compose; from rigsight.simulate.kernel_source import kernel_source\n"
+        "from rigsight.simulate import compose; from rigsight.simulate.compiled.kernel_source import kernel_source\n"
         "import hashlib; print(hashlib.sha256(kernel_source(compose(RUNNING_GEAR, CATALOGUE)).encode()).hexdigest())"
     )
     source = str(Path(rigsight.__file__).parents[1])
@@ -152,7 +152,7 @@ def test_kernels_of_somebody_else_that_may_only_be_read_are_used_and_others_told
     structure = compose(AXIS, [effect_named("cubic_stiffness")])
     kernel_cache.kernel_of(structure)
     kernel_cache._kernels.clear()
-    monkeypatch.setattr("rigsight.simulate.kernel_cache.tempfile.mkstemp", unwritable)
+    monkeypatch.setattr("rigsight.simulate.compiled.kernel_cache.tempfile.mkstemp", unwritable)
     kernel_cache.kernel_of(structure)
     with pytest.raises(InputError, match=r"Read-only.*Set RIGSIGHT_CACHE_DIR"):
         kernel_cache.kernel_of(compose(AXIS, [effect_named("end_stop")]))

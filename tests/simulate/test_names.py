@@ -10,7 +10,7 @@ import pytest
 from rigsight.effects import effect_named, placed
 from rigsight.records import Record
 from rigsight.rigs import rig_file_text
-from rigsight.rigs.rig_file import rig_of_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 TRAIN = rig_file_text("drive_train")

@@ -20,8 +20,8 @@ import pytest
 
 import rigsight
 from rigsight.errors import InputError, RigsightError
-from rigsight.workflow import blind_execution
-from rigsight.workflow.blind_execution import finished
+from rigsight.workflow.blind_bench import execution
+from rigsight.workflow.blind_bench.execution import finished
 
 PATIENCE = 120.0
 
@@ -172,7 +172,7 @@ class Asked(Sequence[int]):
 def test_a_bench_waits_for_workers_and_what_is_left_early_begins_no_more(
     address: str, tmp_path: Path, files: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(blind_execution, "_LOOK_AGAIN", 0.3)
+    monkeypatch.setattr(execution, "_LOOK_AGAIN", 0.3)
     said: list[str] = []
     trials = Asked()
     with ExitStack() as later:
@@ -205,7 +205,7 @@ def test_an_error_of_a_trial_on_a_worker_is_raised(address: str, tmp_path: Path,
 
 @on_a_cluster
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blind_execution, "_REACHED_WITHIN", 1.0)
+    monkeypatch.setattr(execution, "_REACHED_WITHIN", 1.0)
     with closing(socket.create_server(("127.0.0.1", 0))) as server:
         free = f"tcp://127.0.0.1:{server.getsockname()[1]}"
     for wrong in (free, "tcp://127.0.0.1:nonsense", "no/address"):
@@ -253,7 +253,7 @@ def test_a_scheduler_that_dies_is_told_in_one_message(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Whoever takes the results may be away while the connection is given up.
-    monkeypatch.setattr(blind_execution, "_REACHED_WITHIN", 1.0)
+    monkeypatch.setattr(execution, "_REACHED_WITHIN", 1.0)
     # Dask's messages go to handlers of its own.
     monkeypatch.setattr(logging.getLogger("distributed"), "propagate", True)
     with scheduler(tmp_path) as (own, process), worker(own, tmp_path):
@@ -268,7 +268,7 @@ def test_a_scheduler_that_dies_is_told_in_one_message(
 
 @on_a_cluster
 def test_a_trial_that_kills_its_workers_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blind_execution, "_ROUNDS", 2)
+    monkeypatch.setattr(execution, "_ROUNDS", 2)
 
     def run(trial: int) -> int:
         os.kill(os.getpid(), signal.SIGKILL)

@@ -15,10 +15,10 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.workflow import blind
 from rigsight.workflow.blind import run_blind, run_external
-from rigsight.workflow.blind_external import ExternalBench
-from rigsight.workflow.blind_files import RUN_FILE, read_json
-from rigsight.workflow.blind_scoring import score_trial
-from rigsight.workflow.blind_trial import diagnose_trial
+from rigsight.workflow.blind_bench.external import ExternalBench
+from rigsight.workflow.blind_bench.files import RUN_FILE, read_json
+from rigsight.workflow.blind_bench.scoring import score_trial
+from rigsight.workflow.blind_bench.trial import diagnose_trial
 
 NAME = "hardening spring no. 3"
 """A label that tells the effect, in a folder's name that is no number."""

@@ -10,10 +10,10 @@ import pytest
 
 from rigsight.blind import Outcome
 from rigsight.errors import InputError
-from rigsight.workflow import blind_score_files
-from rigsight.workflow.blind_files import STORE_FILE
-from rigsight.workflow.blind_score_files import Scored, merge, write_markdown, write_score
-from rigsight.workflow.blind_store import TrialStore
+from rigsight.workflow.blind_bench import score_files
+from rigsight.workflow.blind_bench.files import STORE_FILE
+from rigsight.workflow.blind_bench.score_files import Scored, merge, write_markdown, write_score
+from rigsight.workflow.blind_bench.store import TrialStore
 
 Like = Callable[..., Outcome]
 
@@ -67,7 +67,7 @@ def test_a_wrong_trial_links_to_its_report_from_wherever_the_score_is(
 def test_a_large_score_keeps_its_figures_and_lists_wrong_trials_alone(
     tmp_path: Path, outcome_like: Like, wrong_outcome: Like, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(blind_score_files, "MOST_LISTED", 3)
+    monkeypatch.setattr(score_files, "MOST_LISTED", 3)
     outcomes = [outcome_like(trial=f"{n:03d}") for n in range(3)]
     few = write_score(tmp_path, [Scored(o, tmp_path) for o in outcomes], "x")
     assert len(few["trials"]) == 3

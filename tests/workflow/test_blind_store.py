@@ -16,7 +16,7 @@ import pytest
 
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.errors import InputError
-from rigsight.workflow.blind_store import TrialStore
+from rigsight.workflow.blind_bench.store import TrialStore
 
 Like = Callable[..., Outcome]
 
@@ -24,7 +24,7 @@ WRITES_ON = """
 import json, sys
 from pathlib import Path
 from rigsight.blind import Outcome
-from rigsight.workflow.blind_store import TrialStore
+from rigsight.workflow.blind_bench.store import TrialStore
 lists = {{"places": (), "named": (), "named_places": (), "withheld": (), "parameters": ()}}
 content = json.loads(sys.argv[2]) | {{"effects": ("backlash",)}} | lists
 with TrialStore(Path(sys.argv[1])) as store:

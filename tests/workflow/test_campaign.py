@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.campaigns.campaign import read_campaign
 
 HEAD = """
 title = "rear axle"

@@ -8,7 +8,7 @@ import pytest
 
 from rigsight.rigs.published import published_sets
 from rigsight.workflow import demo
-from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.campaigns.campaign import read_campaign
 
 
 @pytest.fixture

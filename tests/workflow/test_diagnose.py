@@ -11,7 +11,7 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.conicity import creep_factor
-from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.campaigns.campaign import read_campaign
 from rigsight.workflow.diagnose import run_diagnose, task_of
 from rigsight.workflow.kernels import structures_to_try
 from rigsight.workflow.progress import Step

@@ -12,7 +12,7 @@ from rigsight.discover import MONOMIALS
 from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, State
 from rigsight.effects.symbols import u, v, x
 from rigsight.parameters import Parameter
-from rigsight.workflow.effect_declaration import declaration_faults
+from rigsight.workflow.own.effect_declaration import declaration_faults
 
 c = sp.Symbol("c", real=True)
 z = sp.Symbol("z", real=True)

@@ -11,7 +11,7 @@ from rigsight.diagnose import Diagnosis
 from rigsight.effects import effect_named
 from rigsight.errors import MachineError
 from rigsight.workflow.diagnose import run_diagnose
-from rigsight.workflow.fit_journal import FitJournal
+from rigsight.workflow.files.fit_journal import FitJournal
 from rigsight.workflow.progress import Step
 
 CANDIDATES = [effect_named(name) for name in ("cubic_stiffness", "coulomb_friction")]
@@ -33,7 +33,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.fixture
 def journals(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr("rigsight.workflow.fit_journal.cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr("rigsight.workflow.files.fit_journal.cache_folder", lambda: tmp_path / "cache")
     return tmp_path / "cache/unfinished"
 
 
@@ -105,7 +105,7 @@ def test_a_cache_that_cannot_be_written_stops_nothing(
 ) -> None:
     in_the_way = tmp_path / "file"
     in_the_way.write_text("")
-    monkeypatch.setattr("rigsight.workflow.fit_journal.cache_folder", lambda: in_the_way)
+    monkeypatch.setattr("rigsight.workflow.files.fit_journal.cache_folder", lambda: in_the_way)
     assert diagnosed(axis_campaign).verdict
 
 

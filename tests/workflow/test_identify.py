@@ -187,7 +187,7 @@ def test_nothing_half_written_is_left(
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("rigsight.workflow.results.os.fsync", broken)
+    monkeypatch.setattr("rigsight.workflow.files.results.os.fsync", broken)
     with pytest.raises(InputError, match="disk is full"):
         run_identify(linear_folder, tmp_path / "new" / "out")
     assert not (tmp_path / "new").exists()

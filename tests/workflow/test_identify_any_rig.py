@@ -20,9 +20,9 @@ from rigsight.records.record import Record, Role
 from rigsight.report.identification import identification_summary
 from rigsight.rigs import RIGS, Rig, read_rig_file, rig_file_text
 from rigsight.simulate import compose, simulate
-from rigsight.workflow import identification_any_rig
+from rigsight.workflow.campaigns.in_memory import make_campaign
+from rigsight.workflow.identification import any_rig
 from rigsight.workflow.identify import checked_wishes, identify_campaign, run_identify, write_identification
-from rigsight.workflow.in_memory import make_campaign
 
 Floats = NDArray[np.float64]
 DT, N = 0.01, 2000
@@ -73,7 +73,7 @@ def identified(
 ) -> Identification:
     """Identify from start values a fifth beside the truth: how such are found is not the question here."""
     start = {p.name: 1.2 * truth[p.name] for p in rig.parameters}
-    monkeypatch.setattr(identification_any_rig, "linear_start", lambda *_: start)
+    monkeypatch.setattr(any_rig, "linear_start", lambda *_: start)
     campaign = make_campaign(rig, records, constants=constants)
     return identify_campaign(campaign, checked_wishes("local_rational", None))
 

@@ -13,11 +13,11 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import Record
-from rigsight.workflow.campaign import read_campaign
+from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaigns.in_memory import make_campaign, make_model
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig
 from rigsight.workflow.diagnose import diagnose_campaign, run_diagnose
-from rigsight.workflow.in_memory import make_campaign, make_model
-from rigsight.workflow.model_file import model_of, read_model
+from rigsight.workflow.files.model_file import model_of, read_model
 
 CUBIC = effect_named("cubic_stiffness")
 

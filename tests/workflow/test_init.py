@@ -11,9 +11,9 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.rigs import rig_file_text
-from rigsight.workflow.campaign import read_campaign
-from rigsight.workflow.init import run_init
-from rigsight.workflow.own_rigs import own_rigs
+from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaigns.init import run_init
+from rigsight.workflow.own.own_rigs import own_rigs
 
 from ..records.formats import write_mdf, write_parquet, write_text
 

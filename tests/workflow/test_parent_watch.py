@@ -13,7 +13,7 @@ import pytest
 CHILD = (
     "import os, time\n"
     "from rigsight.cli.signals import ended_by_signals\n"
-    "from rigsight.workflow.parent_watch import end_with_parent\n"
+    "from rigsight.workflow.blind_bench.parent_watch import end_with_parent\n"
     "end_with_parent(os.getcwd())\n"
     "with ended_by_signals():\n"
     "    print('ready', flush=True)\n"

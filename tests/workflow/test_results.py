@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.workflow import results
-from rigsight.workflow.results import (
+from rigsight.workflow.files import results
+from rigsight.workflow.files.results import (
     check_target,
     check_writable,
     json_text,
     write_together,
 )
-from rigsight.workflow.unfinished_files import hidden, write_locked
+from rigsight.workflow.files.unfinished_files import hidden, write_locked
 
 CONTENTS = {"a.json": "{}\n", "b.html": "<p>ä</p>\n"}
 
@@ -225,7 +225,7 @@ def test_a_disk_that_is_full_for_real_leaves_the_old_files(bytes_left: int, tmp_
         (tmp_path / name).write_text("old")
     code = (
         "import sys; from pathlib import Path; from rigsight.errors import InputError\n"
-        "from rigsight.workflow.results import write_together\n"
+        "from rigsight.workflow.files.results import write_together\n"
         "try: write_together(Path(sys.argv[1]), {'a': 'x' * 20_000, 'b': 'x' * 40_000})\n"
         "except InputError as error: sys.exit(str(error))"
     )

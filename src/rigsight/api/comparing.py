@@ -9,7 +9,7 @@ from rigsight.api.comparison_result import ComparisonResult
 from rigsight.api.estimator import campaign_of
 from rigsight.compare import Competitor
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign import Campaign
+from rigsight.workflow.campaigns.campaign import Campaign
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig
 from rigsight.workflow.kernels import checked_jobs
 from rigsight.workflow.progress_display import listening

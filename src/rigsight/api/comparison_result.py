@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 from rigsight.api.choice import named
 from rigsight.api.tables import data_frame
 from rigsight.compare import Comparison
-from rigsight.report.comparison_figures import overall_figure, record_figures
+from rigsight.report.drawing.comparison_figures import overall_figure, record_figures
 from rigsight.report.notebook import comparison_html
 from rigsight.workflow.compare import write_comparison
 

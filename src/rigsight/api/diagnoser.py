@@ -11,11 +11,11 @@ from rigsight.api.estimator import CampaignEstimator, campaign_of
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign import Campaign
+from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.campaigns.in_memory import effects_of
 from rigsight.workflow.diagnose import diagnose_campaign
-from rigsight.workflow.in_memory import effects_of
+from rigsight.workflow.files.model_file import model_of
 from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.model_file import model_of
 from rigsight.workflow.progress_display import listening
 
 

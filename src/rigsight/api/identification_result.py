@@ -11,7 +11,7 @@ from rigsight.api.tables import data_frame
 from rigsight.errors import InputError, check_option
 from rigsight.identify.identification import Identification
 from rigsight.report.notebook import identification_html
-from rigsight.workflow.identification_figures import amplitudes_figure, bode_figure, responses_figure
+from rigsight.workflow.identification.figures import amplitudes_figure, bode_figure, responses_figure
 from rigsight.workflow.identify import write_identification
 
 if TYPE_CHECKING:

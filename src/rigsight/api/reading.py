@@ -8,8 +8,8 @@ from pathlib import Path
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
 from rigsight.rigs import Rig
-from rigsight.workflow.given_simulation import checked_numbers
-from rigsight.workflow.in_memory import rig_of
+from rigsight.workflow.campaigns.given_simulation import checked_numbers
+from rigsight.workflow.campaigns.in_memory import rig_of
 
 
 def read_record(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rigsight.blind.waveforms import Disturbance, Doublet, Multisine, Sweep, Waveform, samples
 from rigsight.errors import SimulationError
 from rigsight.identify.rig_equations import equations_of
-from rigsight.identify.rig_motion import simulated_motion
+from rigsight.identify.start.rig_motion import simulated_motion
 from rigsight.records import Hold, Kind, Record, Role
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, simulate

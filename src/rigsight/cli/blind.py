@@ -86,9 +86,9 @@ def blind(
     """
     with told(debug, "the same command goes on from here"), listening(quiet) as listener:
         from rigsight.workflow import blind as bench
-        from rigsight.workflow.blind_score_files import merge as merged
-        from rigsight.workflow.blind_score_files import write_markdown
-        from rigsight.workflow.results import check_target
+        from rigsight.workflow.blind_bench.score_files import merge as merged
+        from rigsight.workflow.blind_bench.score_files import write_markdown
+        from rigsight.workflow.files.results import check_target
 
         _check_together(campaigns, keys, merge or [], rescore, trial or [])
         if markdown is not None:

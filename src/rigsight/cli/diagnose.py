@@ -50,8 +50,8 @@ def diagnose(
     """
     with told(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
-        from rigsight.workflow.own_effects import named, own_effects
-        from rigsight.workflow.own_rigs import own_rigs
+        from rigsight.workflow.own.own_effects import named, own_effects
+        from rigsight.workflow.own.own_rigs import own_rigs
 
         own = own_effects(effects or [], listener=listener)
         diagnosis = run_diagnose(

@@ -28,7 +28,7 @@ def list_effects(
     """
     with told(debug), listening(quiet) as listener:
         from rigsight.effects import CATALOGUE
-        from rigsight.workflow.own_effects import equation_text, own_effects
+        from rigsight.workflow.own.own_effects import equation_text, own_effects
 
         own = own_effects(effects or [], listener=listener)
         if json:
@@ -43,7 +43,7 @@ def list_effects(
 
 
 def _listed(effects: Iterable[Effect]) -> list[dict[str, object]]:
-    from rigsight.workflow.effect_declaration import equations
+    from rigsight.workflow.own.effect_declaration import equations
 
     return [
         {

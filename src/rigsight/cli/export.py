@@ -70,8 +70,8 @@ def export(
     """
     with told(debug):
         from rigsight.workflow.export import run_export
-        from rigsight.workflow.own_effects import own_effects
-        from rigsight.workflow.own_rigs import own_rigs
+        from rigsight.workflow.own.own_effects import own_effects
+        from rigsight.workflow.own.own_rigs import own_rigs
 
         file = run_export(
             model,

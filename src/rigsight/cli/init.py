@@ -35,7 +35,7 @@ def init(
     Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten.
     """
     with told(debug):
-        from rigsight.workflow.init import run_init
+        from rigsight.workflow.campaigns.init import run_init
 
         draft = run_init(folder, model=model, rig_files=rigs or [])
     if json:

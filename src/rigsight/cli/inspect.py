@@ -14,7 +14,7 @@ from rigsight.cli.terminal import show, show_as_json
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rigsight.workflow.inspect import Inspection
+    from rigsight.workflow.campaigns.inspect import Inspection
 
 
 def inspect(
@@ -31,8 +31,8 @@ def inspect(
 ) -> None:
     """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
     with told(debug):
-        from rigsight.workflow.inspect import run_inspect
-        from rigsight.workflow.own_rigs import own_rigs
+        from rigsight.workflow.campaigns.inspect import run_inspect
+        from rigsight.workflow.own.own_rigs import own_rigs
 
         found = run_inspect(file, own_rigs(rigs or []).values())
     if json:

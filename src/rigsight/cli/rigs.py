@@ -32,12 +32,12 @@ def list_rigs(
     with told(debug):
         from rigsight.errors import InputError, check_option
         from rigsight.rigs import rig_file_text
-        from rigsight.workflow.own_rigs import known_rigs, own_rigs
+        from rigsight.workflow.own.own_rigs import known_rigs, own_rigs
 
         files = own_rigs(rigs or [])
         known = known_rigs(files.values())
         if picture is not None:
-            from rigsight.workflow.rig_picture_file import write_rig_picture
+            from rigsight.workflow.files.rig_picture_file import write_rig_picture
 
             if name is None:
                 raise InputError("Which rig is to be drawn? Name it: rigsight rigs NAME --picture FILE.png.")

@@ -84,8 +84,8 @@ def simulate(
     """
     file = out or Path(f"{record.stem}_simulated.csv")
     with told(debug), listening(quiet):
-        from rigsight.workflow.own_effects import own_effects
-        from rigsight.workflow.own_rigs import own_rigs
+        from rigsight.workflow.own.own_effects import own_effects
+        from rigsight.workflow.own.own_rigs import own_rigs
         from rigsight.workflow.simulate import run_simulate
 
         simulated = run_simulate(

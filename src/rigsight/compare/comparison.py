@@ -23,7 +23,7 @@ from rigsight.compare.score import QUANTITIES, Column, Score
 from rigsight.compare.step_error import DEFAULT_SECONDS, StepWindow, step_window
 from rigsight.errors import InputError, SimulationError
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.record_response import Method
+from rigsight.identify.transfer.record_response import Method
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant

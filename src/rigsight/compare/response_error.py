@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, responses_of_inputs
 from rigsight.frequency.signal_pair import among
-from rigsight.identify.record_response import Method, record_response
-from rigsight.identify.transfer_form import Order
+from rigsight.identify.transfer.record_response import Method, record_response
+from rigsight.identify.transfer.transfer_form import Order
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.advise import advise
-from rigsight.diagnose.candidates import candidates_on
+from rigsight.diagnose.candidates.grow import Prepare
+from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.detect import AT_REST, noise_floors
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.grow import Prepare
 from rigsight.diagnose.in_catalogue import probability_in_catalogue
-from rigsight.diagnose.localize import localize
+from rigsight.diagnose.location.localize import localize
+from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
-from rigsight.diagnose.quantify import budget_intervals, effect_shares
 from rigsight.diagnose.result import (
     Candidate,
     Diagnosis,

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.chance import fitted_in_windows, is_predictable
-from rigsight.diagnose.characterize import fit_candidate, fit_candidates, fit_linear, refine
-from rigsight.diagnose.data_quality import data_quality, with_best_model
-from rigsight.diagnose.finding import DataQuality
-from rigsight.diagnose.grow import Prepare, grown, pruned
-from rigsight.diagnose.grow_in_windows import pairs_in_windows
-from rigsight.diagnose.one_law import told_apart
-from rigsight.diagnose.places import Search, search_places
+from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
+from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candidates, fit_linear, refine
+from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
+from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
+from rigsight.diagnose.candidates.one_law import told_apart
+from rigsight.diagnose.data.data_quality import data_quality, with_best_model
+from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.places.search import Search, search_places
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.task import Task

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from rigsight.diagnose.one_law import is_one_law
+from rigsight.diagnose.candidates.one_law import is_one_law
 from rigsight.diagnose.rank import Ranking
 from rigsight.diagnose.verdict import AT_FLOOR, Judgement, most_left
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.block_means import RESAMPLES, block_means
+from rigsight.diagnose.location.block_means import RESAMPLES, block_means
 from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored
 from rigsight.effects.effect import Place

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.finding import DataQuality
-from rigsight.diagnose.gap_parts import Localization
+from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.discover import MissingForce
 from rigsight.effects import kind_of
 

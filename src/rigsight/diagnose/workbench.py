@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.candidates import candidates_on
+from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.windows import cut
 from rigsight.effects import Effect
 from rigsight.effects import symbols as canonical

@@ -2,17 +2,17 @@
 
 from rigsight.discover.discovery import METHODS as METHODS
 from rigsight.discover.discovery import discover as discover
-from rigsight.discover.joint_force import ForceTrace as ForceTrace
-from rigsight.discover.joint_force import JointForce as JointForce
-from rigsight.discover.joint_force import JointLaw as JointLaw
-from rigsight.discover.joint_force import missing_forces as missing_forces
-from rigsight.discover.joint_law import LawTerm as LawTerm
+from rigsight.discover.joints.joint_force import ForceTrace as ForceTrace
+from rigsight.discover.joints.joint_force import JointForce as JointForce
+from rigsight.discover.joints.joint_force import JointLaw as JointLaw
+from rigsight.discover.joints.joint_force import missing_forces as missing_forces
+from rigsight.discover.joints.joint_law import LawTerm as LawTerm
 from rigsight.discover.missing_force import MissingForce as MissingForce
 from rigsight.discover.missing_force import missing_force as missing_force
-from rigsight.discover.monomials import MONOMIALS as MONOMIALS
-from rigsight.discover.monomials import known_terms as known_terms
 from rigsight.discover.result import Discovery as Discovery
 from rigsight.discover.task import Task as Task
+from rigsight.discover.terms.monomials import MONOMIALS as MONOMIALS
+from rigsight.discover.terms.monomials import known_terms as known_terms
 
 __all__ = [
     "METHODS",

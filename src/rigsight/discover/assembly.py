@@ -10,11 +10,11 @@ import numpy as np
 
 from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.doubts import doubts, warnings_of
-from rigsight.discover.equations import equations
-from rigsight.discover.force_law import ForceEquation
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
 from rigsight.discover.task import Task
+from rigsight.discover.terms.equations import equations
+from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.identify import FitResult
 from rigsight.records.record import Record
 from rigsight.simulate.model import Model

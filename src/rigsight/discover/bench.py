@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.library import Candidate
 from rigsight.discover.regression import Projected
 from rigsight.discover.support_starts import SupportStarts
+from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import Rig

@@ -13,15 +13,15 @@ from rigsight.discover.assembly import Found, assembled
 from rigsight.discover.bench import Attempt, Bench, Trial
 from rigsight.discover.ensembles import inclusion, regressed_force
 from rigsight.discover.held_out import split
-from rigsight.discover.hysteresis import is_loop
-from rigsight.discover.joint_discovery import discover_at_joints
-from rigsight.discover.library import Candidate, candidates, offered_effects
+from rigsight.discover.joints.joint_discovery import discover_at_joints
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, own_terms, rows_of
 from rigsight.discover.regression import Projected, alike
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import STRONG, Selection, criterion, select
 from rigsight.discover.task import Task
+from rigsight.discover.terms.hysteresis import is_loop
+from rigsight.discover.terms.library import Candidate, candidates, offered_effects
 from rigsight.discover.weak_form import Rows
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.discover.bench import Trial
-from rigsight.discover.force_law import ForceEquation
 from rigsight.discover.result import Coefficient, Term
 from rigsight.discover.selection import STRONG, Selection, criterion
 from rigsight.discover.task import Task
+from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.effects import Effect
 from rigsight.records.periods import same_signal
 from rigsight.records.record import Record

@@ -9,14 +9,14 @@ import numpy as np
 import sympy as sp
 
 from rigsight.discover.bench import Bench
-from rigsight.discover.force_law import ForceEquation, ForceLaw, force_equation
-from rigsight.discover.hysteresis import is_loop
-from rigsight.discover.library import candidates, torque_along
 from rigsight.discover.motion import Motion
 from rigsight.discover.own_regression import own_regression, own_terms
 from rigsight.discover.regression import inclusion_probabilities
 from rigsight.discover.selection import Selection, proposals
 from rigsight.discover.task import Task
+from rigsight.discover.terms.force_law import ForceEquation, ForceLaw, force_equation
+from rigsight.discover.terms.hysteresis import is_loop
+from rigsight.discover.terms.library import candidates, torque_along
 from rigsight.discover.weak_form import Rows
 from rigsight.identify import FitResult
 

@@ -13,10 +13,10 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.discover.library import candidates, plain_terms
 from rigsight.discover.motion import motion_of
 from rigsight.discover.own_regression import own_regression, rows_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
+from rigsight.discover.terms.library import candidates, plain_terms
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.discover.joint_force import JointForce
+from rigsight.discover.joints.joint_force import JointForce
 
 SCHEMA_VERSION = 1
 

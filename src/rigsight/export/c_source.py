@@ -10,9 +10,9 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import Balance
+from rigsight.simulate.compiled.kernel_equations import FUNCTIONS, KernelEquations
+from rigsight.simulate.compiled.kernel_source import accurate_integrator
 from rigsight.simulate.equilibrium import BALANCED
-from rigsight.simulate.kernel_equations import FUNCTIONS, KernelEquations
-from rigsight.simulate.kernel_source import accurate_integrator
 from rigsight.simulate.printing.c import C
 from rigsight.simulate.rest import INTERVALS, RAMP_PERIODS, SETTLED, TOLERANCE, WAITS
 from rigsight.simulate.simulation import DEFAULT_ACCURACY, LOCAL_PER_GLOBAL

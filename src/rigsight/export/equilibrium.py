@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from rigsight.effects.symbols import clamp
+from rigsight.simulate.compiled.linear_forms import slope
 from rigsight.simulate.kinks import freeze, is_zero
-from rigsight.simulate.linear_forms import slope
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 NO_START = "with friction or hysteresis the start is known for inputs of zero alone: begin with these, or give initial_state"

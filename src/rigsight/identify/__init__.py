@@ -1,14 +1,10 @@
 """Physical parameters from records: transfer functions, linear start values, grey-box fits, their uncertainty."""
 
-from rigsight.identify.conicity import ConicityEstimate as ConicityEstimate
-from rigsight.identify.conicity import creep_error_of_sine as creep_error_of_sine
-from rigsight.identify.conicity import estimate_conicity as estimate_conicity
-from rigsight.identify.driven_offsets import driven_offsets as driven_offsets
-from rigsight.identify.effect_start import EffectRegression as EffectRegression
-from rigsight.identify.fit_memory import FitMemory as FitMemory
-from rigsight.identify.fit_result import FitResult as FitResult
-from rigsight.identify.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
-from rigsight.identify.grey_box import GreyBoxFit as GreyBoxFit
+from rigsight.identify.fit.fit_memory import FitMemory as FitMemory
+from rigsight.identify.fit.fit_result import FitResult as FitResult
+from rigsight.identify.fit.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
+from rigsight.identify.fit.grey_box import GreyBoxFit as GreyBoxFit
+from rigsight.identify.fit.idle_threads import IdleThreads as IdleThreads
 from rigsight.identify.hysteresis import Calibration as Calibration
 from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
 from rigsight.identify.hysteresis import LoopArea as LoopArea
@@ -19,21 +15,25 @@ from rigsight.identify.hysteresis import calibrate_to_records as calibrate_to_re
 from rigsight.identify.hysteresis import calibrate_to_responses as calibrate_to_responses
 from rigsight.identify.hysteresis import derived_quantities as derived_quantities
 from rigsight.identify.hysteresis import loop_area as loop_area
-from rigsight.identify.idle_threads import IdleThreads as IdleThreads
 from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
 from rigsight.identify.joint import fit_jointly as fit_jointly
-from rigsight.identify.linear_start import linear_start as linear_start
-from rigsight.identify.physical import PhysicalEstimates as PhysicalEstimates
-from rigsight.identify.physical import lateral_parameters as lateral_parameters
-from rigsight.identify.physical import offsets as offsets
-from rigsight.identify.physical import yaw_parameters as yaw_parameters
-from rigsight.identify.scales import characteristic_scales as characteristic_scales
-from rigsight.identify.transfer_fit import TransferFit as TransferFit
-from rigsight.identify.transfer_form import TransferForm as TransferForm
-from rigsight.identify.transfer_function import fit_frequency_response as fit_frequency_response
-from rigsight.identify.transfer_step import fit_step as fit_step
+from rigsight.identify.start.effect_start import EffectRegression as EffectRegression
+from rigsight.identify.start.linear_start import linear_start as linear_start
+from rigsight.identify.start.scales import characteristic_scales as characteristic_scales
+from rigsight.identify.transfer.conicity import ConicityEstimate as ConicityEstimate
+from rigsight.identify.transfer.conicity import creep_error_of_sine as creep_error_of_sine
+from rigsight.identify.transfer.conicity import estimate_conicity as estimate_conicity
+from rigsight.identify.transfer.driven_offsets import driven_offsets as driven_offsets
+from rigsight.identify.transfer.physical import PhysicalEstimates as PhysicalEstimates
+from rigsight.identify.transfer.physical import lateral_parameters as lateral_parameters
+from rigsight.identify.transfer.physical import offsets as offsets
+from rigsight.identify.transfer.physical import yaw_parameters as yaw_parameters
+from rigsight.identify.transfer.transfer_fit import TransferFit as TransferFit
+from rigsight.identify.transfer.transfer_form import TransferForm as TransferForm
+from rigsight.identify.transfer.transfer_function import fit_frequency_response as fit_frequency_response
+from rigsight.identify.transfer.transfer_step import fit_step as fit_step
 
 __all__ = [
     "DEFAULT_ACCURACY",

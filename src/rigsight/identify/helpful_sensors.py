@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.errors import SimulationError
-from rigsight.identify.fit_result import FitResult
-from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.identifiability import free_directions
 from rigsight.identify.information import information
 from rigsight.records.record import Record

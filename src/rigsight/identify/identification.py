@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.conicity import ConicityEstimate
 from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
-from rigsight.identify.physical import PhysicalEstimates
-from rigsight.identify.transfer_fit import TransferFit
+from rigsight.identify.transfer.conicity import ConicityEstimate
+from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Record
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import orth
 
-from rigsight.identify.coordinates import Coordinates
-from rigsight.identify.fit_problem import Problem
-from rigsight.identify.fit_result import FitResult
-from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.fit_problem import Problem
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.simulate import carries_tangents
 from rigsight.units import characteristic_value
 

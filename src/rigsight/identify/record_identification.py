@@ -10,16 +10,21 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.axis_parameters import axis_parameters, springless_parameters
-from rigsight.identify.conicity import ConicityEstimate, estimate_conicity
-from rigsight.identify.driven_offsets import driven_offsets
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.physical import PhysicalEstimates, lateral_parameters, static_lateral, yaw_parameters
-from rigsight.identify.record_response import Method, RecordResponse, record_response
-from rigsight.identify.transfer_fit import TransferFit
-from rigsight.identify.transfer_form import Order
-from rigsight.identify.transfer_function import fit_frequency_response
-from rigsight.identify.transfer_step import fit_step
+from rigsight.identify.transfer.axis_parameters import axis_parameters, springless_parameters
+from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
+from rigsight.identify.transfer.driven_offsets import driven_offsets
+from rigsight.identify.transfer.physical import (
+    PhysicalEstimates,
+    lateral_parameters,
+    static_lateral,
+    yaw_parameters,
+)
+from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
+from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.transfer_form import Order
+from rigsight.identify.transfer.transfer_function import fit_frequency_response
+from rigsight.identify.transfer.transfer_step import fit_step
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Hold, Record
 from rigsight.rigs import Rig, evaluated

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigsight.diagnose.gap_parts import AmplitudePart, BandPart, GapPart, RecordPart, StatePart, TimePart
+from rigsight.diagnose.location.gap_parts import (
+    AmplitudePart,
+    BandPart,
+    GapPart,
+    RecordPart,
+    StatePart,
+    TimePart,
+)
 from rigsight.diagnose.result import Stage
 from rigsight.plot.drawing import (
     FLOOR,

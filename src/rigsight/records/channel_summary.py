@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.records.channel import Channel, as_floats, as_stamps
+from rigsight.records.formats.channel import Channel, as_floats, as_stamps
 
 # Of the median step: a longer one is a gap.
 _GAP = 1.5

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
-from rigsight.records.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
-from rigsight.records.channel_file import open_channels
 from rigsight.records.channel_units import UnknownUnitError, factor
 from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.formats.channel import Channel, ChannelFile, TimeAxis, as_floats, as_stamps
+from rigsight.records.formats.channel_file import open_channels
 
 _LISTED = 30
 """Channels that a message lists; a logger may record thousands."""

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
-from rigsight.records.channel_file import file_format
 from rigsight.records.channel_names import closeness
 from rigsight.records.channel_table import read_channels
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.conditioning import LARGEST_NUMBER, TimeBase, time_base
-from rigsight.records.csv_channels import open_measurement
+from rigsight.records.formats.channel_file import file_format
+from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.records.formats.read_csv import read_csv
 from rigsight.records.plausibility import clipping, is_constant
-from rigsight.records.read_csv import read_csv
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, in_seconds, refuse_different_axes, resampled
 

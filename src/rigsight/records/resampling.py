@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.records.channel import MOST_SAMPLES
 from rigsight.records.conditioning import FEWEST_SAMPLES, TimeBase
+from rigsight.records.formats.channel import MOST_SAMPLES
 from rigsight.records.record import Hold
 
 # Of the sample time: closer than this, a stamp lies on the grid.

@@ -10,7 +10,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 from rich.text import Text
 
-from rigsight.report.blind_views import (
+from rigsight.report.blind_bench.views import (
     NUMBERS,
     SHARES,
     bench_text,

@@ -12,8 +12,8 @@ from rich.text import Text
 
 from rigsight.compare import Column, Comparison
 from rigsight.compare.comparison import best
-from rigsight.report.comparison_figures import ComparisonFigure
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.drawing.comparison_figures import ComparisonFigure
+from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import column_label, error_text
 from rigsight.report.render import environment
 from rigsight.report.terminal import plain_text

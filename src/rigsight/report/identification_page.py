@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify.identification import Identification
 from rigsight.identify.linear_view import LinearView, Mode
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written
 from rigsight.report.render import environment
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigsight import plot
-from rigsight.diagnose.gap_parts import AmplitudePart, GapPart, StatePart
+from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
 from rigsight.report.declared import rig_of
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
 from rigsight.report.sections import output_label
 from rigsight.report.wording import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rigsight import plot
 from rigsight.diagnose.result import STAGES, Diagnosis, Stage, Trace
 from rigsight.metrics import nrmse
-from rigsight.report.charts import (
+from rigsight.report.drawing.charts import (
     Chart,
     ChartPanel,
     Curve,
@@ -22,10 +22,10 @@ from rigsight.report.charts import (
     curve_names,
     points_per_curve,
 )
-from rigsight.report.figures import PageFigure
+from rigsight.report.drawing.figures import PageFigure
+from rigsight.report.drawing.record_drawings import time_drawing, with_unit
+from rigsight.report.drawing.response_charts import response_chart
 from rigsight.report.quantities import gap_percent
-from rigsight.report.record_drawings import time_drawing, with_unit
-from rigsight.report.response_charts import response_chart
 from rigsight.report.responses import PathResponse
 from rigsight.report.sections import output_label
 from rigsight.report.wording import sentence_case, stage_names, told_unit

@@ -14,13 +14,13 @@ from markupsafe import Markup, escape
 from rigsight.diagnose.result import STAGES, Diagnosis
 from rigsight.effects import Effect
 from rigsight.report import location, sections
+from rigsight.report.drawing.loop_figures import loop_figures
+from rigsight.report.drawing.response_charts import amplitude_figures
+from rigsight.report.drawing.rig_figure import rig_figure
 from rigsight.report.equations import equation_groups, known_effects
-from rigsight.report.loop_figures import loop_figures
 from rigsight.report.quantities import Written
 from rigsight.report.record_views import record_views
-from rigsight.report.response_charts import amplitude_figures
 from rigsight.report.responses import record_responses
-from rigsight.report.rig_figure import rig_figure
 from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,

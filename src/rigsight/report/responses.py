@@ -21,7 +21,7 @@ from rigsight.compare.response_error import (
 from rigsight.diagnose.result import Diagnosis, Trace
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.record_response import Method
+from rigsight.identify.transfer.record_response import Method
 from rigsight.records import Record
 from rigsight.records.record import Hold, Kind
 from rigsight.report.declared import rig_of

@@ -12,7 +12,7 @@ from rigsight.diagnose.result import STAGES, Diagnosis, Estimate
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.report.declared import effect_of, rig_of
-from rigsight.report.figures import PageFigure, page_figure
+from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written, written_limits
 from rigsight.report.wording import (
     TIMES,

@@ -12,7 +12,7 @@ from rigsight.compare.response_error import SignalPath
 from rigsight.diagnose.windows import cut
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.record_response import Method, record_response
+from rigsight.identify.transfer.record_response import Method, record_response
 from rigsight.records import Record
 
 _LEAST_CLEARNESS = 10.0

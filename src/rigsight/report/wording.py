@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigsight.diagnose.gap_parts import GapPart
+from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap, Stage
 from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.effects import AT

@@ -8,8 +8,8 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
 
+from rigsight.rigs.reading.rig_file import rig_of_tables, rig_of_text
 from rigsight.rigs.rig import Rig
-from rigsight.rigs.rig_file import rig_of_tables, rig_of_text
 
 
 class BuiltInRigs(Mapping[str, Rig]):

@@ -9,9 +9,9 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.effects import Place
+from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.equilibrium import equilibrium
 from rigsight.simulate.input_hold import HeldInput, hold_input
-from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.structure import Structure
 
 RAMP_PERIODS = 20.0

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import SimulationError
+from rigsight.simulate.compiled.kernel import FittedRecord
+from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.input_hold import HeldInput
-from rigsight.simulate.kernel import FittedRecord
-from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.kinks import freeze
 from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.simulation import (

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError, SimulationError, check_option
 from rigsight.records.record import Record
+from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
-from rigsight.simulate.kernel_cache import kernel_of
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured

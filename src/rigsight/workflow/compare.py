@@ -15,17 +15,17 @@ from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.drift import can_drift
 from rigsight.diagnose.windows import cut, window_length
 from rigsight.errors import InputError, check_option
-from rigsight.identify.record_response import METHODS, Method
+from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
 from rigsight.workflow.compare_files import comparison_csv, comparison_json
 from rigsight.workflow.diagnose import versions
+from rigsight.workflow.files.model_file import MODEL_FILE, named_model
+from rigsight.workflow.files.results import check_writable, json_text, write_together
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.model_file import MODEL_FILE, named_model
 from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.results import check_writable, json_text, write_together
 
 COMPARISON_FILE, TABLE_FILE, PAGE_FILE = "comparison.json", "comparison.csv", "comparison.html"
 COMPARING = "Comparing"

@@ -15,14 +15,14 @@ from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign import Campaign, read_campaign
-from rigsight.workflow.effect_names import effects_on
-from rigsight.workflow.fit_journal import FitJournal
+from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
+from rigsight.workflow.files.fit_journal import FitJournal
+from rigsight.workflow.files.model_file import MODEL_FILE
+from rigsight.workflow.files.results import check_writable, json_text, write_together
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.model_file import MODEL_FILE
 from rigsight.workflow.not_yet import check_takes
+from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.progress import Listener, Stage, Step, silent
-from rigsight.workflow.results import check_writable, json_text, write_together
 
 DIAGNOSIS_FILE = "diagnosis.json"
 REPORT_FILE = "report.html"

@@ -18,12 +18,12 @@ from rigsight.errors import RigsightError, check_option
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
-from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
+from rigsight.workflow.files.model_file import MODEL_FILE
+from rigsight.workflow.files.results import check_writable, json_text, write_together
 from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.model_file import MODEL_FILE
 from rigsight.workflow.not_yet import check_takes
 from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.results import check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
 FIGURE_FILE = "discovery.svg"

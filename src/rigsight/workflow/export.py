@@ -10,8 +10,8 @@ from rigsight.errors import InputError, check_option
 from rigsight.export import TARGETS, export_model
 from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
-from rigsight.workflow.model_file import read_model
-from rigsight.workflow.results import check_target, write_together
+from rigsight.workflow.files.model_file import read_model
+from rigsight.workflow.files.results import check_target, write_together
 
 
 def run_export(

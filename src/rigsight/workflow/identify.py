@@ -14,27 +14,27 @@ from threadpoolctl import threadpool_limits
 from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
-from rigsight.identify.physical import PhysicalEstimates
 from rigsight.identify.record_identification import Wishes, identify_record
-from rigsight.identify.record_response import METHODS, Method
+from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign import Campaign, read_campaign
+from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
 from rigsight.workflow.diagnose import versions
-from rigsight.workflow.identification_any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
-from rigsight.workflow.identification_figures import amplitudes_figure, identification_figures, view_figure
-from rigsight.workflow.identification_joint import identify_jointly
-from rigsight.workflow.identification_json import identification_json
-from rigsight.workflow.identification_warnings import (
+from rigsight.workflow.files.model_file import MODEL_FILE
+from rigsight.workflow.files.results import check_writable, json_text, write_together
+from rigsight.workflow.identification.any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
+from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
+from rigsight.workflow.identification.joint import identify_jointly
+from rigsight.workflow.identification.json import identification_json
+from rigsight.workflow.identification.warnings import (
     beyond_identified_amplitudes,
     campaign_warnings,
     out_of_band,
 )
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.model_file import MODEL_FILE
 from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.results import check_writable, json_text, write_together
 
 IDENTIFICATION_FILE = "identification.json"
 PAGE_FILE = "identification.html"

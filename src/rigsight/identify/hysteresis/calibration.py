@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rigsight.identify.fit_result import FitResult
+from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.hysteresis.derived import DerivedQuantities
 
 RELEASE_GAIN = 1.01

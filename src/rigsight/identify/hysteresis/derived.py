@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from rigsight.effects import symbols as canonical
 from rigsight.effects.effect import Effect, SumAndDifference
 from rigsight.errors import InputError
-from rigsight.identify.coordinates import Coordinates
-from rigsight.identify.fit_result import FitResult
-from rigsight.identify.symmetric_eigen import symmetric_eigen
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
 from rigsight.records.record import Record
 from rigsight.rigs import ELEMENT
 from rigsight.simulate import Structure, compose, simulate_sets

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.transfer_function import fit_frequency_response
+from rigsight.identify.transfer.transfer_function import fit_frequency_response
 
 
 @dataclass(frozen=True)

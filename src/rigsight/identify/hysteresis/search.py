@@ -12,7 +12,7 @@ from scipy.optimize import Bounds, differential_evolution
 from scipy.stats import qmc
 
 from rigsight.errors import InputError
-from rigsight.identify.coordinates import Coordinates
+from rigsight.identify.fit.coordinates import Coordinates
 
 _APART = 0.1
 """Distance in the unit cube from which two ends of a search count as different places."""

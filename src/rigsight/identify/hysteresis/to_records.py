@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError
-from rigsight.identify.coordinates import Coordinates
-from rigsight.identify.first_states import first_state
-from rigsight.identify.fit_result import FitResult
-from rigsight.identify.grey_box import GreyBoxFit
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.first_states import first_state
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
 from rigsight.identify.hysteresis.derived import derived_quantities, record_amplitudes
 from rigsight.identify.hysteresis.parameters import (
@@ -21,8 +21,8 @@ from rigsight.identify.hysteresis.parameters import (
     start_values,
 )
 from rigsight.identify.hysteresis.search import SearchBox, search
-from rigsight.identify.linear_start import linear_start
-from rigsight.identify.scales import characteristic_scales
+from rigsight.identify.start.linear_start import linear_start
+from rigsight.identify.start.scales import characteristic_scales
 from rigsight.records.record import Record
 from rigsight.simulate import Structure, simulate_sets
 

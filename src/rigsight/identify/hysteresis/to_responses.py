@@ -10,9 +10,9 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
-from rigsight.identify.coordinates import STEP, Coordinates
-from rigsight.identify.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit_result import FitResult
+from rigsight.identify.fit.coordinates import STEP, Coordinates
+from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calibration, Minimum, better
 from rigsight.identify.hysteresis.derived import derived_quantities
 from rigsight.identify.hysteresis.parameters import (
@@ -23,7 +23,7 @@ from rigsight.identify.hysteresis.parameters import (
 )
 from rigsight.identify.hysteresis.predicted_response import MeasuredResponse
 from rigsight.identify.hysteresis.search import SearchBox, search
-from rigsight.identify.transfer_function import fit_frequency_response
+from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.simulate import Structure
 
 LEAST_ERROR = 0.003

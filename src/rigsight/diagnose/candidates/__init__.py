@@ -1,0 +1,1 @@
+"""Candidates: each effect at each place, alone and in pairs, fitted to the records and scored."""

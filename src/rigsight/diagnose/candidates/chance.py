@@ -1,0 +1,134 @@
+"""Which effect explains a motion in which chance has a part, looked at a few cycles at a time?
+
+Where a disturbance no larger than the noise makes another motion in the end, not even the true model follows a whole record.
+In windows of a few cycles, each with its own initial state, it does, and a wrong one does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.candidates.starts import start_values
+from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.workbench import Scored, Workbench
+
+_AS_NEAR = 1.5
+_MOST_ASKED = 4
+"""Models that are asked how predictable the motion is: so many, with held-out errors within this factor of the best.
+
+An assumption, like the numbers below: two drawn rigs with play are all that was looked at.
+"""
+_MOST_FITTED = 4
+"""Models that are fitted in windows: those nearest to the whole records, which a true one still is."""
+_SMALLER = (1.0, 0.3)
+"""Factors on the declared starts of an effect: too large a play sticks where a small one would not."""
+_GLIMPSED = 3
+"""Every so many windows are read at a first glance."""
+_GLIMPSE_EVALUATIONS = 10
+_MOST_STARTS = 2
+
+
+def is_predictable(
+    bench: Workbench, linear: Scored, models: Sequence[Scored], at_floor: float, rng: np.random.Generator
+) -> bool:
+    """Return False if no model explains the records and in a near one chance has a part in the motion.
+
+    Parameters
+    ----------
+    bench, linear
+        Whole records, and the re-identified equations on them.
+    models
+        Candidates, fitted and scored.
+    at_floor
+        Held-out error in units of the noise floor at which the records count as explained.
+    rng
+        Source of the disturbances.
+    """
+    usable = _nearest(models)
+    if not usable or usable[0].excess <= at_floor:
+        return True
+    near = [model for model in usable if model.excess <= _AS_NEAR * usable[0].excess][:_MOST_ASKED]
+    return all(growth_of_disturbances(bench, linear, model, rng) <= PREDICTABLE for model in near)
+
+
+def fitted_in_windows(bench: Workbench, linear: Scored, singles: Sequence[Scored]) -> list[Scored]:
+    """Fit the nearest models in windows; the others are only scored there, with the numbers that they have.
+
+    Parameters
+    ----------
+    bench
+        Records cut into windows, scales and noise.
+    linear
+        The re-identified equations.
+    singles
+        Every effect alone, fitted to whole records.
+    """
+    nearest = {model.names for model in _nearest(singles)[:_MOST_FITTED]}
+
+    def one(model: Scored) -> Scored:
+        if not model.residuals:
+            return model
+        return _fitted(bench, linear, model) if model.names in nearest else _scored(bench, model)
+
+    return list(bench.threads.side_by_side(one, singles))
+
+
+def _nearest(singles: Sequence[Scored]) -> list[Scored]:
+    usable = (model for model in singles if model.residuals and np.isfinite(model.excess))
+    return sorted(usable, key=lambda model: model.excess)
+
+
+def _fitted(bench: Workbench, linear: Scored, model: Scored) -> Scored:
+    structure, free = model.fit.structure, model.fit.free
+    (effect,) = model.effects
+    own = [structure.parameter_name(effect, p.name) for p in effect.parameters if p.null == 0.0]
+    declared = list(start_values(bench, structure, effect, linear.fit, {}))
+    starts = [
+        model.fit.values,
+        *({**s, **{n: f * s[n] for n in own if n in free}} for s in declared for f in _SMALLER),
+    ]
+    few = bench.problem(structure, bench.estimation[::_GLIMPSED])
+    glimpses = sorted(
+        (few.fit_windows(start, free, _GLIMPSE_EVALUATIONS, most_rounds=1) for start in starts),
+        key=lambda fit: fit.cost,
+    )
+    problem = bench.problem(structure, bench.estimation)
+    fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[:_MOST_STARTS]]
+    usable = [fit for fit in fits if fit.residuals]
+    if not usable:
+        return replace(model, residuals=(), excess=float("inf"))
+    best = min(usable, key=lambda fit: fit.cost)
+    return scored_in_windows(bench, replace(model, fit=best), best.values)
+
+
+def _scored(bench: Workbench, model: Scored) -> Scored:
+    structure = model.fit.structure
+    there = bench.problem(structure, bench.estimation).fit_windows(model.fit.values, ())
+    fit = replace(
+        model.fit,
+        residuals=there.residuals,
+        initial_states=there.initial_states,
+        cost=there.cost,
+        substeps=there.substeps,
+    )
+    return scored_in_windows(bench, replace(model, fit=fit), fit.values)
+
+
+def scored_in_windows(bench: Workbench, model: Scored, values: Mapping[str, float]) -> Scored:
+    """Return a model scored on the windows that judge, with these numbers and the initial states that suit them.
+
+    Parameters
+    ----------
+    bench
+        Records cut into windows, scales and noise.
+    model
+        Gives the equations.
+    values
+        All parameters.
+    """
+    result = bench.problem(model.fit.structure, bench.scoring).fit_windows(values, ())
+    excess = result.weighted_rms if result.residuals else float("inf")
+    return replace(model, residuals=result.residuals, initial_states=result.initial_states, excess=excess)

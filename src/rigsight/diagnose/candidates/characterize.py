@@ -1,0 +1,241 @@
+"""Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
+
+Each candidate gets a first look. Those that come near the best there are fitted with care, the best of them to full precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from rigsight.diagnose.candidates.first_look import (
+    LOOK_ACCURACY,
+    Look,
+    look_at,
+    looked_again,
+    mean_square,
+    widened,
+)
+from rigsight.diagnose.candidates.starts import restart_values
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Effect
+from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
+from rigsight.simulate import Structure
+
+_MOST_RESTARTS = 4
+_WORTH_RESTARTING = 1e-3
+"""Share of the cost that a fit from elsewhere must remove to be followed."""
+_LONG_PIECE = 20.0
+_STUCK = 2.0
+"""Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit counts as stopped short."""
+_ROUGH_EVALUATIONS = 40
+_ROUGH_TOLERANCE = 1e-4
+_HOPELESS_EVALUATIONS = 8
+_REFINE_EVALUATIONS = 150
+"""With one integration step per sample; a model that takes more gets fewer: far stiffer ones follow a valley without end."""
+_FEWEST_REFINE_EVALUATIONS = 15
+_HOPELESS_TOLERANCE = 1e-2
+_PROMISING = 9.0
+"""A candidate that costs less than this factor of the best on whole records (three times its RMS) is followed to the end."""
+_CONTENDER = 1.5
+"""A model whose held-out error is within this factor of the best is fitted to full precision."""
+_WORTH_RELEASING = 1.05
+"""Excess over the floor above which a fixed exponent is released."""
+_RELEASE_GAIN = 1.02
+"""Factor by which a released exponent must lower the held-out error to be kept."""
+
+
+def fit_linear(bench: Workbench, start: Mapping[str, float]) -> Scored:
+    """Re-identify the equations without an effect."""
+    structure = bench.composed()
+    fit = bench.problem(structure, bench.estimation)
+    return bench.score((), fit.fit(start, bench.free_parameters(structure)))
+
+
+def fit_candidates(
+    bench: Workbench,
+    linear: Scored,
+    effects: Iterable[Effect],
+    progress: Callable[[str], None] | None = None,
+) -> list[Scored]:
+    """Fit and score every effect alone.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    linear
+        The re-identified equations.
+    effects
+        Candidates; those that the rig does not offer are left out.
+    progress
+        Called with the name of each candidate that is done.
+    """
+    regression = None
+    if bench.rig.has_one_motion and bench.rig.is_driven:
+        regression = EffectRegression(bench.rig, bench.estimation, linear.fit.values, bench.scales)
+    looks = _looks(bench, linear, bench.offered(effects), regression)
+    wide = {look.newest: look for look in widened(bench, looks)}
+    lowest = min((look.cost for look in wide.values()), default=float("inf"))
+
+    def one(found: Look) -> Scored:
+        found = wide.get(found.newest, found)
+        promising = found.newest in wide and found.cost <= _PROMISING * lowest
+        scored = followed(bench, found, promising)
+        if progress is not None:
+            progress(found.newest)
+        return scored
+
+    models = list(bench.threads.side_by_side(one, looks))
+    return refine(bench, models)
+
+
+def _looks(
+    bench: Workbench,
+    linear: Scored,
+    effects: Sequence[Effect],
+    regression: EffectRegression | None,
+) -> list[Look]:
+    """Look at every effect; those that start from a simpler one come after it."""
+    names = {effect.name for effect in effects}
+    done: dict[str, Look] = {}
+    waiting = list(effects)
+
+    def one(parents: Mapping[str, FitResult], effect: Effect) -> Look:
+        return look_at(bench, (effect,), linear.fit, parents, regression)
+
+    while waiting:
+        ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]
+        ready = ready or waiting
+        waiting = [effect for effect in waiting if effect not in ready]
+        parents = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
+        looks = list(bench.threads.side_by_side(partial(one, parents), ready))
+        done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
+    return [done[effect.name] for effect in effects]
+
+
+def fit_candidate(
+    bench: Workbench,
+    effects: tuple[Effect, ...],
+    base: FitResult,
+    hold: frozenset[str] = frozenset(),
+) -> Scored:
+    """Fit and score one set of effects to full precision.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects
+        All effects of the model; the last is new.
+    base
+        Fit without the last.
+    hold
+        Rig parameters to keep at their base value.
+    """
+    (found,) = widened(bench, [look_at(bench, effects, base, {}, hold=hold)])
+    return refine(bench, [followed(bench, found, promising=True)])[0]
+
+
+def refine(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
+    """Fit those models to full precision whose held-out error is close to the best."""
+    best = min((m.excess for m in models), default=float("inf"))
+
+    def one(model: Scored) -> Scored:
+        if not (np.isfinite(model.excess) and model.excess <= _CONTENDER * best):
+            return model
+        fit = bench.problem(model.fit.structure, bench.estimation)
+        result = fit.fit(
+            model.fit.values,
+            model.fit.free,
+            initial_states=model.fit.initial_states,
+            max_evaluations=max(_FEWEST_REFINE_EVALUATIONS, _REFINE_EVALUATIONS // max(model.fit.substeps)),
+        )
+        if not result.residuals or result.cost > model.fit.cost * (1.0 + 1e-3):
+            return model
+        return bench.score(model.effects, result)
+
+    return list(bench.threads.side_by_side(one, models))
+
+
+def followed(bench: Workbench, look: Look, promising: bool, finish: bool = True) -> Scored:
+    """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking.
+
+    `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
+    """
+    scored = _fitted(bench, look.effects, look.structure, look.free, look.fits, promising, look.nearest)
+    return finished(bench, scored) if promising and finish else scored
+
+
+def finished(bench: Workbench, scored: Scored) -> Scored:
+    """Fit on from elsewhere, and with exponents and constant forces free that were fixed so far, where that helps."""
+    scored = restarted(bench, scored)
+    fixed = scored.fit.structure.fixed
+    special = scored.effects[-1].special_cases
+    if special:
+        structure = bench.composed(scored.effects, {n: v for n, v in fixed if n not in special})
+        scored = _released(bench, scored, structure, list(special))
+    structure = scored.fit.structure
+    return _released(bench, scored, structure, bench.releasable_parameters(structure))
+
+
+def restarted(bench: Workbench, settled: Scored) -> Scored:
+    """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
+    structure, free = settled.fit.structure, settled.fit.free
+    for _ in range(_MOST_RESTARTS):
+        if settled.excess <= _WORTH_RELEASING:
+            break
+        starts = [s for effect in settled.effects for s in restart_values(structure, effect, settled.fit)]
+        if not starts:
+            break
+        enough = (1.0 - _WORTH_RESTARTING) * settled.fit.cost
+        better = [found for found in looked_again(bench, settled.fit, starts) if found.cost < enough]
+        if not better:
+            break
+        again = _fitted(bench, settled.effects, structure, free, better, True)
+        if again.fit.cost >= settled.fit.cost:
+            break
+        settled = again
+    return settled
+
+
+def _released(bench: Workbench, settled: Scored, structure: Structure, released: Sequence[str]) -> Scored:
+    """Fit on with further parameters free; keep them only if the held-out error falls."""
+    if not released or not np.isfinite(settled.excess) or settled.excess <= _WORTH_RELEASING:
+        return settled
+    free = [name for name in structure.names if name in (*settled.fit.free, *released)]
+    start = {**settled.fit.values, **dict(settled.fit.structure.fixed)}
+    freer = _fitted(bench, settled.effects, structure, free, (replace(settled.fit, values=start),), True)
+    return freer if freer.excess < settled.excess / _RELEASE_GAIN else settled
+
+
+def _fitted(
+    bench: Workbench,
+    effects: tuple[Effect, ...],
+    structure: Structure,
+    free: Sequence[str],
+    starts: Sequence[FitResult],
+    promising: bool,
+    nearest: float = float("inf"),
+) -> Scored:
+    fit = bench.problem(structure, bench.estimation, DEFAULT_ACCURACY if promising else LOOK_ACCURACY)
+    evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
+    tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
+
+    def whole(values: Mapping[str, float]) -> FitResult:
+        return fit.fit(values, free, max_evaluations=evaluations, tolerance=tolerance)
+
+    results = [whole(start.values) for start in (starts if promising else starts[:1])]
+    if promising and min(map(mean_square, results)) > _STUCK * nearest:
+        in_pieces = bench.problem(structure, bench.cut_in_pieces(bench.estimation, _LONG_PIECE))
+        near = in_pieces.fit(
+            starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
+        )
+        results.append(whole(near.values))
+    usable = [result for result in results if result.residuals]
+    if not usable:
+        return Scored(effects, results[0], (), (), float("inf"))
+    return bench.score(effects, min(usable, key=lambda result: result.cost), roughly=not promising)

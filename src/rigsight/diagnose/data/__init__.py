@@ -1,0 +1,1 @@
+"""Data: can the records be trusted before any effect is blamed?"""

@@ -1,0 +1,66 @@
+"""Can the records be trusted, or would a fault of the data explain the gap before any effect does?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rigsight.diagnose.data.amplitude_response import amplitude_dependence
+from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.data.input_timing import input_timing
+from rigsight.diagnose.data.sensor_faults import sensor_faults
+from rigsight.diagnose.windows import leading_output
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.records.record import Record
+
+
+def data_quality(bench: Workbench, records: Sequence[Record], linear: Scored) -> DataQuality:
+    """Look at the records before an effect is tried.
+
+    Parameters
+    ----------
+    bench
+        Records as they are fitted, scales and noise.
+    records
+        All records of the campaign, whole.
+    linear
+        The re-identified equations.
+
+    Notes
+    -----
+    A wrong hold that a strong effect hides shows only with that effect in the model, see `with_best_model`.
+    """
+    timing = input_timing(bench, (), linear.fit)
+    faults = [finding for record in records for finding in sensor_faults(bench.rig, record)]
+    response = leading_output(bench.rig, records)
+    faulty = {finding.record for finding in faults if finding.signal == response}
+    # A channel at fault distorts as an effect would.
+    healthy = [record for record in records if record.name not in faulty]
+    return DataQuality(
+        findings=(*(timing.findings() if timing is not None else ()), *faults),
+        amplitude=amplitude_dependence(bench.rig, healthy),
+    )
+
+
+def with_best_model(quality: DataQuality, bench: Workbench, model: Scored) -> DataQuality:
+    """Ask about the hold of the input once more, with the effects in the model that hid its part of the gap.
+
+    Parameters
+    ----------
+    quality
+        What was found before.
+    bench
+        Records as they are fitted, scales and noise.
+    model
+        The best model; nothing is asked where it has no effect.
+    """
+    if not model.effects or any(finding.kind in ("hold", "time_shift") for finding in quality.findings):
+        return quality
+    timing = input_timing(bench, model.effects, model.fit, with_shift=False)
+    if timing is None or not timing.findings():
+        return quality
+    # A delay may explain as much; it is worth its fit only now.
+    timing = input_timing(bench, model.effects, model.fit) or timing
+    named = " and ".join(model.names)
+    found = [replace(f, sentence=f"With {named} in the model: {f.sentence}") for f in timing.findings()]
+    return replace(quality, findings=(*found, *quality.findings))

@@ -1,0 +1,158 @@
+"""On which leg of the signal path does the gap lie? Each leg with its own input as measured, and what they say together.
+
+A delay before the motion leaves the lateral leg alone. A delay of the motion's sensor shifts it the other way: the motion is
+measured late, so y seems early.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.location.gap_parts import PathPart
+from rigsight.diagnose.location.lateral_leg import LateralLeg, fit_lateral_leg
+from rigsight.diagnose.verdict import AT_FLOOR
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Place
+from rigsight.metrics import rms
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+_SIGNIFICANT = 5.0
+"""Standard errors from zero at which a shift counts: they take the residual for white, which it is not."""
+_WORTHWHILE = 1.1
+"""Factor by which a shift must lower what the leg leaves to be spoken of; an assumption."""
+
+
+def path_parts(bench: Workbench, before: Scored, linear: Scored, after: Scored) -> tuple[PathPart, ...]:
+    """Return every leg of the signal path with what it leaves of its output when its input is taken as measured.
+
+    Parameters
+    ----------
+    bench
+        Records and noise.
+    before, linear, after
+        The given simulation, the re-identified equations, the model of the verdict.
+    """
+    rig = bench.rig
+    source, motion = rig.inputs[0].name, rig.outputs[0].name
+    own = _motion_alone(bench, linear)
+    parts = [
+        _part(
+            bench.scoring,
+            motion,
+            source,
+            {"before": _column(before, 0), "reidentified": _column(own, 0), "after": _column(after, 0)},
+            bench.noise[motion],
+        )
+    ]
+    leg = fit_lateral_leg(bench, before.fit.values)
+    if leg is not None and rig.follower is not None:
+        parts.append(_lateral_part(bench, leg, motion, rig.follower.symbol.name))
+    return tuple(parts)
+
+
+def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
+    """Return what the legs of the path say together, in plain words; empty where there is no leg."""
+    if not parts:
+        return ""
+    first = parts[0]
+    motion = f"{first.path} leaves {_times(first.reidentified, first)}"
+    if len(parts) == 1:
+        return f"The path has one leg that can be checked: {motion} after re-identification."
+    lateral = parts[1]
+    clean = lateral.reidentified <= AT_FLOOR * lateral.noise_floor
+    said = (
+        f"{lateral.path}, with {lateral.source} as measured, leaves {_times(lateral.reidentified, lateral)}"
+    )
+    moved = (
+        abs(lateral.shift) > _SIGNIFICANT * lateral.shift_std
+        and lateral.shifted * _WORTHWHILE < lateral.reidentified
+    )
+    if clean and first.reidentified > AT_FLOOR * first.noise_floor:
+        return (
+            f"The gap lies before {lateral.source} is measured: {motion}, but {said}. Drive or {_words(rig)}, not the lateral "
+            f"part and not a delay of the {lateral.source} sensor."
+        )
+    if clean:
+        return f"No leg of the path has a gap worth the name: {motion}, {said}."
+    shifted = _times(lateral.shifted, lateral)
+    if moved and lateral.shifted <= AT_FLOOR * lateral.noise_floor:
+        late, early = (
+            (lateral.source, lateral.output) if lateral.shift > 0.0 else (lateral.output, lateral.source)
+        )
+        return (
+            f"The sensors disagree: {said}, and {shifted} if {late} were measured {1e3 * abs(lateral.shift):.3g} ms too late "
+            f"against {early}; {motion}."
+        )
+    better = f" ({shifted} with {lateral.source} shifted by {1e3 * lateral.shift:.3g} ms)" if moved else ""
+    return f"The lateral part or a sensor has a gap of its own: {said}{better}; {motion}."
+
+
+def _times(value: float, part: PathPart) -> str:
+    return f"{value / part.noise_floor:.3g} times its noise floor"
+
+
+def _words(rig: Rig) -> str:
+    return rig.place_name(Place.DYNAMICS).replace("_", " ")
+
+
+def _motion_alone(bench: Workbench, linear: Scored) -> Scored:
+    """Re-identify the motion without regard to what it drives: a gap there must not bend the numbers here."""
+    downstream = bench.rig.downstream_parameters
+    if not downstream or downstream <= bench.held:
+        return linear
+    names = {symbol.name for symbol in bench.rig.downstream}
+    alone = replace(
+        bench,
+        estimation=tuple(_without(record, names) for record in bench.estimation),
+        scoring=tuple(_without(record, names) for record in bench.scoring),
+        held=bench.held | downstream,
+    )
+    structure = linear.fit.structure
+    fit = alone.problem(structure, alone.estimation).fit(linear.fit.values, alone.free_parameters(structure))
+    return alone.score((), fit) if fit.residuals else linear
+
+
+def _without(record: Record, names: set[str]) -> Record:
+    return replace(record, signals={n: s for n, s in record.signals.items() if n not in names})
+
+
+def _column(model: Scored, index: int) -> list[NDArray[np.float64]]:
+    return [residual[:, index] for residual in model.residuals]
+
+
+def _lateral_part(bench: Workbench, leg: LateralLeg, motion: str, output: str) -> PathPart:
+    records = [record for record in bench.scoring if output in record]
+    noise = float(np.hypot(bench.noise[output], leg.noise_gain * bench.noise[motion]))
+    part = _part(records, output, motion, {"before": leg.given, "reidentified": leg.fitted}, noise)
+    spread = float(np.std(np.concatenate([record[output] for record in records]))) or 1.0
+    shifted = rms(np.concatenate(leg.shifted)) / spread
+    return replace(part, shift=leg.shift, shift_std=leg.shift_std, shifted=shifted)
+
+
+def _part(
+    records: Sequence[Record],
+    output: str,
+    source: str,
+    residuals: dict[str, Sequence[NDArray[np.float64]]],
+    noise: float,
+) -> PathPart:
+    spread = float(np.std(np.concatenate([record[output] for record in records]))) or 1.0
+    left = {stage: rms(np.concatenate(list(parts))) / spread for stage, parts in residuals.items()}
+    floor = noise / spread
+    return PathPart(
+        output=output,
+        before=left["before"],
+        reidentified=left["reidentified"],
+        after=left.get("after", float("nan")),
+        noise_floor=floor,
+        share=1.0,
+        noise_share=min(1.0, (floor / left["reidentified"]) ** 2) if left["reidentified"] > 0.0 else 1.0,
+        path=f"{source} -> {output}",
+        source=source,
+        units={"shift": "s", "shift_std": "s"},
+    )

@@ -1,0 +1,117 @@
+"""How far does the gap shrink, how surely, and how much of that is owed to each of several effects?
+
+The intervals are those of a block bootstrap over the scored records: how much the figures would move with other stretches of
+the same experiments. They do not cover what another amplitude or another waveform would bring.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.location.block_means import RESAMPLES, block_means
+from rigsight.diagnose.result import STAGES, Trace
+
+_LIMITS = (0.025, 0.975)
+
+Interval = tuple[float, float]
+
+
+def budget_intervals(
+    traces: Sequence[Trace], output: str, noise_floor: float, rng: np.random.Generator
+) -> dict[str, Interval]:
+    """Return 95 % intervals of the gap budget of an output over the records that hold it, see `gap_intervals`."""
+    holding = [trace for trace in traces if output in trace.measured]
+    residuals = {str(stage): [trace.residual(stage, output) for trace in holding] for stage in STAGES}
+    return gap_intervals(residuals, [trace.measured[output] for trace in holding], noise_floor, rng)
+
+
+def gap_intervals(
+    residuals: Mapping[str, Sequence[NDArray[np.float64]]],
+    measured: Sequence[NDArray[np.float64]],
+    noise_floor: float,
+    rng: np.random.Generator,
+) -> dict[str, Interval]:
+    """Return 95 % intervals of the NRMSE of each stage, and of the share of the gap that is closed.
+
+    All stages are resampled together, so that a stretch in which the rig moves much weighs on all of them.
+
+    Parameters
+    ----------
+    residuals
+        Stage -> residuals per record, shape (n_samples,) each; ``"before"`` and ``"after"`` give ``"closed"``.
+    measured
+        Measured output per record, shape (n_samples,) each.
+    noise_floor
+        NRMSE that a perfect model would leave.
+    rng
+        Source of the resampling.
+
+    Returns
+    -------
+    Stage -> lower and upper limit; NaN where a residual is not finite.
+    """
+    stages = list(residuals)
+    center = float(np.mean(np.concatenate(measured)))
+    squares = [
+        np.column_stack([(m - center) ** 2, *(residuals[stage][i] ** 2 for stage in stages)])
+        for i, m in enumerate(measured)
+    ]
+    blocks = block_means(squares)
+    draws = rng.integers(0, blocks.shape[0], size=(RESAMPLES, blocks.shape[0]))
+    means = np.mean(blocks[draws], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        drawn = {stage: np.sqrt(means[:, 1 + i] / means[:, 0]) for i, stage in enumerate(stages)}
+        if "before" in drawn and "after" in drawn:
+            drawn["closed"] = (drawn["before"] - drawn["after"]) / (drawn["before"] - noise_floor)
+    return {stage: _limits(values) for stage, values in drawn.items()}
+
+
+def _limits(values: NDArray[np.float64]) -> Interval:
+    if not np.all(np.isfinite(values)):
+        return math.nan, math.nan
+    low, high = np.quantile(values, _LIMITS)
+    return float(low), float(high)
+
+
+def effect_shares(
+    effects: Sequence[str], left: Mapping[frozenset[str], Mapping[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Return the share of the closed gap that each of several effects explains, by effect and output.
+
+    An effect's share is what it takes away, averaged over the orders in which the effects can be added: the shares add up to one,
+    and two effects that can stand for each other share what both explain.
+
+    Parameters
+    ----------
+    effects
+        Effects of the verdict.
+    left
+        NRMSE by output of the models that were fitted, by the set of their effects; the empty set is the re-identified equations.
+
+    Returns
+    -------
+    Empty where there are fewer than two effects, or a model with some of them was not fitted. NaN where they close nothing.
+
+    References
+    ----------
+    L. S. Shapley, "A value for n-person games", Contributions to the Theory of Games II (Princeton 1953).
+    """
+    subsets = [frozenset(c) for n in range(len(effects) + 1) for c in itertools.combinations(effects, n)]
+    if len(effects) < 2 or any(subset not in left for subset in subsets):
+        return {}
+    orders = list(itertools.permutations(effects))
+    shares: dict[str, dict[str, float]] = {effect: {} for effect in effects}
+    for output in left[frozenset(effects)]:
+        closed = left[frozenset()][output] - left[frozenset(effects)][output]
+        for effect in effects:
+            steps = []
+            for order in orders:
+                earlier = frozenset(order[: order.index(effect)])
+                steps.append(left[earlier][output] - left[earlier | {effect}][output])
+            shares[effect][output] = float(np.mean(steps)) / closed if closed > 0.0 else math.nan
+    return shares

@@ -1,0 +1,170 @@
+"""In which states does the gap arise? Residuals, and the force that the equations lack, over displacement and velocity.
+
+The force that the re-identified equations lack is ``m e'' + d e' + k e`` of their residual e: the initial transient and the
+drive obey the equations and cancel. Effects that the simulation has already are linearized away: beside them the map shows the
+shape of what is lacking, not its exact size. It is formed from the residual up to the frequency
+at which that stands out of the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from rigsight.diagnose.location.bands import spectrum
+from rigsight.diagnose.location.gap_parts import StatePart
+from rigsight.diagnose.result import STAGES, Trace
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.metrics import rms
+from rigsight.rigs import Rig, evaluated
+from rigsight.simulate.prescribed_motion import smooth_motion
+
+_CELLS = 9
+"""Cells along each axis of the plane."""
+_STANDS_OUT = 4.0
+_MARGIN = 1.5
+_HIGHEST_CUTOFF = 0.8
+"""Of the Nyquist frequency."""
+_ORDER = 4
+_NOTHING = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """Displacement, velocity and the force that is lacking of one record, shape (n_samples,) each, and the noise of the force."""
+
+    x: NDArray[np.float64]
+    v: NDArray[np.float64]
+    force: NDArray[np.float64]
+    force_noise: float
+
+
+def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+    """Return the gap of each output over a coarse grid of the measured motion's displacement and velocity.
+
+    Parameters
+    ----------
+    bench
+        Rig and noise.
+    linear
+        The re-identified equations.
+    scored
+        Records.
+    """
+    if not scored:
+        return ()
+    motions = [_motion(bench, linear.fit.values, trace) for trace in scored]
+    x = np.concatenate([motion.x for motion in motions])
+    v = np.concatenate([motion.v for motion in motions])
+    force = np.concatenate([motion.force for motion in motions])
+    # Where no record's residual stands out there is no force to speak of, and of the others the noisiest speaks for all.
+    levels = [motion.force_noise for motion in motions if np.isfinite(motion.force_noise)]
+    force_noise = max(levels, default=_NOTHING)
+    columns, x_edges = _cells(x)
+    rows, v_edges = _cells(v)
+    cell = columns * _CELLS + rows
+    parts = []
+    for index, signal in enumerate(bench.rig.outputs):
+        holding = np.concatenate([np.full(t.t.size, signal.name in t.measured) for t in scored])
+        if not np.any(holding):
+            continue
+        with_output = [trace for trace in scored if signal.name in trace.measured]
+        spread = float(np.std(np.concatenate([t.measured[signal.name] for t in with_output]))) or 1.0
+        residuals = {s: np.concatenate([t.residual(s, signal.name) for t in with_output]) for s in STAGES}
+        own_cell, own_force = cell[holding], force[holding]
+        total = float(np.sum(residuals["reidentified"] ** 2)) or 1.0
+        noise = bench.noise[signal.name]
+        for i in np.unique(own_cell):
+            inside = own_cell == i
+            n_samples = int(np.count_nonzero(inside))
+            lacking = own_force[inside] if index == 0 else np.array([_NOTHING])
+            column, row = divmod(int(i), _CELLS)
+            parts.append(
+                StatePart(
+                    output=signal.name,
+                    **{stage: rms(residual[inside]) / spread for stage, residual in residuals.items()},
+                    noise_floor=noise / spread,
+                    share=float(np.sum(residuals["reidentified"][inside] ** 2)) / total,
+                    noise_share=n_samples * noise**2 / total,
+                    x_low=float(x_edges[column]),
+                    x_high=float(x_edges[column + 1]),
+                    v_low=float(v_edges[row]),
+                    v_high=float(v_edges[row + 1]),
+                    n_samples=n_samples,
+                    force_mean=_finite_mean(lacking),
+                    force_rms=float(np.sqrt(_finite_mean(lacking**2))),
+                    force_noise=force_noise if index == 0 else _NOTHING,
+                    units=_units(bench.rig),
+                )
+            )
+    return tuple(parts)
+
+
+def _motion(bench: Workbench, values: Mapping[str, float], trace: Trace) -> _Motion:
+    rig = bench.rig
+    response = rig.outputs[0].name
+    if not rig.is_driven:
+        x, v = smooth_motion(next(iter(trace.inputs.values())), trace.dt)
+        return _Motion(x, v, trace.residual("reidentified", response), bench.noise[response])
+    measured = trace.measured[response]
+    filtered = _low_pass(measured - np.mean(measured), trace.dt, bench.noise[response])
+    x = measured if filtered is None else _filtered(filtered, measured)
+    residual = trace.residual("reidentified", response)
+    own = _low_pass(residual, trace.dt, bench.noise[response])
+    if own is None:
+        force, noise = np.full(residual.size, _NOTHING), _NOTHING
+    else:
+        m, d, k = (
+            evaluated(e, values) for e in (rig.motion.inertia, rig.motion.damping, rig.motion.stiffness)
+        )
+        smooth = _filtered(own, residual)
+        rate = np.gradient(smooth, trace.dt)
+        force = m * np.gradient(rate, trace.dt) + d * rate + k * smooth
+        omega, gain = scipy.signal.freqz_sos(own, 512)
+        omega = omega / trace.dt
+        # Forward and backward filtering squares the gain.
+        operator = np.abs(gain) ** 2 * np.abs(k - m * omega**2 + 1j * d * omega)
+        noise = bench.noise[response] * rms(operator)
+    return _Motion(x, np.gradient(x, trace.dt), force, noise)
+
+
+def _low_pass(samples: NDArray[np.float64], dt: float, noise: float) -> NDArray[np.float64] | None:
+    """Return a filter that keeps what stands out of the noise, None where nothing does."""
+    omega, power = spectrum(samples, dt)
+    out = np.flatnonzero(power > _STANDS_OUT * noise**2 / omega.size)
+    if out.size == 0:
+        return None
+    nyquist = np.pi / dt
+    cutoff = float(np.clip(_MARGIN * omega[out[-1]], 2.0 * omega[1], _HIGHEST_CUTOFF * nyquist))
+    return np.asarray(scipy.signal.butter(_ORDER, cutoff / nyquist, output="sos"), dtype=np.float64)
+
+
+def _filtered(sections: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(scipy.signal.sosfiltfilt(sections, samples), dtype=np.float64)
+
+
+def _cells(values: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the cell of each value and the edges of the cells."""
+    low, high = float(np.min(values)), float(np.max(values))
+    if high <= low:
+        high = low + 1.0
+    edges = np.linspace(low, high, _CELLS + 1)
+    return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CELLS - 1), edges
+
+
+def _finite_mean(values: NDArray[np.float64]) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite)) if finite.size else _NOTHING
+
+
+def _units(rig: Rig) -> dict[str, str]:
+    x, time, force = rig.units["x"], rig.units["time"], rig.units["force"]
+    return {
+        **dict.fromkeys(("x_low", "x_high"), x),
+        **dict.fromkeys(("v_low", "v_high"), f"{x}/{time}"),
+        **dict.fromkeys(("force_mean", "force_rms", "force_noise"), force),
+    }

@@ -1,0 +1,73 @@
+"""Which places of a rig are worth the fits? Those at which some push takes away nearly as much of the gap as at the best one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigsight.diagnose.places.suspects import Lineup, Suspect
+from rigsight.diagnose.result import SuspectedPlace
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Effect
+
+_WORTH_LOOKING = 0.5
+"""Share of what the best place takes away from which another place is looked at.
+
+An assumption, made before 80 drive trains were drawn (experiments/places): a push has the form of a start and not of the fit, so
+that the true place of a large gap may come second.
+"""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where to look, and for which effects.
+
+    Attributes
+    ----------
+    places
+        All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
+    effects
+        Candidates at the places that are looked at.
+    others
+        The rest, for a gap that none of these explains.
+    """
+
+    places: tuple[SuspectedPlace, ...]
+    effects: tuple[Effect, ...]
+    others: tuple[Effect, ...] = ()
+
+
+def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) -> Search:
+    """Return the places at which what a model leaves may arise.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    model
+        The equations that leave something, fitted.
+    effects
+        Candidates at their places.
+    """
+    if bench.rig.has_one_motion:
+        return Search((), tuple(effects))
+    # What pulsates by itself goes with no motion, so that no push along one tells of it.
+    pushing = [effect for effect in effects if effect.pulsation is None]
+    suspects = Lineup(bench, model).suspects(pushing)
+    shares = _by_place(bench, suspects)
+    most = max(shares.values(), default=0.0)
+    places = sorted(
+        (SuspectedPlace(name, share, share >= _WORTH_LOOKING * most) for name, share in shares.items()),
+        key=lambda place: -place.share,
+    )
+    looked_at = {place.name for place in places if place.looked_at}
+    first = [e for e in effects if e.pulsation is not None or bench.rig.acts_at(e) in looked_at]
+    return Search(tuple(places), tuple(first), tuple(effect for effect in effects if effect not in first))
+
+
+def _by_place(bench: Workbench, suspects: Sequence[Suspect]) -> dict[str, float]:
+    shares: dict[str, float] = {}
+    for suspect in suspects:
+        place = bench.rig.acts_at(suspect.effect)
+        shares[place] = max(shares.get(place, 0.0), suspect.share)
+    return shares

@@ -1,0 +1,210 @@
+"""How does a rig move that follows its sensors, and which forces at its joints does that take?
+
+A rig carries an unknown force at some of its joints. The equations are linearized about the motion found so far, a smoother finds
+a better one, and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.joints.force_observer import Cases, Gains, cases_of, gains_of, smoothed, whitened
+from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
+from rigsight.discover.joints.unknown_force import UNKNOWN_FORCE, force_states
+from rigsight.effects import placed
+from rigsight.parameters import Parameter
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+
+Floats = NDArray[np.float64]
+
+DECADES = (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0)
+"""Intensities of an unknown force that are tried, in decades of its size and the motion's angular frequency."""
+BREADTH = 30.0
+"""Standard deviation of the first state in units of its size: what no sensor shows may be far off."""
+_KNOWN = 0.5
+"""Standard deviation of a parameter that was identified without the force, in units of itself: what is the same as the force to
+the sensors (the inertia of the joint it acts on) would run away otherwise."""
+_FACTOR = 2.0
+"""Most by which a linearized estimate may change a parameter at once."""
+_FACTOR_IN_ALL = 4.0
+"""Most by which a parameter may differ from what was known beforehand: a force at the wrong joint would take it anywhere."""
+
+
+@dataclass(eq=False)
+class FollowedMotion:
+    """A rig with an unknown force at some joints, as far as its motion is known.
+
+    Attributes
+    ----------
+    equations
+        Of the rig with the forces.
+    forces
+        Where each force and its rate stand among the states.
+    fitted
+        Parameters of which the equations give derivatives.
+    values
+        Constants and parameters.
+    motions
+        States per record, shape (n_samples, n_states) each.
+    sizes
+        Of the states.
+    omega
+        Angular frequency of the motion [rad/s].
+    decade
+        Logarithm of the forces' intensity.
+    errors
+        Standard errors of the states, as `motions`.
+    known
+        Values that were known beforehand.
+    jumps
+        Per record where the forces may jump, shape (n_samples,); None for nowhere.
+    """
+
+    equations: MotionEquations
+    forces: tuple[tuple[int, int], ...]
+    fitted: tuple[Parameter, ...]
+    values: dict[str, float]
+    motions: list[Floats]
+    sizes: Floats
+    omega: float
+    decade: float = 0.0
+    errors: list[Floats] = field(default_factory=list)
+    known: dict[str, float] = field(init=False)
+    jumps: list[NDArray[np.bool_] | None] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Keep the values known beforehand, to which an estimate is held where the records say nothing."""
+        self.known = dict(self.values)
+        self.jumps = [None] * len(self.motions)
+
+    @property
+    def offsets(self) -> Floats:
+        """How far the fitted parameters are from what was known beforehand, shape (n_fitted,)."""
+        return np.array([self.values[p.name] - self.known[p.name] for p in self.fitted])
+
+    def linearized(self, records: Sequence[Record]) -> list[LinearizedMotion]:
+        """Linearize about what is known of the motion in each record."""
+        return [
+            self.equations.about(record, self.values, motion)
+            for record, motion in zip(records, self.motions, strict=True)
+        ]
+
+    def left(self, records: Sequence[Record], noise: Floats) -> float:
+        """Return the weighted square of what the sensors showed beside the motion."""
+        return float(sum(np.nansum((m.residual / noise) ** 2) for m in self.linearized(records)))
+
+
+def with_unknown_forces(
+    rig: Rig, joints: Sequence[str], fitted: Sequence[Parameter]
+) -> tuple[MotionEquations, tuple[tuple[int, int], ...]]:
+    """Return the equations of a rig with an unknown force at each of some joints, and where the forces stand among the states."""
+    effects = [placed(UNKNOWN_FORCE, joint) for joint in joints]
+    structure = compose(rig, effects)
+    equations = MotionEquations(structure, [p.name for p in fitted])
+    return equations, tuple(force_states(structure, effect) for effect in effects)
+
+
+def improved(
+    followed: Sequence[FollowedMotion], records: Sequence[Record], noise: Floats, decades: Sequence[float]
+) -> float:
+    """Estimate motion and forces once more, for rigs with as many states side by side.
+
+    Parameters
+    ----------
+    followed
+        What is known so far; changed in place.
+    records
+        Inputs, and what the sensors showed.
+    noise
+        Noise floor of each output, shape (n_outputs,).
+    decades
+        Intensities to try.
+
+    Returns
+    -------
+    The largest change of a state that is no force, in its size.
+    """
+    n_records = len(records)
+    linear = [motion for one in followed for motion in one.linearized(records)]
+    cases = cases_of(
+        linear,
+        noise,
+        [one.sizes for one in followed for _ in records],
+        followed[0].forces,
+        BREADTH,
+        [own for one in followed for own in one.jumps],
+        lasting=True,
+    )
+    tried = np.tile(np.asarray(decades), (len(followed), 1))
+    gains = gains_of(cases, _intensities(followed, tried, n_records))
+    costs = _squares(cases, gains) + gains.log_variances
+    for own, one, ranked in zip(tried, followed, costs.reshape(len(followed), n_records, -1), strict=True):
+        one.decade = float(own[int(np.argmin(np.sum(ranked, axis=0)))])
+    chosen = np.array([[one.decade] for one in followed])
+    gains = gains_of(cases, _intensities(followed, chosen, n_records), keep=True)
+    found = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])
+    moved = 0.0
+    for i, one in enumerate(followed):
+        one.errors = []
+        others = np.setdiff1d(np.arange(one.sizes.size), np.ravel(one.forces))
+        for j, motion in enumerate(one.motions):
+            step = found.deviation[: motion.shape[0], i * n_records + j]
+            one.motions[j] = motion + step * one.sizes
+            one.errors.append(found.error[: motion.shape[0], i * n_records + j] * one.sizes)
+            moved = max(moved, float(np.max(np.abs(step[:, others]))))
+    return moved
+
+
+def _intensities(followed: Sequence[FollowedMotion], decades: Floats, n_records: int) -> Floats:
+    omega = np.array([[one.omega] for one in followed])
+    return np.repeat(10.0**decades * omega, n_records, axis=0)
+
+
+def _squares(cases: Cases, gains: Gains) -> Floats:
+    """Return the sum of the squares of what the filter did not expect, shape (n_cases, n_intensities)."""
+    total = np.zeros(gains.variance.shape[1:3])
+
+    def tell(_sample: int, _sensor: int, rows: Floats) -> None:
+        nonlocal total
+        total += rows[..., 0] ** 2
+
+    whitened(cases, gains, lambda k: cases.drive[k, :, :, :1], lambda k: cases.data[k, :, :, :1], tell)
+    return total
+
+
+def prior_spread(one: FollowedMotion, target: float, own: Floats) -> Floats:
+    """Return how far the parameters may be off by what was known beforehand, shape (n_fitted,).
+
+    Parameters
+    ----------
+    one
+        The rig.
+    target
+        Square of the whitened readings: one that was zero may explain all of it.
+    own
+        Squares of the whitened responses to the parameters.
+    """
+    known = np.array([one.known[p.name] for p in one.fitted])
+    reach = np.sqrt(target / np.where(own > 0.0, own, 1.0))
+    return np.where(known != 0.0, _KNOWN * np.abs(known), reach)
+
+
+def within_reach(one: FollowedMotion, found: Mapping[str, float]) -> dict[str, float]:
+    """Return estimates of the parameters, as far from the values of the linearization as that can be trusted, and admissible."""
+    values = dict(one.values)
+    for parameter in one.fitted:
+        value = values[parameter.name]
+        low, high = parameter.lower, parameter.upper
+        for origin, factor in ((value, _FACTOR), (one.known[parameter.name], _FACTOR_IN_ALL)):
+            if origin > 0.0 and parameter.lower >= 0.0:
+                low, high = max(low, origin / factor), min(high, origin * factor)
+            elif origin != 0.0:
+                low, high = max(low, origin - factor * abs(origin)), min(high, origin + factor * abs(origin))
+        values[parameter.name] = float(np.clip(found[parameter.name], low, high))
+    return values

@@ -1,0 +1,283 @@
+"""Which motion and which unknown force agree best with the sensors? Kalman filter and smoother about a reference motion.
+
+The unknown force is a state of the structure, an integrated random walk. Many cases (joints, records, intensities of the walk)
+go through time side by side. Whatever else might have moved the sensors (a changed parameter, a force of known course) passes
+the same filter as a further column: the columns that leave it are whitened, and plain least squares on them is the likeliest
+estimate with the unknown force averaged out.
+
+References
+----------
+G. J. Bierman, *Factorization Methods for Discrete Sequential Estimation* (Academic Press 1977), for the smoother with adjoint
+states; P. de Jong, Ann. Stat. 19 (1991) 1073, for the further columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.joints.linearized_motion import LinearizedMotion
+
+Floats = NDArray[np.float64]
+Rows = Callable[[int, int, Floats], None]
+"""Called with sample, sensor and whitened rows, shape (n_cases, n_intensities, n_columns)."""
+AtSample = Callable[[int], Floats]
+"""Columns of one sample: shape (n_cases, n_states, n_columns) or (n_cases, n_outputs, n_columns)."""
+
+_EVENED = 64
+"""Samples after which rounding is taken out of the covariance's symmetry."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """Linearized motions of the same structure or of structures alike, in units in which noise and states are about one.
+
+    Axis 0 is time, axis 1 the case. What is shorter than the longest is filled up with samples that nothing measures.
+
+    Attributes
+    ----------
+    transition
+        Shape (n_samples - 1, n_cases, n_states, n_states).
+    seen
+        Shape (n_samples, n_cases, n_outputs, n_states); zero where nothing was measured.
+    drive
+        Known changes of the next state by column, shape (n_samples - 1, n_cases, n_states, n_columns).
+    data
+        What the sensors show of each column, shape (n_samples, n_cases, n_outputs, n_columns).
+    measured
+        True where a sensor was read, shape (n_samples, n_cases, n_outputs).
+    start
+        Covariance of the first state, shape (n_cases, n_states, n_states).
+    walk
+        Covariance that an intensity of one adds from sample to sample, shape (n_cases, n_states, n_states).
+    jump
+        Directions in which anything may happen behind some samples, shape (n_samples - 1, n_cases, n_states, n_directions).
+    jumps
+        Behind which samples, shape (n_samples, n_cases).
+    """
+
+    transition: Floats
+    seen: Floats
+    drive: Floats
+    data: Floats
+    measured: NDArray[np.bool_]
+    start: Floats
+    walk: Floats
+    jump: Floats
+    jumps: NDArray[np.bool_]
+
+    @property
+    def n_measured(self) -> NDArray[np.int_]:
+        """Measured values of each case."""
+        return np.asarray(np.count_nonzero(self.measured, axis=(0, 2)))
+
+
+def cases_of(
+    motions: Sequence[LinearizedMotion],
+    noise: Floats,
+    sizes: Sequence[Floats],
+    forces: Sequence[tuple[int, int]],
+    breadth: float,
+    jumps: Sequence[NDArray[np.bool_] | None],
+    lasting: bool,
+) -> Cases:
+    """Bring linearized motions into one form; the first column is what was measured, the others are the parameters.
+
+    Parameters
+    ----------
+    motions
+        One for each case.
+    noise
+        Standard deviation of each output, shape (n_outputs,).
+    sizes
+        Size of each state in each case, shape (n_states,) each.
+    forces
+        Index of each unknown force among the states, and of its rate.
+    breadth
+        Standard deviation of the first state in units of the sizes.
+    jumps
+        Behind which samples the unknown forces may be others by their size, shape (n_samples,) each; None for nowhere.
+    lasting
+        True where they stay what they have become, False where they are others for that sample alone.
+    """
+    longest = max(motion.residual.shape[0] for motion in motions)
+    n_cases, (n_outputs, n) = len(motions), motions[0].seen.shape[1:]
+    n_columns = 1 + motions[0].by_parameter.shape[2]
+    transition = np.tile(np.eye(n), (longest - 1, n_cases, 1, 1))
+    seen = np.zeros((longest, n_cases, n_outputs, n))
+    drive = np.zeros((longest - 1, n_cases, n, n_columns))
+    data = np.zeros((longest, n_cases, n_outputs, n_columns))
+    measured = np.zeros((longest, n_cases, n_outputs), dtype=bool)
+    walk = np.zeros((n_cases, n, n))
+    leaps = np.zeros((longest, n_cases), dtype=bool)
+    for case, (motion, size, own_jumps) in enumerate(zip(motions, sizes, jumps, strict=True)):
+        count = motion.residual.shape[0]
+        known = np.isfinite(motion.residual)
+        measured[:count, case] = known
+        transition[: count - 1, case] = motion.transition * (size[None, :] / size[:, None])
+        seen[:count, case] = np.where(known[:, :, None], motion.seen * size / noise[:, None], 0.0)
+        drive[: count - 1, case, :, 0] = motion.defect / size
+        drive[: count - 1, case, :, 1:] = -motion.by_parameter / size[:, None]
+        data[:count, case, :, 0] = np.where(known, motion.residual / noise, 0.0)
+        data[:count, case, :, 1:] = np.where(
+            known[:, :, None], motion.seen_by_parameter / noise[:, None], 0.0
+        )
+        if own_jumps is not None:
+            leaps[:count, case] = own_jumps
+        dt = motion.dt
+        own = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+        for force, rate in forces:
+            unit = np.array([size[force], size[rate]])
+            walk[case][np.ix_([force, rate], [force, rate])] = own * size[rate] ** 2 / np.outer(unit, unit)
+    start = np.tile(breadth**2 * np.eye(n), (n_cases, 1, 1))
+    own_forces = [force for force, _ in forces]
+    if lasting:
+        jump = np.tile(np.eye(n)[:, own_forces], (longest - 1, n_cases, 1, 1))
+    else:
+        jump = transition[..., own_forces].copy()
+        jump[:, :, np.ravel(forces)] = 0.0
+    return Cases(transition, seen, drive, data, measured, start, walk, jump, leaps)
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """What a filter needs of the covariances, shape (n_samples, n_cases, n_intensities, ...) each.
+
+    Attributes
+    ----------
+    gain
+        (..., n_outputs, n_states).
+    variance
+        Of each whitened reading before it is whitened, (..., n_outputs).
+    predicted
+        Covariance before the sample is read, (..., n_states, n_states); empty unless it was to be kept.
+    """
+
+    gain: Floats
+    variance: Floats
+    predicted: Floats
+
+    @property
+    def log_variances(self) -> Floats:
+        """Sum of the logarithms of all variances, shape (n_cases, n_intensities)."""
+        return np.asarray(np.sum(np.log(self.variance), axis=(0, 3)))
+
+
+def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
+    """Run the covariances through time.
+
+    Parameters
+    ----------
+    cases
+        The cases.
+    intensities
+        Of the random walk in each case, shape (n_cases, n_intensities), in units of the sizes.
+    keep
+        Keep the covariances for a smoother.
+    """
+    n_samples, n_cases, n_outputs, n = cases.seen.shape
+    n_q = intensities.shape[1]
+    gain = np.zeros((n_samples, n_cases, n_q, n_outputs, n))
+    variance = np.ones((n_samples, n_cases, n_q, n_outputs))
+    predicted = np.zeros((n_samples if keep else 0, n_cases, n_q, n, n))
+    walk = intensities[:, :, None, None] * cases.walk[:, None]
+    spread = np.repeat(cases.start[:, None], n_q, axis=1)
+    for k in range(n_samples):
+        if keep:
+            predicted[k] = spread
+        for i in range(n_outputs):
+            row = cases.seen[k, :, None, i, :]
+            toward = (spread @ row[..., None])[..., 0]
+            variance[k, :, :, i] = np.sum(toward * row, axis=-1) + 1.0
+            gain[k, :, :, i] = toward / variance[k, :, :, i, None]
+            spread = spread - gain[k, :, :, i, :, None] * toward[..., None, :]
+        if k < n_samples - 1:
+            step = cases.transition[k][:, None]
+            spread = step @ spread @ np.swapaxes(step, -1, -2) + walk
+            if np.any(cases.jumps[k]):
+                ways = cases.jump[k] * cases.jumps[k][:, None, None]
+                spread = spread + (ways @ np.swapaxes(ways, -1, -2))[:, None]
+            if k % _EVENED == 0:
+                spread = 0.5 * (spread + np.swapaxes(spread, -1, -2))
+    return Gains(gain, variance, predicted)
+
+
+def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: Rows) -> None:
+    """Send columns through the filter.
+
+    Parameters
+    ----------
+    cases, gains
+        The filter.
+    drive, data
+        Columns as in `Cases`, of one sample.
+    tell
+        Called with every whitened row, samples in order.
+    """
+    n_samples, n_cases, n_outputs, n = cases.seen.shape
+    root = np.sqrt(gains.variance)
+    state = np.zeros((n_cases, gains.variance.shape[2], n, data(0).shape[2]))
+    for k in range(n_samples):
+        shown = data(k)
+        for i in range(n_outputs):
+            row = cases.seen[k, :, None, i, None, :]
+            error = shown[:, None, i, :] - (row @ state)[..., 0, :]
+            tell(k, i, error / root[k, :, :, i, None])
+            state = state + gains.gain[k, :, :, i, :, None] * error[..., None, :]
+        if k < n_samples - 1:
+            state = cases.transition[k][:, None] @ state + drive(k)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """States with the knowledge of a whole record: deviations from the reference and their standard errors, in the sizes.
+
+    Shape (n_samples, n_cases, n_states) each.
+    """
+
+    deviation: Floats
+    error: Floats
+
+
+def smoothed(cases: Cases, gains: Gains, drive: Floats, data: Floats) -> Smoothed:
+    """Smooth one column of each case, for gains of a single intensity.
+
+    Parameters
+    ----------
+    cases, gains
+        The filter, its covariances kept.
+    drive, data
+        Shape (n_samples - 1, n_cases, n_states) and (n_samples, n_cases, n_outputs).
+    """
+    n_samples, n_cases, n_outputs, n = cases.seen.shape
+    before = np.zeros((n_samples, n_cases, n))
+    errors = np.zeros((n_samples, n_cases, n_outputs))
+    state = np.zeros((n_cases, n))
+    for k in range(n_samples):
+        before[k] = state
+        for i in range(n_outputs):
+            errors[k, :, i] = data[k, :, i] - np.sum(cases.seen[k, :, i] * state, axis=-1)
+            state = state + gains.gain[k, :, 0, i] * errors[k, :, i, None]
+        if k < n_samples - 1:
+            state = (cases.transition[k] @ state[..., None])[..., 0] + drive[k]
+    deviation, error = np.zeros_like(before), np.zeros_like(before)
+    adjoint, spread = np.zeros((n_cases, n, 1)), np.zeros((n_cases, n, n))
+    identity = np.eye(n)
+    for k in range(n_samples - 1, -1, -1):
+        if k < n_samples - 1:
+            back = np.swapaxes(cases.transition[k], -1, -2)
+            adjoint, spread = back @ adjoint, back @ spread @ cases.transition[k]
+        for i in range(n_outputs - 1, -1, -1):
+            row = cases.seen[k, :, i, :, None]
+            kept = identity - gains.gain[k, :, 0, i, :, None] * np.swapaxes(row, -1, -2)
+            back = np.swapaxes(kept, -1, -2)
+            weight = 1.0 / gains.variance[k, :, 0, i]
+            adjoint = back @ adjoint - row * (weight * errors[k, :, i])[:, None, None]
+            spread = back @ spread @ kept + row * np.swapaxes(row, -1, -2) * weight[:, None, None]
+        known = gains.predicted[k, :, 0]
+        deviation[k] = before[k] - (known @ adjoint)[..., 0]
+        error[k] = np.sqrt(np.maximum(np.einsum("cii->ci", known - known @ spread @ known), 0.0))
+    return Smoothed(deviation, error)

@@ -1,0 +1,334 @@
+"""The whole discovery on a rig of several joints: records and a rig -> missing force per joint, its law, polished equations.
+
+Linearized responses propose joint and law; output error polishes the rig with the law at its place, and free runs of records it
+has not seen decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.held_out import split
+from rigsight.discover.joints.joint_force import JointForce, missing_forces
+from rigsight.discover.joints.joint_law import LawTerm
+from rigsight.discover.regression import information_criterion
+from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
+from rigsight.discover.selection import STRONG, independent_samples
+from rigsight.discover.task import Task
+from rigsight.discover.terms.equations import equations
+from rigsight.effects import effect_named, placed
+from rigsight.effects.placed import kind_of
+from rigsight.errors import SimulationError
+from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+from rigsight.simulate.model import Model
+
+Floats = NDArray[np.float64]
+
+_EVALUATIONS = 100
+_CONTRADICTED = 3.0
+"""Factor over the least contradiction of the sensors at which a joint is ruled out: its law is not polished."""
+_FLOOR = 1.5
+"""Noise floors from which on something is missing still."""
+_NO_WORSE = 1.05
+"""Factor of the held-out error up to which an equation with fewer terms is worth shortening further."""
+_VAGUE = 3.0
+"""Standard errors below which a coefficient cannot be told from zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Polished:
+    """The rig with some terms, fitted and scored; `residuals` are held-out errors, shape (n_samples, n_outputs) per record."""
+
+    terms: tuple[LawTerm, ...]
+    fit: FitResult
+    residuals: tuple[Floats, ...]
+    excess: float
+
+
+def discover_at_joints(
+    task: Task, seed: int = 0, progress: Callable[[str], None] | None = None, n_jobs: int = 1
+) -> Discovery:
+    """Discover which force is missing at which joint, and complete the rig's equations with its law.
+
+    Parameters
+    ----------
+    task
+        Records and rig.
+    seed
+        Seed of the ensembles.
+    progress
+        Called with a short text when a stage is done.
+    n_jobs
+        Records that are simulated at the same time.
+
+    Raises
+    ------
+    InputError
+        If there is no estimation record, one is too short, or none moves the rig.
+    SimulationError
+        If the rig's own equations cannot be simulated near the records.
+    """
+    say = progress or (lambda _: None)
+    polisher = _Polisher(task, IdleThreads(n_jobs))
+    alone = polisher.polished((), polisher.start)
+    if not math.isfinite(alone.fit.cost):
+        raise SimulationError(
+            f"The equations of {task.rig.name} cannot be simulated near these records: {alone.fit.message}"
+        )
+    say("re-identified")
+    known = {**task.constants, **alone.fit.values}
+    joints = missing_forces(task.rig, polisher.estimation, known, task.noise, np.random.default_rng(seed))
+    say("missing forces")
+    least = min(force.error_over_noise for force in joints)
+    found = [alone]
+    for force in joints:
+        if force.law.terms and force.error_over_noise <= _CONTRADICTED * least:
+            start = {**known, **force.parameters}
+            found.append(polisher.polished(force.law.terms, start))
+            say(", ".join(term.effect.name for term in force.law.terms))
+    found += _shorter(polisher, min(found, key=lambda one: one.excess), say)
+    return _assembled(task, polisher, found, joints)
+
+
+def _shorter(polisher: _Polisher, best: _Polished, say: Callable[[str], None]) -> list[_Polished]:
+    """Polish equations with a term less, or with a special case of a term in its place, for as long as they are no worse."""
+    found: list[_Polished] = []
+    while best.terms:
+        values = {**best.fit.values}
+        tried = [polisher.polished(terms, values) for terms in _simpler(best) if terms]
+        found += tried
+        say("fewer terms")
+        good = [one for one in tried if one.excess <= _NO_WORSE * best.excess]
+        if not good:
+            break
+        best = min(good, key=lambda one: one.excess)
+    return found
+
+
+def _simpler(one: _Polished) -> list[tuple[LawTerm, ...]]:
+    fitted = [
+        replace(term, values={**term.values, **one.fit.structure.values_of(term.effect, one.fit.values)})
+        for term in one.terms
+    ]
+    found = [tuple(term for term in fitted if term is not out) for out in fitted]
+    for term in fitted:
+        for name in term.effect.parents:
+            parent = placed(effect_named(kind_of(name)), str(term.effect.at))
+            own = [p.name for p in parent.parameters]
+            taken = any(other.effect.name == parent.name for other in fitted)
+            if not taken and all(n in term.values for n in own):
+                values, units = {n: term.values[n] for n in own}, {n: term.units[n] for n in own}
+                found.append(
+                    tuple(LawTerm(parent, values, {}, units) if other is term else other for other in fitted)
+                )
+    return found
+
+
+class _Polisher:
+    """Fits the rig with terms at its joints, and scores it on records it has not seen."""
+
+    def __init__(self, task: Task, threads: IdleThreads) -> None:
+        self.rig, self.noise, self._threads = task.rig, task.noise, threads
+        self.estimation, self.held_out, self.how = split(task)
+        self.start = {**task.constants, **linear_start(task.rig, self.estimation, task.constants, {})}
+        self._scales = characteristic_scales(task.rig, self.estimation, self.start)
+
+    def polished(self, terms: Sequence[LawTerm], values: Mapping[str, float]) -> _Polished:
+        structure = compose(self.rig, [term.effect for term in terms])
+        start, free = dict(values), {p.name for p in self.rig.parameters if p.fitted}
+        for term in terms:
+            for parameter in term.effect.parameters:
+                name = structure.parameter_name(term.effect, parameter.name)
+                value = term.values.get(parameter.name, parameter.default)
+                assert value is not None
+                start[name] = value
+                free |= {name} if parameter.fitted else set()
+        names = [name for name in structure.names if name in free]
+        problem = GreyBoxFit(structure, self.estimation, self._scales, self.noise, threads=self._threads)
+        fit = problem.fit(start, names, max_evaluations=_EVALUATIONS)
+        if not math.isfinite(fit.cost):
+            return _Polished(tuple(terms), fit, (), float("inf"))
+        score = GreyBoxFit(structure, self.held_out, self._scales, self.noise, threads=self._threads).fit(
+            fit.values, []
+        )
+        excess = score.weighted_rms if score.residuals else float("inf")
+        return _Polished(tuple(terms), fit, score.residuals, excess)
+
+
+def _assembled(
+    task: Task, polisher: _Polisher, found: Sequence[_Polished], joints: tuple[JointForce, ...]
+) -> Discovery:
+    rig, held_out = task.rig, polisher.held_out
+    finest = min(found, key=lambda one: one.excess)
+    if not math.isfinite(finest.excess):
+        raise SimulationError("The polished equations cannot be simulated on the held-out records.")
+    independent = _independent(rig, finest)
+
+    def criterion(one: _Polished) -> float:
+        if not math.isfinite(one.excess):
+            return float("inf")
+        return information_criterion(one.excess**2, len(one.fit.free), independent)
+
+    ordered = sorted(found, key=criterion)
+    close = [one for one in ordered if criterion(one) <= criterion(ordered[0]) + STRONG]
+    chosen = min(close, key=lambda one: (len(one.fit.free), criterion(one)))
+    # The joint of the equation comes first, whatever the linearized responses say.
+    own_joints = {str(term.effect.at) for term in chosen.terms}
+    joints = tuple(sorted(joints, key=lambda force: force.joint not in own_joints))
+    structure, values = chosen.fit.structure, chosen.fit.values
+    constants = {p.name for p in rig.constants}
+    numbers = {n: v for n, v in values.items() if n not in chosen.fit.free and n not in constants}
+    text, latex = equations(structure, numbers)
+    units = {p.name: p.unit for p in structure.parameters}
+    coefficients = {
+        name: Coefficient(values[name], chosen.fit.standard_errors[name], units[name])
+        for name in chosen.fit.free
+    }
+    own = {p.name for p in rig.parameters}
+    nrmse, floor = _relative(rig, task.noise, held_out, chosen)
+    first = rig.outputs[0]
+    return Discovery(
+        title=task.title,
+        rig=rig.name,
+        method="discrepancy",
+        form="linearized responses",
+        equations=text,
+        latex=latex,
+        rig_parameters={name: c for name, c in coefficients.items() if name in own},
+        terms=_terms(chosen, joints, coefficients),
+        alternatives=tuple(
+            Alternative(
+                tuple(term.effect.name for term in one.terms),
+                len(one.fit.free),
+                one.excess,
+                criterion(one) - len(one.fit.free) * (math.log(independent) - 2.0),
+                criterion(one),
+            )
+            for one in ordered
+        ),
+        force_equation={},
+        held_out=tuple(record.name for record in held_out),
+        held_out_error=chosen.excess,
+        held_out_nrmse=nrmse,
+        noise_floor=floor,
+        independent=independent,
+        runs=tuple(_runs(rig, held_out, chosen)),
+        output=first.name,
+        unit=first.unit,
+        model=Model.of(structure, values, polisher.estimation[0].hold).to_json(),
+        warnings=tuple(_warnings(polisher.how, chosen, ordered, joints, coefficients)),
+        joints=joints,
+    )
+
+
+def _terms(
+    chosen: _Polished, joints: Sequence[JointForce], coefficients: Mapping[str, Coefficient]
+) -> tuple[Term, ...]:
+    structure, found = chosen.fit.structure, []
+    inclusion = {name: share for force in joints for name, share in force.law.inclusion.items()}
+    for term in chosen.terms:
+        effect = term.effect
+        names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
+        own = {name: coefficients[name] for name in names if name in coefficients}
+        vague = [n for n, c in own.items() if not c.std < abs(c.value) / _VAGUE]
+        doubt = f"{' and '.join(vague)} cannot be told from zero" if vague else ""
+        found.append(
+            Term(
+                kind_of(effect.name),
+                effect.summary,
+                True,
+                inclusion.get(effect.name, 0.0),
+                own,
+                doubt,
+                str(effect.at),
+            )
+        )
+    kept = {term.effect.name for term in chosen.terms}
+    others = [
+        (force.law.inclusion.get(term.effect.name, 0.0), term)
+        for force in joints
+        for term in force.law.terms
+        if term.effect.name not in kept
+    ]
+    found += [
+        Term(kind_of(t.effect.name), t.effect.summary, False, share, {}, where=str(t.effect.at))
+        for share, t in others
+    ]
+    return tuple(found)
+
+
+def _independent(rig: Rig, one: _Polished) -> float:
+    """Return the number of independent samples behind the held-out errors of all sensors."""
+    return sum(
+        independent_samples(shown)
+        for left in one.residuals
+        for i in range(len(rig.outputs))
+        if (shown := left[np.isfinite(left[:, i]), i]).size > 1
+    )
+
+
+def _relative(
+    rig: Rig, noise: Mapping[str, float], held_out: Sequence[Record], chosen: _Polished
+) -> tuple[float, float]:
+    """Return held-out error and noise floor relative to the spread of what each sensor showed, RMS over the sensors."""
+    errors, floors = [], []
+    for i, signal in enumerate(rig.outputs):
+        shown = [record[signal.name] for record in held_out if signal.name in record]
+        if not shown:
+            continue
+        spread = float(np.std(np.concatenate(shown))) or 1.0
+        left = np.concatenate([residual[:, i] for residual in chosen.residuals])
+        errors.append(float(np.nanmean(left**2)) / spread**2)
+        floors.append((noise[signal.name] / spread) ** 2)
+    return float(np.sqrt(np.mean(errors))), float(np.sqrt(np.mean(floors)))
+
+
+def _runs(rig: Rig, held_out: Sequence[Record], chosen: _Polished) -> list[Run]:
+    """Return the free runs of the completed model on the held-out records, one for each sensor."""
+    return [
+        Run(r.name, r.role, r.t, r[signal.name], r[signal.name] - left[:, i], signal.name, signal.unit)
+        for r, left in zip(held_out, chosen.residuals, strict=True)
+        for i, signal in enumerate(rig.outputs)
+        if signal.name in r
+    ]
+
+
+def _warnings(
+    how: str,
+    chosen: _Polished,
+    ordered: Sequence[_Polished],
+    joints: Sequence[JointForce],
+    coefficients: Mapping[str, Coefficient],
+) -> list[str]:
+    """Return what a user should know, one sentence each."""
+    found = [how] if how else []
+    first = joints[0]
+    ruled_out = [
+        force.joint for force in joints if force.error_over_noise > _CONTRADICTED * first.error_over_noise
+    ]
+    if ruled_out:
+        found.append(
+            f"No force at {' or '.join(ruled_out)} alone explains what all sensors show; at {first.joint} one does, "
+            f"but for {first.error_over_noise:.2g} noise floors."
+        )
+    rivals = [one for one in ordered if one is not chosen and one.excess <= chosen.excess and one.terms]
+    if rivals:
+        listed = "; ".join(", ".join(term.effect.name for term in one.terms) for one in rivals)
+        found.append(f"With {listed} the held-out error is no larger, but not smaller by more than chance.")
+    if chosen.excess > _FLOOR:
+        found.append(
+            f"The equations leave {chosen.excess:.1f} times the noise floor in free run on the held-out records: "
+            "something is still missing, or disturbances are larger than the floor says."
+        )
+    unknown = [name for name, c in coefficients.items() if not math.isfinite(c.std)]
+    if unknown:
+        found.append(f"These records do not determine {', '.join(unknown)}.")
+    return found

@@ -1,0 +1,324 @@
+"""Which force is missing at each joint of a rig, how much of what the sensors contradict would it explain, and which law has it?
+
+For rigs of several joints, degrees of freedom, inputs or sensors. Each joint in turn carries all that is missing. Law and
+parameters of the rig are estimated together, and the likelihood of what all sensors showed ranks the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.joints.followed_motion import FollowedMotion, within_reach
+from rigsight.discover.joints.joint_law import LawTerm, RegressedLaw, force_along, inclusion, regressed_laws
+from rigsight.discover.joints.joint_motion import JointMotion, followed_again, joint_motions, noise_of
+from rigsight.errors import InputError, SimulationError
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose, simulate
+
+Floats = NDArray[np.float64]
+
+_ROUNDS = 7
+"""Rounds of law and motion; numbers that were identified without the force are far off at first."""
+_FOR_ALL = 3
+"""Rounds for every joint; further ones are for those that are not ruled out."""
+_RULED_OUT = 3.0
+"""Factor over the least contradiction of the sensors (RMS) at which a joint is ruled out."""
+_SETTLED = 0.01
+"""Relative change of parameters and coefficients from which another round changes nothing."""
+_LARGE = 98.0
+"""Percentile of a motion or a force that is its size."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTrace:
+    """The missing force of a joint along one record, shape (n_samples,) each.
+
+    Attributes
+    ----------
+    record
+        Its name.
+    t
+        Time [s].
+    displacement, velocity
+        Motion of the joint from its rest.
+    force, standard_error
+        The force that resists it, and how well it is known.
+    law
+        What the law says of it.
+    """
+
+    record: str
+    t: Floats
+    displacement: Floats
+    velocity: Floats
+    force: Floats
+    standard_error: Floats
+    law: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class JointLaw:
+    """The law of a missing force.
+
+    Attributes
+    ----------
+    terms
+        The surest first; empty where no term describes the force.
+    share
+        Share of the force that they explain (as power).
+    inclusion
+        How often sparse regression takes each term when stretches of the records are drawn anew, by the name of the effect.
+    """
+
+    terms: tuple[LawTerm, ...]
+    share: float
+    inclusion: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class JointForce:
+    """What is missing at one joint, if all that is missing acts there.
+
+    Attributes
+    ----------
+    joint
+        Its name.
+    x_unit, unit
+        Of its motion, and of the force.
+    traces
+        The force and the motion, per record.
+    share
+        Share of the weighted square of the rig's free-run errors that the force explains; all sensors together.
+    error_over_noise
+        What the sensors still contradict, RMS in units of their noise floors: far above 1, this joint alone cannot be it.
+    standard_error
+        RMS of that of the force.
+    law
+        The fitted law.
+    parameters
+        The rig's own, estimated with the law.
+    criterion
+        Bayesian information criterion of law, parameters and what remains unknown; the smallest comes first.
+    """
+
+    joint: str
+    x_unit: str
+    unit: str
+    traces: tuple[ForceTrace, ...]
+    share: float
+    error_over_noise: float
+    standard_error: float
+    law: JointLaw
+    parameters: Mapping[str, float]
+    criterion: float
+
+    @property
+    def sentence(self) -> str:
+        """The finding in words."""
+        if not self.law.terms:
+            return f"No law of the motion of {self.joint} describes a force that is missing there."
+        told = " and ".join(term.text for term in self.law.terms)
+        return (
+            f"A force that is missing at {self.joint} is {told}, x and v from there: "
+            f"that explains {self.law.share:.0%} of it."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data without the traces."""
+        return {
+            "where": self.joint,
+            "share": self.share,
+            "error_in_noise_floors": self.error_over_noise,
+            "standard_error": {"value": self.standard_error, "unit": self.unit},
+            "criterion": self.criterion,
+            "terms": [
+                {**term.to_json(), "inclusion_probability": self.law.inclusion.get(term.effect.name)}
+                for term in self.law.terms
+            ],
+            "share_of_force": self.law.share,
+            "sentence": self.sentence,
+        }
+
+
+def missing_forces(
+    rig: Rig,
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    noise: Mapping[str, float],
+    rng: np.random.Generator | None = None,
+) -> tuple[JointForce, ...]:
+    """Return the force that would have to be missing at each joint; the joint at which it is likeliest to act comes first.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        Estimation records: inputs, and what the sensors showed. A sensor may be missing in some.
+    values
+        Constants and re-identified parameters, by name.
+    noise
+        Noise floor of each output.
+    rng
+        Source of the ensemble behind the inclusion probabilities of the first joint's terms; None for none.
+
+    Raises
+    ------
+    InputError
+        If there is no record.
+    """
+    if not records:
+        raise InputError("A missing force is traced in records; there is none.")
+    floors = noise_of(rig, noise)
+    found = joint_motions(rig, records, values, noise)
+    before = _free_run_square(rig, records, values, floors, found[0].followed)
+    laws: dict[str, RegressedLaw] = {}
+    open_joints = found
+    for number in range(_ROUNDS):
+        open_joints, change = _improved(rig, open_joints, records, noise, laws)
+        found = tuple(next((new for new in open_joints if new.joint is old.joint), old) for old in found)
+        if number + 1 >= _FOR_ALL:
+            least = min(one.left for one in open_joints)
+            open_joints = tuple(one for one in open_joints if one.left <= _RULED_OUT**2 * least)
+            if change < _SETTLED:
+                break
+    first = min(open_joints, key=lambda one: laws[one.joint.name].criterion)
+    n_measured = sum(
+        int(np.count_nonzero(m.residual == m.residual)) for m in first.followed.linearized(records)
+    )
+    included = (
+        {first.joint.name: inclusion(first, floors, _sizes(first), laws[first.joint.name], rng)}
+        if rng
+        else {}
+    )
+    forces = [
+        _joint_force(
+            rig, one, records, laws[one.joint.name], before, n_measured, included.get(one.joint.name, {})
+        )
+        for one in found
+    ]
+    still_open = {one.joint.name for one in open_joints}
+    return tuple(sorted(forces, key=lambda force: (force.joint not in still_open, force.criterion)))
+
+
+def _improved(
+    rig: Rig,
+    found: Sequence[JointMotion],
+    records: Sequence[Record],
+    noise: Mapping[str, float],
+    laws: dict[str, RegressedLaw],
+) -> tuple[tuple[JointMotion, ...], float]:
+    """Regress the law of each joint, take over its parameters and follow the motion once more; return the largest change."""
+    floors = noise_of(rig, noise)
+    change = 0.0
+    for one, law in zip(found, regressed_laws(found, floors, [_sizes(one) for one in found]), strict=True):
+        changed = within_reach(one.followed, law.parameters)
+        change = max(change, _change(one.followed, changed), _law_change(laws.get(one.joint.name), law))
+        laws[one.joint.name] = law
+        one.followed.values = changed
+    return followed_again(
+        [one.joint for one in found], [one.followed for one in found], records, noise
+    ), change
+
+
+def _change(followed: FollowedMotion, changed: Mapping[str, float]) -> float:
+    before = followed.values
+    return max(
+        (
+            abs(changed[p.name] - before[p.name]) / abs(before[p.name])
+            for p in followed.fitted
+            if before[p.name] != 0.0
+        ),
+        default=0.0,
+    )
+
+
+def _law_change(before: RegressedLaw | None, law: RegressedLaw) -> float:
+    if before is None or [t.effect.name for t in before.terms] != [t.effect.name for t in law.terms]:
+        return float("inf")
+    pairs = [
+        (old.values[name], value)
+        for old, new in zip(before.terms, law.terms, strict=True)
+        for name, value in new.values.items()
+    ]
+    return max((abs(new - old) / abs(new) for old, new in pairs if new != 0.0), default=0.0)
+
+
+def _sizes(one: JointMotion) -> dict[str, float]:
+    """Return the size of each base quantity at a joint."""
+
+    def size(signals: Sequence[Floats]) -> float:
+        together = np.concatenate([np.abs(signal - np.median(signal)) for signal in signals])
+        return float(np.percentile(together, _LARGE)) or 1.0
+
+    x, v, force = size(one.displacement), size(one.velocity), size(one.force)
+    return {"x": x, "time": x / v, "force": force, "drive": force}
+
+
+def _free_run_square(
+    rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Floats, followed: FollowedMotion
+) -> float:
+    """Return the weighted square of the free-run errors of the rig's own equations; no more than if nothing moved."""
+    structure, total = compose(rig), 0.0
+    others = np.setdiff1d(np.arange(followed.sizes.size), np.ravel(followed.forces))
+    for record, motion in zip(records, followed.motions, strict=True):
+        shown = [
+            (record[s.name], floor) for s, floor in zip(rig.outputs, noise, strict=True) if s.name in record
+        ]
+        still = sum(float(np.sum(((y - np.mean(y)) / floor) ** 2)) for y, floor in shown)
+        try:
+            run = simulate(structure, values, record, motion[0, others], accuracy=1e-4)
+        except SimulationError:
+            total += still
+            continue
+        moving = sum(
+            float(np.sum(((record[s.name] - run[s.name]) / floor) ** 2))
+            for s, floor in zip(rig.outputs, noise, strict=True)
+            if s.name in record
+        )
+        total += min(still, moving)
+    return total
+
+
+def _joint_force(
+    rig: Rig,
+    one: JointMotion,
+    records: Sequence[Record],
+    law: RegressedLaw,
+    before: float,
+    n_measured: int,
+    included: Mapping[str, float],
+) -> JointForce:
+    told = [
+        sum((force_along(t, one, i, law.parameters) for t in law.terms), start=np.zeros(record.n_samples))
+        for i, record in enumerate(records)
+    ]
+    traces = tuple(
+        ForceTrace(r.name, r.t, x, v, force, error, own)
+        for r, x, v, force, error, own in zip(
+            records, one.displacement, one.velocity, one.force, one.error, told, strict=True
+        )
+    )
+    whole = sum(float(np.sum(trace.force**2)) for trace in traces)
+    rest = sum(float(np.sum((trace.force - trace.law) ** 2)) for trace in traces)
+    errors = np.concatenate(one.error)
+    units = rig.units_at(one.joint.name)
+    own = {p.name for p in rig.parameters}
+    return JointForce(
+        joint=one.joint.name,
+        x_unit=units["x"],
+        unit=units["force"],
+        traces=traces,
+        share=max(0.0, 1.0 - one.left / before) if before > 0.0 else 0.0,
+        error_over_noise=float(np.sqrt(one.left / n_measured)),
+        standard_error=float(np.sqrt(np.mean(errors**2))),
+        law=JointLaw(law.terms, max(0.0, 1.0 - rest / whole) if law.terms and whole > 0.0 else 0.0, included),
+        parameters={name: value for name, value in law.parameters.items() if name in own},
+        criterion=law.criterion,
+    )

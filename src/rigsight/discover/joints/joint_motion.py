@@ -1,0 +1,241 @@
+"""Which force at one joint alone would make a rig follow its sensors, and how does that joint move?
+
+First all joints carry an unknown force, so that the motion follows the sensors wherever the missing force acts. From there each
+joint carries it alone: what the sensors still contradict then speaks against the joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.discover.joints.followed_motion import (
+    DECADES,
+    FollowedMotion,
+    improved,
+    with_unknown_forces,
+)
+from rigsight.discover.joints.linearized_motion import LinearizedMotion, MotionEquations
+from rigsight.discover.joints.unknown_force import joint_motion
+from rigsight.records.record import Record
+from rigsight.rigs import Joint, Rig
+from rigsight.simulate import parameter_vector, record_input, rest_state
+from rigsight.simulate.compiled.linear_forms import slope
+from rigsight.simulate.simulation import record_values
+
+Floats = NDArray[np.float64]
+
+_PASSES = 4
+_SETTLED = 1e-2
+"""Change of the motion, in its sizes, from which another linearization changes nothing."""
+_AT_REST = 0.02
+"""Share of a joint's usual velocity below which it may stick: dry friction is then whatever holds it, and jumps when it turns."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """One joint while it carries the unknown force alone.
+
+    Attributes
+    ----------
+    joint
+        The joint.
+    followed
+        The rig with the unknown force there.
+    records
+        What was measured.
+    displacement, velocity
+        Of the joint from its rest, shape (n_samples,) per record.
+    force, error
+        The unknown force that resists it and its standard error, per record.
+    left
+        Weighted square of what the sensors showed beside this motion.
+    """
+
+    joint: Joint
+    followed: FollowedMotion
+    records: tuple[Record, ...]
+    displacement: tuple[Floats, ...]
+    velocity: tuple[Floats, ...]
+    force: tuple[Floats, ...]
+    error: tuple[Floats, ...]
+    left: float
+
+
+def noise_of(rig: Rig, noise: Mapping[str, float]) -> Floats:
+    """Return the noise floor of each output, shape (n_outputs,); one for a sensor that no record holds, which weighs nothing."""
+    return np.array([noise.get(signal.name, 1.0) for signal in rig.outputs])
+
+
+def joint_motions(
+    rig: Rig, records: Sequence[Record], values: Mapping[str, float], noise: Mapping[str, float]
+) -> tuple[JointMotion, ...]:
+    """Return each joint with the force that it would have to carry alone, in the order of the rig.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        Inputs, and what the sensors showed.
+    values
+        Constants and re-identified parameters, by name.
+    noise
+        Noise floor of each output.
+    """
+    floors = noise_of(rig, noise)
+    joints = rig.mechanism.joints
+    every = _at_every_joint(rig, records, dict(values), floors)
+    n_own = every.sizes.size - 2 * len(joints)
+    alone = []
+    fitted = tuple(p for p in rig.parameters if p.fitted)
+    for index, joint in enumerate(joints):
+        size = every.sizes[n_own + 2 * index : n_own + 2 * index + 2]
+        equations, forces = with_unknown_forces(rig, [joint.name], fitted)
+        columns = [*range(n_own), n_own + 2 * index, n_own + 2 * index + 1]
+        motions = [motion[:, columns] for motion in every.motions]
+        sizes = np.append(every.sizes[:n_own], size)
+        alone.append(FollowedMotion(equations, forces, fitted, dict(values), motions, sizes, every.omega))
+    improved(alone, records, floors, DECADES)
+    return followed_again(joints, alone, records, noise)
+
+
+def followed_again(
+    joints: Sequence[Joint],
+    alone: Sequence[FollowedMotion],
+    records: Sequence[Record],
+    noise: Mapping[str, float],
+) -> tuple[JointMotion, ...]:
+    """Return each joint with its force, estimated once more about what is known of it; the force may jump where the joint rests.
+
+    Parameters
+    ----------
+    joints, alone
+        Each joint, and the rig with the unknown force there.
+    records, noise
+        As for `joint_motions`.
+    """
+    for joint, one in zip(joints, alone, strict=True):
+        one.jumps = list(_resting(joint, one, records))
+    floors = noise_of(alone[0].equations.structure.rig, noise)
+    improved(alone, records, floors, DECADES)
+    return tuple(_found(joint, one, records, floors) for joint, one in zip(joints, alone, strict=True))
+
+
+def _at_every_joint(
+    rig: Rig, records: Sequence[Record], values: dict[str, float], noise: Floats
+) -> FollowedMotion:
+    """Return the motion that follows the sensors with an unknown force at every joint."""
+    joints = rig.mechanism.joints
+    equations, forces = with_unknown_forces(rig, [joint.name for joint in joints], ())
+    structure = equations.structure
+    rest = [
+        rest_state(
+            structure,
+            parameter_vector(structure, record_values(structure, values, record)),
+            record_input(structure, record),
+        )
+        for record in records
+    ]
+    motions = [np.tile(state, (record.n_samples, 1)) for state, record in zip(rest, records, strict=True)]
+    linear = equations.about(records[0], values, motions[0])
+    omega = _typical_rate(rig, records, noise)
+    sizes = _sizes(rig, equations, forces, records, values, linear, omega)
+    followed = FollowedMotion(equations, forces, (), values, motions, sizes, omega)
+    improved([followed], records, noise, DECADES)
+    for _ in range(_PASSES):
+        if improved([followed], records, noise, (followed.decade,)) < _SETTLED:
+            break
+    return followed
+
+
+def _typical_rate(rig: Rig, records: Sequence[Record], noise: Floats) -> float:
+    """Return the angular frequency at which the sensors' readings change [rad/s]."""
+    found = []
+    for signal, floor in zip(rig.outputs, noise, strict=True):
+        for record in records:
+            if signal.name in record and record.n_samples > 2:
+                shown = record[signal.name]
+                power = np.var(np.gradient(shown, record.dt)) - floor**2 / (2.0 * record.dt**2)
+                spread = np.var(shown) - floor**2
+                if power > 0.0 and spread > 0.0:
+                    found.append(float(np.sqrt(power / spread)))
+    longest = max(record.dt * record.n_samples for record in records)
+    return float(np.median(found)) if found else 2.0 * np.pi / longest
+
+
+def _sizes(
+    rig: Rig,
+    equations: MotionEquations,
+    forces: Sequence[tuple[int, int]],
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    linear: LinearizedMotion,
+    omega: float,
+) -> Floats:
+    """Return the size of every state: what the sensors say of it, by its rate or by its coordinate, else that of the others."""
+    seen = np.max(np.abs(linear.seen), axis=0)
+    spreads = np.array(
+        [max((float(np.std(r[s.name])) for r in records if s.name in r), default=0.0) for s in rig.outputs]
+    )
+    n, n_states = len(rig.mechanism.free), seen.shape[1]
+    with np.errstate(divide="ignore"):
+        shown = np.where(seen > 0.0, spreads[:, None] / seen, 0.0)
+    size = np.max(shown, axis=0, initial=0.0)
+    size[:n] = np.maximum(size[:n], size[n : 2 * n] / omega)
+    moving = size[:n][size[:n] > 0.0]
+    size[:n] = np.where(size[:n] > 0.0, size[:n], np.max(moving) if moving.size else 1.0)
+    size[n : 2 * n] = np.maximum(size[n : 2 * n], omega * size[:n])
+    size = np.where(size > 0.0, size, 1.0)
+    # What a force has to be that moves its joint as far as it moves, within one radian of the motion.
+    rates = (linear.transition[0] - np.eye(n_states)) / linear.dt
+    for joint, (force, rate) in zip(rig.mechanism.joints, forces, strict=True):
+        motion = joint_motion(equations.structure, joint)[0]
+        by_state = [slope(motion, c.symbol) for c in rig.mechanism.free]
+        slopes = equations.along(by_state, records[0], values, linear.reference)[:, 0]
+        moved = float(np.sum(np.abs(slopes) * size[:n]))
+        mobility = abs(float(slopes @ rates[n : 2 * n, force]))
+        direct = seen[:, force]
+        if mobility > 0.0:
+            size[force] = moved * omega**2 / mobility
+        elif np.any(direct > 0.0):
+            size[force] = np.max(spreads[direct > 0.0] / direct[direct > 0.0])
+        size[rate] = size[force] * omega
+    return size
+
+
+def _resting(joint: Joint, one: FollowedMotion, records: Sequence[Record]) -> Iterator[NDArray[np.bool_]]:
+    """Yield, per record, where a joint may be at rest or turns round behind a sample."""
+    expression = joint_motion(one.equations.structure, joint)[1]
+    velocities = [
+        one.equations.along([expression], record, one.values, motion)[0]
+        for record, motion in zip(records, one.motions, strict=True)
+    ]
+    usual = float(np.sqrt(np.mean(np.concatenate(velocities) ** 2)))
+    for velocity in velocities:
+        slow = np.abs(velocity) < _AT_REST * usual
+        turns = np.append(velocity[1:] * velocity[:-1] < 0.0, False)
+        # The force is another one from the sample before the first slow one on.
+        yield slow | turns | np.append(slow[1:], False)
+
+
+def _found(joint: Joint, one: FollowedMotion, records: Sequence[Record], noise: Floats) -> JointMotion:
+    expressions = joint_motion(one.equations.structure, joint)
+    moved = [
+        one.equations.along(expressions, record, one.values, motion)
+        for record, motion in zip(records, one.motions, strict=True)
+    ]
+    ((force, _),) = one.forces
+    return JointMotion(
+        joint=joint,
+        followed=one,
+        records=tuple(records),
+        displacement=tuple(x for x, _ in moved),
+        velocity=tuple(v for _, v in moved),
+        force=tuple(motion[:, force] for motion in one.motions),
+        error=tuple(error[:, force] for error in one.errors),
+        left=one.left(records, noise),
+    )

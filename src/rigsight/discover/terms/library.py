@@ -1,0 +1,355 @@
+"""Which terms may the equation hold, and what is each along the measured motion?
+
+Every candidate comes from an effect's own declaration. Where its torque is linear in its parameters, those become
+coefficients; what stands inside (a clearance, a dead time, the shape of a loop) is found by variable projection: a grid
+outside, linear regression inside. Each effect then brings one column to the library, at its best inner values.
+"""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.discover.motion import Motion
+from rigsight.discover.regression import Projected
+from rigsight.discover.terms.driven_states import is_filter, states_along
+from rigsight.discover.terms.hysteresis import best_loop, is_loop
+from rigsight.discover.terms.monomials import MONOMIALS
+from rigsight.discover.weak_form import Rows
+from rigsight.effects import CATALOGUE, Effect
+from rigsight.effects import symbols as canonical
+from rigsight.effects.effect import Place
+from rigsight.identify import IdleThreads
+from rigsight.parameters import Parameter
+from rigsight.rigs import Rig
+from rigsight.units import characteristic_value
+
+_GRID = 10
+_LEAST_SHARE = 0.02
+_MOST_SHARE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect at its best inner values, as one column of the library.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    inner
+        Values of the parameters that stand inside the term.
+    linear
+        Share of each of the effect's linear parameters in the coefficient of the column; empty where it has none.
+    column
+        Rows of all records, shape (n_rows,).
+    """
+
+    effect: Effect
+    inner: Mapping[str, float]
+    linear: Mapping[str, float]
+    column: NDArray[np.float64]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+
+def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
+    """Return the effects that a regression can hold as terms on this rig.
+
+    A state has no signal of its own along a measured motion; loops, and what filters the drive, are the exceptions, because
+    theirs follow from motion and input. A torque of states is none: a mass that rides along would explain the acceleration by
+    the acceleration.
+    """
+    changes_spring = [e for e in (*CATALOGUE, *MONOMIALS) if e.spring is not None or e.deflection is not None]
+    return [
+        effect
+        for effect in (*CATALOGUE, *MONOMIALS)
+        if rig.offers(effect)
+        and (has_spring or effect not in changes_spring)
+        and (is_loop(effect) or _filters_drive(effect) or _is_static(effect))
+    ]
+
+
+def plain_terms(rig: Rig, has_spring: bool) -> list[Effect]:
+    """Return those of the offered effects that are a torque with one coefficient and nothing inside."""
+    return [effect for effect in offered_effects(rig, has_spring) if _is_plain(effect)]
+
+
+def _is_static(effect: Effect) -> bool:
+    """Return True for a known signal of displacement, velocity and input: no state, no use of a torque it would change."""
+    known = (effect.torque, effect.deflection, effect.drive, effect.delay)
+    symbols = {
+        canonical.x,
+        canonical.v,
+        canonical.u,
+        *(sp.Symbol(p.name, real=True) for p in effect.parameters),
+    }
+    return (
+        effect.place in (Place.ACTUATOR, Place.DYNAMICS)
+        and not effect.states
+        and effect.spring is None
+        and any(part is not None for part in known)
+        and all(part is None or part.free_symbols <= symbols for part in known)
+    )
+
+
+def _filters_drive(effect: Effect) -> bool:
+    """Return True for a drive that follows the input through states of its own."""
+    return effect.place is Place.ACTUATOR and effect.drive is not None and is_filter(effect)
+
+
+def candidates(
+    effects: Sequence[Effect],
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    driven: bool,
+    threads: IdleThreads | None = None,
+) -> list[Candidate]:
+    """Return one candidate per effect, at the inner values that explain most of what the rig's own terms leave.
+
+    Parameters
+    ----------
+    effects
+        From `offered_effects`.
+    motions
+        Of all records.
+    rows
+        How signals become rows.
+    projected
+        The rig's own terms, projected out of every column.
+    scales
+        Size of each base quantity.
+    driven
+        True if the acceleration is regressed, false if the force is: a resisting force has the other sign there.
+    threads
+        Who looks for inner values; None for the calling thread alone.
+    """
+    sign = -1.0 if driven else 1.0
+    helpers = threads or IdleThreads()
+    plain = [effect for effect in effects if _is_plain(effect)]
+    found = []
+    for effect, column in zip(plain, _library_columns(plain, motions, rows), strict=True):
+        found.append(Candidate(effect, {}, {effect.parameters[0].name: 1.0}, sign * column))
+
+    def at_best_values(effect: Effect) -> Candidate | None:
+        if is_loop(effect):
+            return _loop(effect, motions, rows, projected, scales, driven, helpers)
+        return _best_inner(effect, motions, rows, projected, scales, sign)
+
+    others = [effect for effect in effects if effect not in plain]
+    return found + [best for best in helpers.side_by_side(at_best_values, others) if best is not None]
+
+
+def _loop(
+    effect: Effect,
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    driven: bool,
+    threads: IdleThreads,
+) -> Candidate | None:
+    loop = best_loop(effect, motions, rows, projected, scales, driven, threads)
+    return None if loop is None else Candidate(effect, loop.values, {}, loop.column)
+
+
+def _best_inner(
+    effect: Effect,
+    motions: Sequence[Motion],
+    rows: Rows,
+    projected: Projected,
+    scales: Mapping[str, float],
+    sign: float,
+) -> Candidate | None:
+    best: Candidate | None = None
+    highest = 0.0
+    for signals in term_signals(effect, motions, scales):
+        parts = sign * np.column_stack(
+            [np.concatenate([rows.of(one) for one in part]) for part in zip(*signals.parts, strict=True)]
+        )
+        candidate, share = mixed(signals, parts, projected)
+        if share > highest:
+            best, highest = candidate, share
+    return best
+
+
+def mixed(signals: TermSignals, parts: NDArray[np.float64], projected: Projected) -> tuple[Candidate, float]:
+    """Return the parts of a term as one column, mixed as the regression wishes them, and the share it explains.
+
+    Parameters
+    ----------
+    signals
+        The term.
+    parts
+        Rows of its parts, shape (n_rows, n_parts).
+    projected
+        What is regressed.
+    """
+    weights, share = projected.explained(parts)
+    if not np.any(weights):
+        return Candidate(signals.effect, signals.inner, {}, parts[:, 0]), 0.0
+    # One part keeps its own unit.
+    mixture = np.ones(1) if len(weights) == 1 else weights / np.max(np.abs(weights))
+    linear = dict(zip(signals.names, map(float, mixture), strict=True)) if signals.names else {}
+    return Candidate(signals.effect, signals.inner, linear, parts @ mixture), share
+
+
+def _is_plain(effect: Effect) -> bool:
+    """Return True for a torque with one coefficient and nothing inside."""
+    return effect.torque is not None and not effect.states and len(effect.parameters) == 1
+
+
+def _library_columns(
+    effects: Sequence[Effect], motions: Sequence[Motion], rows: Rows
+) -> list[NDArray[np.float64]]:
+    """Return the columns of the terms without inner parameters, as a pysindy library gives them on [x, x']."""
+    if not effects:
+        return []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from pysindy import CustomLibrary
+
+    library = CustomLibrary(
+        library_functions=[_term(effect) for effect in effects],
+        function_names=[_constant_name(effect.name) for effect in effects],
+    )
+    columns: list[list[NDArray[np.float64]]] = [[] for _ in effects]
+    for motion in motions:
+        # In SI, as a sine is none of the angle in other units; every regression brings its columns to one length itself.
+        values = np.asarray(library.fit_transform(np.column_stack([motion.x, motion.v])))
+        for i in range(len(effects)):
+            columns[i].append(rows.of(np.ascontiguousarray(values[:, i])))
+    return [np.concatenate(parts) for parts in columns]
+
+
+def _term(effect: Effect) -> Any:
+    compiled = sp.lambdify((canonical.x, canonical.v), _slope(effect, effect.parameters[0]), "numpy")
+
+    def term(x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(compiled(x, v))
+
+    return term
+
+
+def _constant_name(name: str) -> Any:
+    return lambda _x, _v: name
+
+
+def _slope(effect: Effect, parameter: Parameter) -> sp.Expr:
+    assert effect.torque is not None
+    return sp.diff(effect.torque, sp.Symbol(parameter.name, real=True))
+
+
+@dataclass(frozen=True, eq=False)
+class TermSignals:
+    """What an effect with certain inner values is along measured motions.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    inner
+        Values of the parameters that stand inside the term.
+    names
+        Linear parameters, one for each part; empty where the term has one part without a coefficient of its own.
+    parts
+        Per record the parts as resisting forces per unit of their coefficient, shape (n_samples,) each.
+    """
+
+    effect: Effect
+    inner: Mapping[str, float]
+    names: tuple[str, ...]
+    parts: tuple[tuple[NDArray[np.float64], ...], ...]
+
+
+def term_signals(
+    effect: Effect, motions: Sequence[Motion], scales: Mapping[str, float]
+) -> Iterator[TermSignals]:
+    """Yield an effect along measured motions, for each point of the grid of its inner values.
+
+    Parameters
+    ----------
+    effect
+        An effect without states.
+    motions
+        Of all records.
+    scales
+        Size of each base quantity.
+    """
+    fitted = [p for p in effect.parameters if p.fitted]
+    linear = [p for p in fitted if effect.torque is not None and _is_linear(effect, p)]
+    inside = [p for p in fitted if p not in linear]
+    names = tuple(p.name for p in linear)
+    for values in itertools.product(*(_grid(p, scales) for p in inside)):
+        inner = dict(zip((p.name for p in inside), values, strict=True))
+        parts = tuple(tuple(_signals(effect, linear, inner, motion)) for motion in motions)
+        yield TermSignals(effect, inner, names, parts)
+
+
+def _is_linear(effect: Effect, parameter: Parameter) -> bool:
+    return not _slope(effect, parameter).has(sp.Symbol(parameter.name, real=True))
+
+
+def _grid(parameter: Parameter, scales: Mapping[str, float]) -> list[float]:
+    size = characteristic_value(parameter.dimension, scales)
+    low, high = max(parameter.search[0], _LEAST_SHARE), min(parameter.search[1], _MOST_SHARE)
+    return [float(share * size) for share in np.geomspace(low, 0.97 * high, _GRID)]
+
+
+def _signals(
+    effect: Effect, linear: Sequence[Parameter], inner: Mapping[str, float], motion: Motion
+) -> list[NDArray[np.float64]]:
+    """Return the parts of an effect as resisting forces per unit of their coefficient."""
+    if effect.delay is not None:
+        time = motion.dt * np.arange(motion.u.size)
+        return [motion.u - np.interp(time - _evaluated(effect.delay, inner, motion), time, motion.u)]
+    if effect.torque is not None:
+        return [_evaluated(_slope(effect, p), inner, motion) for p in linear]
+    if effect.deflection is not None:
+        return [_evaluated(effect.deflection, inner, motion) - motion.x]
+    assert effect.drive is not None
+    defaults = {p.name: p.default for p in effect.parameters if p.default is not None}
+    states = states_along(effect, {**defaults, **inner}, motion) if effect.states else {}
+    return [motion.u - _evaluated(effect.drive, {**inner, **states}, motion)]
+
+
+def torque_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+    """Return the torque of a static effect along a measured motion, shape (n_samples,)."""
+    assert effect.torque is not None
+    return _evaluated(effect.torque, values, motion)
+
+
+def deflection_along(effect: Effect, values: Mapping[str, float], motion: Motion) -> NDArray[np.float64]:
+    """Return what the spring sees of a measured motion behind a static effect, shape (n_samples,)."""
+    assert effect.deflection is not None
+    return _evaluated(effect.deflection, values, motion)
+
+
+def _evaluated(
+    expression: sp.Expr, inner: Mapping[str, float | NDArray[np.float64]], motion: Motion
+) -> NDArray[np.float64]:
+    function = _compiled(expression, tuple(inner))
+    return np.broadcast_to(function(motion.x, motion.v, motion.u, *inner.values()), motion.x.shape).astype(
+        np.float64
+    )
+
+
+@lru_cache(maxsize=256)
+def _compiled(expression: sp.Expr, names: tuple[str, ...]) -> Any:
+    """Return an expression as a function of displacement, velocity, input and named parameters."""
+    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2)
+    own = [sp.Symbol(name, real=True) for name in names]
+    return sp.lambdify((canonical.x, canonical.v, canonical.u, *own), plain, "numpy", cse=True)

@@ -1,0 +1,161 @@
+"""Covariance of least-squares estimates whose residuals are colored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
+
+_DEPENDENT = 1e-14
+"""Share of the largest eigenvalue below which a direction of the coordinates moves nothing but rounding errors."""
+_MARGIN = 3.0
+"""By how much an error of the derivatives is multiplied before a direction that stands out of it is believed; an assumption."""
+_MIXED = 30.0
+"""The same for the part that a coordinate takes in such a direction, as errors of the derivatives mix it with others.
+
+An assumption: ten times as much as for the direction itself; an arm with three undetermined numbers was looked at.
+"""
+_TAKES_PART = 1e-9
+SMOOTHED = 15
+"""Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
+record however fast it is sampled, and what a disturbance leaves of a resonance is some of them wide."""
+
+
+def colored_covariance(
+    sensitivities: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    n_common: int,
+    n_outputs: Sequence[int] | None = None,
+    derivative_error: float = 0.0,
+) -> NDArray[np.float64]:
+    """Return the covariance of the common coordinates, allowing for colored residuals.
+
+    ``(J^T J)^-1 (sum_f J(f)^* S(f) J(f)^T) (J^T J)^-1`` with the smoothed residual spectrum S of each record, a matrix over its
+    outputs: a disturbance in front of two sensors moves both. Coordinates that the records do not determine get an infinite
+    variance.
+
+    Parameters
+    ----------
+    sensitivities
+        Per record the weighted residuals, shape (n,), and their derivatives, shape (n, n_common + n_own): the first columns
+        belong to common coordinates, the others to this record's own (its initial states).
+    n_common
+        Number of common coordinates.
+    n_outputs
+        Per record how many outputs of equal length stand one after the other in its residuals; by default one.
+    derivative_error
+        Relative error of the derivatives: dependent columns differ by as much.
+
+    Returns
+    -------
+    Shape (n_common, n_common).
+
+    References
+    ----------
+    L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9; W. K. Newey and K. D. West, Econometrica 55
+    (1987) 703.
+    """
+    own_sizes = [derivative.shape[1] - n_common for _, derivative in sensitivities]
+    n_total = n_common + sum(own_sizes)
+    bread = np.zeros((n_total, n_total))
+    filling = np.zeros((n_total, n_total))
+    first = n_common
+    stacked = [1] * len(sensitivities) if n_outputs is None else n_outputs
+    for (residual, derivative), n_own, count in zip(sensitivities, own_sizes, stacked, strict=True):
+        columns = np.concatenate([np.arange(n_common), first + np.arange(n_own)]).astype(np.intp)
+        first += n_own
+        bread[np.ix_(columns, columns)] += derivative.T @ derivative
+        filling[np.ix_(columns, columns)] += _spectral_product(residual, derivative, count)
+    covariance = sandwich_covariance(bread, filling, derivative_error)
+    return np.asarray(covariance[:n_common, :n_common])
+
+
+def sandwich_covariance(
+    bread: NDArray[np.float64], filling: NDArray[np.float64], derivative_error: float = 0.0
+) -> NDArray[np.float64]:
+    """Return ``bread^-1 filling bread^-1`` with infinite variances of coordinates that the bread does not determine.
+
+    Parameters
+    ----------
+    bread
+        J^T J of the weighted residuals, shape (n, n).
+    filling
+        Covariance of J^T r, shape (n, n); the bread itself where the residuals are independent with variance 1.
+    derivative_error
+        Relative error of the derivatives in the bread.
+
+    Returns
+    -------
+    Shape (n, n).
+    """
+    if bread.shape[0] == 0:
+        return np.zeros((0, 0))
+    size = np.sqrt(np.diag(bread))
+    size[size == 0.0] = 1.0
+    eigenvalues, vectors = symmetric_eigen(bread / np.outer(size, size))
+    dependent = max(_DEPENDENT, (_MARGIN * derivative_error) ** 2)
+    seen = eigenvalues > dependent * max(float(eigenvalues[-1]), 1e-300)
+    known = vectors[:, seen]
+    inverse = (known / eigenvalues[seen]) @ known.T
+    covariance = inverse @ (filling / np.outer(size, size)) @ inverse / np.outer(size, size)
+    # A coordinate that takes part in an unseen direction may be anything, however well its share in the seen ones is known.
+    takes_part = max(_TAKES_PART, (_MIXED * derivative_error) ** 2)
+    undetermined = np.sum(vectors[:, ~seen] ** 2, axis=1) > takes_part
+    covariance[undetermined, :] = 0.0
+    covariance[:, undetermined] = 0.0
+    covariance[undetermined, undetermined] = np.inf
+    return np.asarray(covariance)
+
+
+def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``chain covariance chain^T`` where variances may be infinite.
+
+    Parameters
+    ----------
+    covariance
+        Of coordinates, shape (n, n), see `colored_covariance`.
+    chain
+        d parameters / d coordinates, shape (m, n).
+
+    Returns
+    -------
+    Shape (m, m); a parameter that depends on an undetermined coordinate has an infinite variance, no other is touched.
+    """
+    infinite = np.isinf(np.diag(covariance))
+    finite = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
+    result = chain @ finite @ chain.T
+    touched = np.any(chain[:, infinite] != 0.0, axis=1)
+    result[touched, :] = 0.0
+    result[:, touched] = 0.0
+    result[touched, touched] = np.inf
+    return np.asarray(result)
+
+
+def _spectral_product(
+    residual: NDArray[np.float64], derivative: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Return the covariance of J^T r for residuals of `count` outputs, one after the other."""
+    by_output = residual.reshape(count, -1)
+    n = by_output.shape[1]
+    lines = np.fft.rfft(by_output, axis=1)
+    spectra = np.fft.rfft(derivative.reshape(count, n, -1), axis=1)
+    folded = np.full(lines.shape[1], 2.0)
+    folded[0] = 1.0
+    if n % 2 == 0:
+        folded[-1] = 1.0
+    product = np.zeros((derivative.shape[1], derivative.shape[1]))
+    for one in range(count):
+        for other in range(count):
+            power = _smoothed(lines[one] * lines[other].conj() / n) * (folded / n)
+            product += np.real((spectra[one].conj() * power[:, None]).T @ spectra[other])
+    return np.asarray(product)
+
+
+def _smoothed(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Average over neighbors; beyond zero and Nyquist the spectrum of a real signal goes on conjugated."""
+    half = min(SMOOTHED // 2, spectrum.size - 1)
+    before, after = spectrum[half:0:-1].conj(), spectrum[-2 : -2 - half : -1].conj()
+    around = np.concatenate([before, spectrum, after])
+    return np.asarray(np.convolve(around, np.full(2 * half + 1, 1.0 / (2 * half + 1)), "valid"))

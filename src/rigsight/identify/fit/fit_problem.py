@@ -1,0 +1,356 @@
+"""Cost, derivatives and Gauss-Newton matrix of an output-error fit as functions of its coordinates and initial states.
+
+They come from one call of the kernel for all records. It carries the derivatives along with the motion, or, where that takes
+longer, the current parameters and every shifted one are lanes of its side-by-side integrator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import SimulationError
+from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
+from rigsight.identify.fit.fit_data import FitData, weighted
+from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
+from rigsight.simulate import (
+    FittedRecord,
+    Substeps,
+    carries_tangents,
+    choose_substeps,
+    differs_at_events,
+    normal_equations,
+    simulate_sets,
+    simulate_tangents,
+    tangent_equations,
+)
+
+MOST_SUBSTEPS = 16
+"""A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
+_WORTH_REFINING = 1e-3
+"""Share of the cost that finer steps must promise to remove."""
+_WORSE = 1e3
+_DIVERGED = 1e100
+"""Sum of squares, in units of the noise, of a simulation that left the range in which an optimizer can compare numbers."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Cost r^T r, J^T J and J^T r at coordinates."""
+
+    theta: NDArray[np.float64]
+    cost: float
+    normal: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+
+    @cached_property
+    def compressed(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """R and c with R^T R = J^T J and R^T c = J^T r, also where the derivatives are dependent."""
+        size = np.sqrt(np.diag(self.normal))
+        size[size == 0.0] = 1.0
+        eigenvalues, vectors = symmetric_eigen(self.normal / np.outer(size, size))
+        kept = np.maximum(eigenvalues, 0.0)
+        floor = 1e-13 * max(float(kept[-1]), 1e-300)
+        root = np.sqrt(kept)
+        inverse = np.where(kept > floor, 1.0 / np.where(kept > floor, root, 1.0), 0.0)
+        projection = inverse * (vectors.T @ (self.gradient / size))
+        return (root[:, None] * vectors.T) * size, projection
+
+
+class Problem:
+    """Cost, gradient and Gauss-Newton matrix as functions of the coordinates, with the last evaluation kept."""
+
+    def __init__(
+        self,
+        data: FitData,
+        coordinates: Coordinates,
+        n_states: int,
+        upper: NDArray[np.float64],
+    ) -> None:
+        self.data = data
+        self.coordinates = coordinates
+        self.n_states = n_states
+        self.upper = upper
+        has_events = bool(np.any(data.limited)) or differs_at_events(data.structure)
+        self.steps = np.full(upper.size, STEP if has_events else FINE_STEP)
+        self.derivative_error = (
+            0.0 if carries_tangents(data.structure) else float(np.max(self.steps, initial=0.0))
+        )
+        self.n_free = len(coordinates.free)
+        self.n_evaluations = 0
+        self.substeps = [Substeps(MOST_SUBSTEPS)] * len(data.records)
+        self._fitted: list[tuple[Substeps, FittedRecord]] = []
+        self._last: Evaluation | None = None
+        self._best = float("inf")
+
+    def states(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Return the initial states per record."""
+        places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
+        sizes = self.data.state_sizes(self.coordinates.to_parameters(theta[: self.n_free])[:, None])[:, 0]
+        return [row * sizes for row in places]
+
+    def choose_substeps(self, theta: NDArray[np.float64]) -> None:
+        """Choose the substeps of each record from the accuracy wish at these coordinates."""
+        p = self.coordinates.to_parameters(theta[: self.n_free])
+        states = self.states(theta)
+
+        def chosen(index: int) -> Substeps:
+            record = self.data.records[index]
+            try:
+                return choose_substeps(
+                    self.data.structure,
+                    record.held,
+                    record.parameters(p),
+                    states[index],
+                    record.record.n_samples,
+                    self.data.accuracy,
+                    MOST_SUBSTEPS,
+                )
+            except SimulationError:
+                return Substeps(MOST_SUBSTEPS)
+
+        self.substeps = self.data.of_each_record(chosen)
+
+    def refined(self, theta: NDArray[np.float64]) -> bool:
+        """Double the substeps if the cost would then fall further from here; return True if so."""
+        before = self.substeps
+        within_reach = self._removable(theta)
+        self.substeps = [n.with_most(min(2 * n, MOST_SUBSTEPS)) for n in before]
+        self._last = None
+        if self.substeps != before and self._removable(theta) > within_reach + _WORTH_REFINING:
+            self._best = float("inf")
+            return True
+        self.substeps, self._last = before, None
+        return False
+
+    def _removable(self, theta: NDArray[np.float64]) -> float:
+        """Return the share of the cost that a full Gauss-Newton step promises to remove."""
+        evaluation = self.at(theta)
+        if not np.isfinite(evaluation.cost):
+            return 0.0
+        _, projection = evaluation.compressed
+        return float(projection @ projection) / max(evaluation.cost, 1e-300)
+
+    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a vector with the same cost and the same projection on the derivatives as the residuals."""
+        evaluation = self.at(theta)
+        if not np.isfinite(evaluation.cost):
+            stand_in = np.zeros(theta.size + 1)
+            stand_in[-1] = np.sqrt(_WORSE * self._best)
+            return stand_in
+        _, projection = evaluation.compressed
+        rest = max(evaluation.cost - float(projection @ projection), 0.0)
+        return np.append(projection, np.sqrt(rest))
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives that go with `residual`."""
+        root, _ = self.at(theta).compressed
+        return np.vstack([root, np.zeros(theta.size)])
+
+    def at(self, theta: NDArray[np.float64]) -> Evaluation:
+        """Evaluate, or return the last evaluation if it was here."""
+        if self._last is not None and np.array_equal(self._last.theta, theta):
+            return self._last
+        # A diverging simulation overflows here; that is what the check below is for.
+        with np.errstate(over="ignore", invalid="ignore"):
+            products = np.array(self._products(theta))
+            cost = float(np.sum(products[:, 0, 0]))
+            normal, gradient = self._put_together(products[:, 1:, 1:], products[:, 0, 1:])
+        if not (cost < _DIVERGED and np.all(np.abs(normal) < _DIVERGED)):
+            cost = float("inf")
+        self._best = min(self._best, cost)
+        self._last = Evaluation(theta.copy(), cost, normal, gradient)
+        self.n_evaluations += 1
+        return self._last
+
+    def _put_together(
+        self, products: NDArray[np.float64], projections: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what all records say of all coordinates, given what each says of the parameters and its own initial states.
+
+        Parameters
+        ----------
+        products
+            Shape (n_records, n, n) with n = n_free + n_states.
+        projections
+            Shape (n_records, n).
+
+        Returns
+        -------
+        Shapes (n_coordinates, n_coordinates) and (n_coordinates,).
+        """
+        n_records, free = products.shape[0], slice(None, self.n_free)
+        own = self.n_free + np.arange(n_records * self.n_states).reshape(n_records, self.n_states)
+        size = self.n_free + own.size
+        normal, gradient = np.zeros((size, size)), np.zeros(size)
+        normal[free, free] = np.sum(products[:, free, free], axis=0)
+        between = np.moveaxis(products[:, free, self.n_free :], 0, 1).reshape(self.n_free, own.size)
+        normal[free, self.n_free :], normal[self.n_free :, free] = between, between.T
+        normal[own[:, :, None], own[:, None, :]] = products[:, self.n_free :, self.n_free :]
+        gradient[free] = np.sum(projections[:, free], axis=0)
+        gradient[self.n_free :] = projections[:, self.n_free :].ravel()
+        return normal, gradient
+
+    def columns(self, index: int) -> NDArray[np.intp]:
+        """Return which coordinates a record depends on: the parameters and its own initial states."""
+        own = self.n_free + index * self.n_states + np.arange(self.n_states)
+        return np.concatenate([np.arange(self.n_free), own]).astype(np.intp)
+
+    def sensitivities(
+        self, theta: NDArray[np.float64]
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return per record the weighted residuals (n,) and their derivatives (n, n_free + n_states)."""
+        data = self.data
+        if carries_tangents(data.structure):
+            p, dp, x0, dx0 = self._place(theta)
+
+            def tangents(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+                own, n = data.records[index], data.records[index].record.n_samples
+                with np.errstate(all="ignore"):
+                    out = simulate_tangents(
+                        data.structure,
+                        own.held,
+                        own.parameters(p),
+                        dp,
+                        x0[index],
+                        dx0,
+                        n,
+                        self.substeps[index],
+                    )
+                    # To `weighted` they are outputs of sets that differ by one.
+                    out[:, :, 1:] += out[:, :, :1]
+                    return weighted(own, out)
+
+            return data.of_each_record(tangents)
+        shifts, sets, states = self._sets(theta)
+
+        def differences(index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            residual, changes = self._differences(index, sets, states[index])
+            with np.errstate(all="ignore"):
+                changes /= shifts[self.columns(index)]
+            return residual, changes
+
+        return data.of_each_record(differences)
+
+    def _place(
+        self, theta: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return parameters, initial states and their derivatives by the coordinates that a record depends on.
+
+        Shapes (n_parameters,), (n_parameters, n), (n_records, n_states) and (n_states, n) with n = n_free + n_states. No state
+        is limited where this is asked for, so that the unit of none depends on the parameters.
+        """
+        own = theta[: self.n_free]
+        p = self.coordinates.to_parameters(own)
+        sizes = self.data.state_sizes(p[:, None])[: self.n_states, 0]
+        dp = np.hstack([self.coordinates.derivatives(own), np.zeros((p.size, self.n_states))])
+        dx0 = np.hstack([np.zeros((self.n_states, self.n_free)), np.diag(sizes)])
+        return p, dp, theta[self.n_free :].reshape(len(self.data.records), self.n_states) * sizes, dx0
+
+    def _sets(
+        self, theta: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the shift of each coordinate, and what differences are taken of: the place itself and each shifted one.
+
+        These are parameters, shape (n_parameters, n_sets), and initial states, shape (n_records, n_states, n_sets).
+        """
+        shifts = np.where(theta + self.steps > self.upper, -self.steps, self.steps)
+        base = self.coordinates.to_parameters(theta[: self.n_free])
+        shifted = []
+        for i in range(self.n_free):
+            moved = theta[: self.n_free].copy()
+            moved[i] += shifts[i]
+            shifted.append(self.coordinates.to_parameters(moved))
+        p = np.column_stack([base, *shifted, *[base] * self.n_states])
+        places = theta[self.n_free :].reshape(len(self.data.records), self.n_states)
+        states = np.repeat(places[:, :, None], p.shape[1], axis=2)
+        own = np.arange(self.n_states)
+        states[:, own, 1 + self.n_free + own] += shifts[self.n_free :].reshape(places.shape)
+        return shifts, p, states * self.data.state_sizes(p)
+
+    def _products(self, theta: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Return per record the products of its residual and its derivatives, shape (1 + n, 1 + n), n = n_free + n_states."""
+        data = self.data
+        if data.structure.is_shifted or data.structure.histories:
+            columns = [np.column_stack(parts) for parts in self.sensitivities(theta)]
+            return [np.asarray(own.T @ own) for own in columns]
+        fitted, lengths = self._fitted_records(), [record.record.n_samples for record in data.records]
+        if carries_tangents(data.structure):
+            p, dp, x0, dx0 = self._place(theta)
+            return data.threads.results_of_shares(
+                self._of_equal_rigs(
+                    p,
+                    lambda own, share: tangent_equations(
+                        data.structure, [fitted[i] for i in share], own, dp, x0[share], dx0
+                    ),
+                ),
+                lengths,
+            )
+        shifts, sets, states = self._sets(theta)
+        products = data.threads.results_of_shares(
+            self._of_equal_rigs(
+                sets,
+                lambda own, share: normal_equations(
+                    data.structure, [fitted[i] for i in share], own, states[share]
+                ),
+            ),
+            lengths,
+        )
+        per_shift = [np.append(1.0, 1.0 / shifts[self.columns(index)]) for index in range(len(lengths))]
+        return [own * np.outer(scale, scale) for own, scale in zip(products, per_shift, strict=True)]
+
+    def _of_equal_rigs(
+        self,
+        p: NDArray[np.float64],
+        several: Callable[[NDArray[np.float64], list[int]], NDArray[np.float64]],
+    ) -> Callable[[Sequence[int]], list[NDArray[np.float64]]]:
+        """Return a function of shares of the records that calls another one for those of equal constants together."""
+
+        def of_share(share: Sequence[int]) -> list[NDArray[np.float64]]:
+            groups: dict[tuple[tuple[int, float], ...], list[int]] = {}
+            for index in share:
+                groups.setdefault(self.data.records[index].own, []).append(index)
+            found: dict[int, NDArray[np.float64]] = {}
+            for group in groups.values():
+                own = self.data.records[group[0]].parameters(p)
+                found.update(zip(group, several(own, group), strict=True))
+            return [found[index] for index in share]
+
+        return of_share
+
+    def _fitted_records(self) -> list[FittedRecord]:
+        # Equal numbers of steps may stand for other needs: these are the same if they are the same object.
+        if [id(substeps) for substeps, _ in self._fitted] != [id(substeps) for substeps in self.substeps]:
+            self._fitted = [
+                (
+                    substeps,
+                    FittedRecord(
+                        record.held,
+                        substeps.per_piece(record.held.n_pieces),
+                        record.measured,
+                        record.weights,
+                    ),
+                )
+                for substeps, record in zip(self.substeps, self.data.records, strict=True)
+            ]
+        return [fitted for _, fitted in self._fitted]
+
+    def _differences(
+        self, index: int, p: NDArray[np.float64], x0: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return weighted residuals (n,) of the first set, and its outputs minus those of each other (n, n_sets - 1)."""
+        record = self.data.records[index]
+        with np.errstate(all="ignore"):
+            out = simulate_sets(
+                self.data.structure,
+                record.held,
+                record.parameters(p),
+                x0,
+                record.record.n_samples,
+                self.substeps[index],
+            )
+            return weighted(record, out)

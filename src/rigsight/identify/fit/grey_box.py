@@ -1,0 +1,395 @@
+"""Output-error fit of a structure's parameters, initial states included, to any number of records at once.
+
+The optimizer is scipy's bounded trust-region least squares, fed with an equivalent compressed problem: it only uses J^T J, J^T r
+and r^T r, so a square root of J^T J stands for the tall Jacobian.
+
+References
+----------
+L. Ljung, *System Identification* (Prentice Hall 1999), chapters 7 and 9, for output error and its covariance with colored
+residuals. M. A. Branch, T. F. Coleman and Y. Li, SIAM J. Sci. Comput. 21 (1999) 1, for the optimizer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import SimulationError
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.fit.fit_data import FitData, RecordData
+from rigsight.identify.fit.fit_memory import FitMemory, fit_key, record_digest
+from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.idle_threads import IdleThreads
+from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
+from rigsight.identify.fit.separate_states import SeparateStates
+from rigsight.identify.fit.settled_states import guessed_states
+from rigsight.records.record import Record
+from rigsight.simulate import (
+    Structure,
+    Substeps,
+    record_input,
+    record_values,
+    simulate_outputs,
+)
+from rigsight.units import characteristic_value
+
+DEFAULT_ACCURACY = 1e-4
+"""Relative accuracy of simulations inside a fit: below the noise of any bench."""
+_MOST_ROUNDS = 4
+"""Fits that follow each other with finer steps."""
+_WORTH_A_ROUND = 1e-3
+"""Share of the cost that a round must have removed for another one."""
+_STATE_RANGE = 20.0
+"""How far an initial state may move from its guess, in units of its size."""
+_Outcome = tuple[NDArray[np.float64], bool, str]
+"""Coordinates and places where a search ended, whether it converged, and the optimizer's words."""
+
+
+@dataclass(frozen=True)
+class _Begin:
+    """Where a search starts: parameters and initial states together, and the states with their bounds per record."""
+
+    coordinates: Coordinates
+    theta: NDArray[np.float64]
+    places: list[NDArray[np.float64]]
+    lower: list[NDArray[np.float64]]
+    upper: list[NDArray[np.float64]]
+
+    @property
+    def n_states(self) -> int:
+        return self.lower[0].size
+
+
+class GreyBoxFit:
+    """Output-error least squares of a structure on records.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    records
+        Records to fit; a record may lack sensors, of a rig of one motion any but the first.
+    scales
+        Size of each base quantity, see `characteristic_scales`.
+    output_noise
+        Standard deviation by which the residuals of each output are divided.
+    accuracy
+        Relative accuracy of the simulations; the number of substeps follows from it.
+    memory
+        Where outcomes are kept; a fit that was done before is not done again, and comes out the same.
+    threads
+        Who helps with the records; None for the calling thread alone.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        records: Sequence[Record],
+        scales: Mapping[str, float],
+        output_noise: Mapping[str, float],
+        accuracy: float = DEFAULT_ACCURACY,
+        memory: FitMemory | None = None,
+        threads: IdleThreads | None = None,
+    ) -> None:
+        self.structure = structure
+        self.memory = memory
+        self.scales = dict(scales)
+        sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
+        names = [signal.name for signal in structure.rig.outputs]
+        self.data = FitData(
+            structure=structure,
+            records=tuple(self._prepared(record, names, output_noise) for record in records),
+            limited=np.array([equation.limit is not None for equation in structure.equations], dtype=bool),
+            unlimited_sizes=np.array(sizes).reshape(-1, 1),
+            accuracy=accuracy,
+            threads=threads or IdleThreads(),
+        )
+        self._problem: list[Any] = []
+        if memory is not None:
+            self._problem = [
+                # Bounds and start values stand in no equation.
+                dict(structure.rig.declaration),
+                [str(equation) for equation in (*structure.equations, *structure.outputs)],
+                list(structure.names),
+                sorted(self.scales.items()),
+                [record_digest(record) for record in records],
+                [d.weights.tolist() for d in self.data.records],
+                accuracy,
+            ]
+        self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self.data.records))
+
+    def _prepared(
+        self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
+    ) -> RecordData:
+        missing = np.full(record.n_samples, np.nan)
+        measured = np.column_stack([record.signals.get(n, missing) for n in names])
+        weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
+        own = record_values(self.structure, {}, record)
+        places = tuple((self.structure.names.index(name), value) for name, value in own.items())
+        return RecordData(record, record_input(self.structure, record), measured, weights, places)
+
+    def fit(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        initial_states: Sequence[NDArray[np.float64]] | None = None,
+        max_evaluations: int = 60,
+        tolerance: float = 1e-7,
+        finish: bool = True,
+        substeps: Sequence[int] | None = None,
+    ) -> FitResult:
+        """Fit the free parameters and every record's initial state.
+
+        Parameters
+        ----------
+        start
+            Value of every parameter of the structure.
+        free
+            Names of those to fit; may be empty, then only initial states are.
+        initial_states
+            Start values per record, shape (n_states,) each; default from the first samples.
+        max_evaluations
+            Limit for the optimizer.
+        tolerance
+            Relative change of the cost at which the optimizer stops.
+        finish
+            Compute standard errors, and residuals with the accurate integrator. False for a first look.
+        substeps
+            Integration steps per sample of each record; default is chosen from the accuracy with the accurate integrator.
+
+        Returns
+        -------
+        The result; ``success`` is False, with the reason as ``message``, where the start cannot be simulated or the
+        optimizer ran out of evaluations.
+        """
+        begin = self._begin(start, free, initial_states)
+        coordinates, theta = begin.coordinates, begin.theta
+        lower = np.concatenate([coordinates.lower, *begin.lower])
+        upper = np.concatenate([coordinates.upper, *begin.upper])
+        problem = Problem(self.data, coordinates, begin.n_states, upper)
+        if substeps is None:
+            problem.choose_substeps(theta)
+        else:
+            problem.substeps = [n if isinstance(n, Substeps) else Substeps(n) for n in substeps]
+        if not np.isfinite(problem.at(theta).cost):
+            return self._failed(problem, theta, "The start values cannot be simulated.")
+        if theta.size == 0:
+            return self._result(problem, theta, True, "Nothing to fit.", finish)
+
+        def search(theta: NDArray[np.float64] = theta) -> _Outcome:
+            for _ in range(_MOST_ROUNDS if finish and substeps is None else 1):
+                solution = searched(problem, theta, (lower, upper), tolerance, max_evaluations)
+                theta = solution.x
+                # A time constant on its way to zero is held back where steps chosen for a longer one become unstable.
+                if not (finish and substeps is None and problem.refined(theta)):
+                    break
+            if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
+                theta = off_kinks(problem, theta, (lower, upper), self.n_samples)
+            return theta, bool(solution.status > 0), str(solution.message)
+
+        settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))
+        outcome = self._recalled(self._key(coordinates, start, theta, settings), problem, search)
+        return self._result(problem, *outcome, finish)
+
+    def fit_windows(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        max_evaluations: int = 40,
+        tolerance: float = 1e-5,
+        most_rounds: int = 5,
+    ) -> FitResult:
+        """Fit the free parameters to many short records, each with the initial state that suits the parameters best.
+
+        For motion whose memory sticks and slips: `fit`, which moves everything together, can stop far from the best place there.
+
+        Parameters
+        ----------
+        start, free
+            As of `fit`.
+        max_evaluations
+            Limit for the optimizer in each round.
+        tolerance
+            Relative change of the cost at which a round ends.
+        most_rounds
+            Rounds; between them limited states try other places.
+
+        Returns
+        -------
+        As of `fit`.
+        """
+        begin = self._begin(start, free, None)
+        coordinates, n_free = begin.coordinates, len(free)
+        problem = SeparateStates(self.data, coordinates, begin.places, begin.lower, begin.upper)
+        problem.choose_substeps(begin.theta)
+        if not np.isfinite(problem.settle_anew(begin.theta[:n_free])):
+            return self._failed(problem, begin.theta, "The start values cannot be simulated.")
+
+        def search() -> _Outcome:
+            own, success, message = begin.theta[:n_free], True, "Nothing to fit but initial states."
+            bounds, cost = (coordinates.lower, coordinates.upper), float("inf")
+            for _ in range(most_rounds if free else 0):
+                solution = searched(problem, own, bounds, tolerance, max_evaluations)
+                own, success, message = solution.x, bool(solution.status > 0), str(solution.message)
+                before, cost = cost, problem.settle_anew(own)
+                if cost > (1.0 - _WORTH_A_ROUND) * before:
+                    break
+            return np.concatenate([own, *problem.places]), success, message
+
+        settings = (max_evaluations, tolerance, [*map(int, problem.substeps), most_rounds])
+        outcome = self._recalled(self._key(coordinates, start, begin.theta, settings), problem, search)
+        together = Problem(self.data, coordinates, begin.n_states, problem.upper)
+        together.substeps, together.n_evaluations = problem.substeps, problem.n_evaluations
+        return self._result(together, *outcome, finish=True)
+
+    def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
+        """Return what the records say of parameters at their start, with all initial states as unknown as they are.
+
+        The Fisher information of relative changes, of changes in units of their size where a value is zero; NaN where the start
+        cannot be simulated.
+
+        Parameters
+        ----------
+        start, free
+            As of `fit`.
+
+        Returns
+        -------
+        Shape (n_free, n_free).
+        """
+        begin, n = self._begin(start, free, None), len(free)
+        problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
+        problem.choose_substeps(begin.theta)
+        normal = problem.at(begin.theta).normal
+        if not np.all(np.isfinite(normal)):
+            return np.full((n, n), np.nan)
+        own = (
+            normal[:n, :n] - normal[:n, n:] @ np.linalg.pinv(normal[n:, n:], hermitian=True) @ normal[n:, :n]
+        )
+        sizes = np.array([abs(start[name]) for name in free])
+        sizes = np.where(sizes > 0.0, sizes, begin.coordinates.scale)
+        relative = sizes / np.diag(begin.coordinates.jacobian(begin.theta[:n]))
+        return np.asarray(own * np.outer(relative, relative))
+
+    def _recalled(self, key: str, problem: Problem, search: Callable[[], _Outcome]) -> _Outcome:
+        """Return the outcome of a search, from memory if it was done before."""
+        known = None if self.memory is None else self.memory.recall(key)
+        if known is not None:
+            problem.n_evaluations = known["evaluations"]
+            problem.substeps = [
+                own.with_most(most) for own, most in zip(problem.substeps, known["substeps"], strict=True)
+            ]
+            return np.array(known["theta"]), known["success"], known["message"]
+        theta, success, message = search()
+        if self.memory is not None:
+            outcome = {"theta": theta.tolist(), "success": success, "message": message}
+            steps = {"evaluations": problem.n_evaluations, "substeps": list(map(int, problem.substeps))}
+            self.memory.remember(key, {**outcome, **steps})
+        return theta, success, message
+
+    def _begin(
+        self,
+        start: Mapping[str, float],
+        free: Sequence[str],
+        initial_states: Sequence[NDArray[np.float64]] | None,
+    ) -> _Begin:
+        coordinates = Coordinates.of(self.structure, free, start, self.scales)
+        states = list(initial_states) if initial_states is not None else guessed_states(self.data, start)
+        own = coordinates.from_values(start)
+        sizes = self.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
+        limited = self.data.limited
+        places = [np.where(limited, np.clip(s / sizes, -1.0, 1.0), s / sizes) for s in states]
+        return _Begin(
+            coordinates=coordinates,
+            theta=np.concatenate([own, *places]),
+            places=places,
+            lower=[np.where(limited, -1.0, place - _STATE_RANGE) for place in places],
+            upper=[np.where(limited, 1.0, place + _STATE_RANGE) for place in places],
+        )
+
+    def _key(
+        self,
+        coordinates: Coordinates,
+        start: Mapping[str, float],
+        theta: NDArray[np.float64],
+        settings: tuple[int, float, list[int]],
+    ) -> str:
+        if self.memory is None:
+            return ""
+        values = [float(start[name]) for name in self.structure.names]
+        return fit_key([*self._problem, values, list(coordinates.free)], theta, settings)
+
+    def _failed(self, problem: Problem, theta: NDArray[np.float64], message: str) -> FitResult:
+        coordinates = problem.coordinates
+        p = coordinates.to_parameters(theta[: len(coordinates.free)])
+        n = len(coordinates.free)
+        return FitResult(
+            structure=self.structure,
+            success=False,
+            message=message,
+            values=dict(zip(self.structure.names, map(float, p), strict=True)),
+            standard_errors=dict.fromkeys(coordinates.free, float("inf")),
+            initial_states=tuple(problem.states(theta)),
+            cost=float("inf"),
+            n_samples=self.n_samples,
+            n_evaluations=1,
+            free=coordinates.free,
+            covariance=np.full((n, n), np.inf),
+            residuals=(),
+            substeps=(Substeps(MOST_SUBSTEPS),) * len(self.data.records),
+        )
+
+    def _result(
+        self, problem: Problem, theta: NDArray[np.float64], success: bool, message: str, finish: bool
+    ) -> FitResult:
+        coordinates, n_evaluations = problem.coordinates, problem.n_evaluations
+        n_free = len(coordinates.free)
+        p = coordinates.to_parameters(theta[:n_free])
+        states = problem.states(theta)
+        cost = problem.at(theta).cost
+        residuals: tuple[NDArray[np.float64], ...] = ()
+        covariance = np.full((n_free, n_free), np.nan)
+        if finish:
+            try:
+                residuals = tuple(self.data.of_each_record(lambda i: self._left(i, p, states[i])))
+            except SimulationError as error:
+                return self._failed(problem, theta, str(error))
+            cost = float(
+                sum(
+                    np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self.data.records, strict=True)
+                )
+            )
+            outputs = [int(np.count_nonzero(d.weights)) for d in self.data.records]
+            covariance = colored_covariance(
+                problem.sensitivities(theta), n_free, outputs, problem.derivative_error
+            )
+            covariance = propagated_covariance(covariance, coordinates.jacobian(theta[:n_free]))
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if n_free else np.zeros(0)
+        return FitResult(
+            structure=self.structure,
+            success=success,
+            message=message,
+            values=dict(zip(self.structure.names, map(float, p), strict=True)),
+            standard_errors=dict(zip(coordinates.free, map(float, errors), strict=True)),
+            initial_states=tuple(states),
+            cost=cost,
+            n_samples=self.n_samples,
+            n_evaluations=n_evaluations,
+            free=coordinates.free,
+            covariance=covariance,
+            residuals=residuals,
+            substeps=tuple(problem.substeps),
+        )
+
+    def _left(self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return measured minus accurately simulated outputs of a record."""
+        d = self.data.records[index]
+        return d.measured - simulate_outputs(
+            self.structure, d.held, d.parameters(p), state, d.record.n_samples, self.data.accuracy
+        )

@@ -1,0 +1,183 @@
+"""The parameters alone as coordinates: at each step every record takes the initial state that suits it (variable projection).
+
+In windows of records there are far more initial states than parameters, and where a memory sticks or lets go they answer to the
+parameters with jumps: a step that moves all together is refused, one after which each window settles is not.
+
+References
+----------
+G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; L. Kaufman, BIT 15 (1975) 49, for the projected derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.fit.coordinates import STEP, Coordinates
+from rigsight.identify.fit.fit_data import FitData, weighted
+from rigsight.identify.fit.fit_problem import Evaluation, Problem
+from rigsight.identify.fit.symmetric_eigen import symmetric_eigen
+from rigsight.simulate import simulate_sets
+
+_DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)
+"""Levenberg-Marquardt steps of an initial state that are tried side by side, in units of the normalized equations."""
+_ASIDE = (-0.3, 0.3)
+"""Shares of its range by which a limited state is moved beside them: its derivative is zero where it has slipped."""
+_FEW_STEPS = 8
+_MANY_STEPS = 15
+_SETTLED = 1e-3
+"""Share of a record's cost below which another step is not worth its time."""
+_PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Where limited states are started from when the search pauses."""
+_DEPENDENT = 1e-9
+
+
+class SeparateStates(Problem):
+    """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates.
+
+    Parameters
+    ----------
+    data
+        What is fitted.
+    coordinates
+        Of the parameters.
+    places
+        Initial state of each record in units of its sizes, shape (n_states,) each.
+    lower, upper
+        Bounds of the places, shape (n_states,) each.
+    """
+
+    def __init__(
+        self,
+        data: FitData,
+        coordinates: Coordinates,
+        places: Sequence[NDArray[np.float64]],
+        lower: Sequence[NDArray[np.float64]],
+        upper: Sequence[NDArray[np.float64]],
+    ) -> None:
+        n_states = len(data.structure.states)
+        super().__init__(data, coordinates, n_states, np.concatenate([coordinates.upper, *upper]))
+        self.places = list(places)
+        self._lower, self._upper = lower, upper
+        self._settled_at = self.places
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives that go with `residual`; where they are asked for, the search goes on from."""
+        evaluation = self.at(theta)
+        self.places = self._settled_at
+        root, _ = evaluation.compressed
+        return np.vstack([root, np.zeros(theta.size)])
+
+    def at(self, theta: NDArray[np.float64]) -> Evaluation:
+        """Settle the initial states, then evaluate with what they can make up for taken out of the derivatives."""
+        if self._last is not None and np.array_equal(self._last.theta, theta):
+            return self._last
+        p = self.coordinates.to_parameters(theta)
+        settled = self.data.of_each_record(lambda i: self._settled(i, p, self.places[i], _FEW_STEPS)[0])
+        n = theta.size
+        normal, gradient, cost = np.zeros((n, n)), np.zeros(n), 0.0
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging simulation overflows here
+            for residual, derivative in self.sensitivities(np.concatenate([theta, *settled])):
+                cost += float(residual @ residual)
+                own, rest = _projected(derivative[:, :n], derivative[:, n:], residual)
+                normal += own.T @ own
+                gradient += own.T @ rest
+        if not (np.isfinite(cost) and np.all(np.isfinite(normal))):
+            cost = float("inf")
+        self._best = min(self._best, cost)
+        self._last, self._settled_at = Evaluation(theta.copy(), cost, normal, gradient), settled
+        self.n_evaluations += 1
+        return self._last
+
+    def settle_anew(self, theta: NDArray[np.float64]) -> float:
+        """Let limited states try other places, and return the cost that is left."""
+        self._last = None
+        p = self.coordinates.to_parameters(theta)
+
+        def best(index: int) -> tuple[NDArray[np.float64], float]:
+            place = self.places[index]
+            starts = [place]
+            if np.any(self.data.limited):
+                starts += [np.where(self.data.limited, share, place) for share in _PLACES]
+            tried = [self._settled(index, p, start, _MANY_STEPS) for start in starts]
+            return min(tried, key=lambda found: found[1])
+
+        found = self.data.of_each_record(best)
+        for index, (place, _) in enumerate(found):
+            self.places[index] = place
+        return sum((cost for _, cost in found), start=0.0)
+
+    def _settled(
+        self, index: int, p: NDArray[np.float64], place: NDArray[np.float64], most: int
+    ) -> tuple[NDArray[np.float64], float]:
+        """Return the best place near one, and its cost."""
+        n, cost = self.n_states, float("inf")
+        low, high = self._lower[index][:, None], self._upper[index][:, None]
+        for _ in range(most):
+            step = np.where(place + STEP > self._upper[index], -STEP, STEP)
+            lanes = place[:, None] + np.column_stack([np.zeros(n), np.diag(step)])
+            residuals = self._residuals(index, p, lanes)
+            residual = residuals[:, 0]
+            with np.errstate(over="ignore", invalid="ignore"):
+                cost = float(residual @ residual)
+            if not np.isfinite(cost):
+                return place, float("inf")
+            derivative = np.nan_to_num((residuals[:, 1:] - residuals[:, :1]) / step, posinf=0.0, neginf=0.0)
+            tried = np.clip(self._candidates(place, derivative, residual), low, high)
+            with np.errstate(over="ignore", invalid="ignore"):
+                costs = np.sum(self._residuals(index, p, tried) ** 2, axis=0)
+            costs[~np.isfinite(costs)] = np.inf
+            best = int(np.argmin(costs))
+            if costs[best] >= cost:
+                break
+            place, gained, cost = tried[:, best], cost - float(costs[best]), float(costs[best])
+            if gained < _SETTLED * cost:
+                break
+        return place, cost
+
+    def _candidates(
+        self, place: NDArray[np.float64], derivative: NDArray[np.float64], residual: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return places to try, shape (n_states, n_lanes)."""
+        size = np.linalg.norm(derivative, axis=0)
+        size[size == 0.0] = 1.0
+        normal = (derivative / size).T @ (derivative / size)
+        values, vectors = symmetric_eigen(normal)
+        slope = vectors.T @ ((derivative / size).T @ residual)
+        steps = [
+            (vectors @ (slope / (np.maximum(values, 0.0) + damping + 1e-12))) / size for damping in _DAMPINGS
+        ]
+        lanes = [place - step for step in steps]
+        if np.any(self.data.limited):
+            lanes += [np.where(self.data.limited, place + aside, place) for aside in _ASIDE]
+        return np.column_stack(lanes)
+
+    def _residuals(
+        self, index: int, p: NDArray[np.float64], places: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        record = self.data.records[index]
+        sets = np.repeat(record.parameters(p)[:, None], places.shape[1], axis=1)
+        with np.errstate(all="ignore"):
+            out = simulate_sets(
+                self.data.structure,
+                record.held,
+                sets,
+                places * self.data.state_sizes(sets),
+                record.record.n_samples,
+                self.substeps[index],
+            )
+            first, against_first = weighted(record, out)
+            return np.column_stack([first, first[:, None] + against_first])
+
+
+def _projected(
+    own: NDArray[np.float64], states: NDArray[np.float64], residual: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return derivatives and residual without what the initial states can make up for."""
+    size = np.linalg.norm(states, axis=0)
+    size[size == 0.0] = 1.0
+    base, triangle = np.linalg.qr(states / size)
+    base = base[:, np.abs(np.diag(triangle)) > _DEPENDENT]
+    return own - base @ (base.T @ own), residual - base @ (base.T @ residual)

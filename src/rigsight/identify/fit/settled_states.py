@@ -1,0 +1,142 @@
+"""Which initial state does the beginning of a record speak for? From a guess over ever longer stretches to the whole record.
+
+What a state does is known over a short stretch better than over a long one, above all where the motion is unstable or chaotic: a
+descent that begins with the whole record would not come back from a guess that is a little off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.fit.first_states import first_state, state_at_rest
+from rigsight.identify.fit.fit_data import FitData, RecordData, weighted
+from rigsight.simulate import parameter_vector, simulate_sets
+
+Floats = NDArray[np.float64]
+
+_FIRST_SAMPLES = 25
+"""Samples of the first stretch; each further one is twice as long."""
+_STEP = 1e-6
+"""Difference of a state in units of its size."""
+_STEPS = 4
+"""Gauss-Newton steps on each stretch."""
+_DAMPINGS = (1.0, 0.3, 0.1, 0.03)
+"""Shares of a step that are tried side by side."""
+_PULL = 1e-3
+"""Weight of the guess against an error of size one: it decides what the stretch does not tell."""
+_LARGEST = 1e9
+"""Error at which a motion has left the range of numbers, or may as well have."""
+_SUBSTEPS = 4
+_FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
+"""Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
+_LOST = 2.0
+"""Growth of the error per sample at which a longer stretch is not followed: the parameters are not good enough for it."""
+
+
+def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
+    """Return each record's initial state; of several for states with a range, and of moving and resting, the best.
+
+    On a rig of more than one motion it is fitted to the beginning of the record.
+
+    Parameters
+    ----------
+    data
+        What is fitted.
+    values
+        Value of every parameter of the structure.
+
+    Returns
+    -------
+    Shape (n_states,) each.
+    """
+    guesses = [first_state(data.structure, d.record, values) for d in data.records]
+    p = parameter_vector(data.structure, values)
+    if np.any(data.limited):
+        return [_placed(data, *pair, p, values) for pair in zip(data.records, guesses, strict=True)]
+    if data.structure.rig.has_one_motion:
+        return guesses
+    return data.of_each_record(lambda i: settled_state(data, data.records[i], p, guesses[i]))
+
+
+def _placed(
+    data: FitData, record: RecordData, guess: Floats, p: Floats, values: Mapping[str, float]
+) -> Floats:
+    """Return the best of the guess and the state at rest with limited states at several places of their ranges."""
+    own = record.parameters(p)
+    ranges = np.where(data.limited, data.state_sizes(own[:, None])[:, 0], 0.0)
+    at_rest = state_at_rest(data.structure, record.record, guess, values)
+    lanes = np.column_stack([g + place * ranges for place in _FIRST_PLACES for g in (guess, at_rest)])
+    with np.errstate(all="ignore"):
+        sets = np.repeat(own[:, None], lanes.shape[1], axis=1)
+        out = simulate_sets(data.structure, record.held, sets, lanes, record.record.n_samples, _SUBSTEPS)
+        errors = (record.measured[:, :, None] - out) * record.weights[:, None]
+        costs = np.nansum(errors**2, axis=(0, 1))
+    costs[~np.all(np.isfinite(out), axis=(0, 1))] = np.inf
+    return lanes[:, int(np.argmin(costs))] if np.any(np.isfinite(costs)) else guess
+
+
+def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -> Floats:
+    """Return the initial state that fits a record from its beginning on as far as the parameters can follow it.
+
+    Parameters
+    ----------
+    data
+        What is fitted.
+    record
+        The record.
+    p
+        Parameters, shape (n_parameters,); the record's own constants replace those in it.
+    guess
+        Shape (n_states,).
+
+    Returns
+    -------
+    Shape (n_states,).
+    """
+    own = record.parameters(p)
+    sizes = data.state_sizes(own[:, None])[:, 0]
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    state, n_samples, before = guess, min(_FIRST_SAMPLES, record.record.n_samples), np.inf
+    while True:
+        found, error = _fitted(data, record, own, state, sizes, n_samples)
+        if not error <= _LOST * max(before, 1.0):
+            return state
+        state, before = found, error
+        if n_samples == record.record.n_samples:
+            return state
+        n_samples = min(2 * n_samples, record.record.n_samples)
+
+
+def _fitted(
+    data: FitData, record: RecordData, p: Floats, start: Floats, sizes: Floats, n_samples: int
+) -> tuple[Floats, float]:
+    """Return the state that fits the first samples best, and the root mean square of the weighted error there."""
+    n, place, beginning = start.size, np.zeros(start.size), record.first(n_samples)
+
+    def errors(places: Floats) -> Floats:
+        lanes = start[:, None] + sizes[:, None] * places
+        sets = np.repeat(p[:, None], lanes.shape[1], axis=1)
+        with np.errstate(all="ignore"):
+            out = simulate_sets(data.structure, beginning.held, sets, lanes, n_samples, _SUBSTEPS)
+            first, against = weighted(beginning, out)
+            left = np.column_stack([first, first[:, None] + against])
+        return np.vstack([np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST), _PULL * places])
+
+    cost = np.inf
+    for _ in range(_STEPS):
+        lanes = errors(place[:, None] + np.column_stack([np.zeros(n), _STEP * np.eye(n)]))
+        cost = float(lanes[:, 0] @ lanes[:, 0])
+        step = np.linalg.lstsq((lanes[:, 1:] - lanes[:, :1]) / _STEP, -lanes[:, 0], rcond=None)[0]
+        tried = place[:, None] + np.outer(step, _DAMPINGS)
+        costs = np.sum(errors(tried) ** 2, axis=0)
+        best = int(np.argmin(costs))
+        if not costs[best] < cost:
+            break
+        gained, cost, place = cost - float(costs[best]), float(costs[best]), tried[:, best]
+        if gained < 1e-3 * cost:
+            break
+    n_measured = max(1, n_samples * int(np.count_nonzero(record.weights)))
+    return start + sizes * place, float(np.sqrt(cost / n_measured))

@@ -1,0 +1,238 @@
+"""Parameters of a rig of any shape straight from its records, as start values of a grey-box fit.
+
+Where sensors show all states, the error of the equations of motion is made small (`weak_equations`); in any case that of the
+linearization against the spectra (`linearized_responses`). Both search over decades and cost no simulation. The best few of their
+minima are fitted roughly by simulation, and the one that leaves least is the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from rigsight.errors import InputError
+from rigsight.identify.fit.first_states import rig_state
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.identify.rig_equations import equations_of
+from rigsight.identify.start.linearized_responses import LinearizedResponses
+from rigsight.identify.start.place_scales import scales_at_places
+from rigsight.identify.start.spread_search import AGREEING, PERSISTENT, balanced, ends_of_search
+from rigsight.identify.start.weak_equations import WeakEquations
+from rigsight.identify.typical_size import size_of_signal
+from rigsight.parameters import Parameter
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+from rigsight.simulate.prescribed_motion import smooth_motion
+
+Floats = NDArray[np.float64]
+
+_SEED = 0
+"""The same records give the same start."""
+_LIKELY = 2
+"""Minima of each search that are fitted by simulation."""
+_ROUGH_EVALUATIONS = 15
+_ROUGH_TOLERANCE = 1e-3
+_PIECES = (32, 16, 8, 4, 2)
+"""Into how many pieces each record is cut, in turn."""
+_TOLD = 1.0
+"""Error that changing a parameter to its double must make, of size one for noise, for the records to tell it; else it is held."""
+_LONG_PIECES = 8
+"""Pieces of a record that are long: free initial states make up for many a wrong number in shorter ones."""
+_GROWN = 2.0
+"""Ratio of the residuals of the whole and of long pieces up to which nothing is gained by a search elsewhere."""
+_MOST_PIECES = 16
+_MOST_SAMPLES = 10000
+"""Samples of all records together that are simulated for a start."""
+_EXPLAINED = 2.0
+"""Residual over what is rough in the sensors at which nothing further is tried: a spline leaves half of the noise at least."""
+_HIGHEST = 0.9
+"""Share of the spectrum behind which it is taken for noise."""
+_LEAST_NOISE = 1e-4
+"""Noise of a sensor that shows none, relative to its size: a fit that comes so near has found its place."""
+
+
+def any_rig_start(
+    rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
+    """Return a value for every parameter of a rig without effects.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        Estimation records.
+    constants
+        The rig's constants by name.
+    known
+        Parameters that keep their value.
+
+    Raises
+    ------
+    InputError
+        If no record holds a sensor of the rig that moves.
+    """
+    _check_moves(rig, records)
+    sought = [p for p in rig.parameters if p.name not in known]
+    if not sought:
+        return dict(known)
+    values = {**constants, **known}
+    rough = _Rough(rig, records, values, [p.name for p in sought])
+    best: FitResult | None = None
+    for is_weak, is_close, start in _minima(rig, records, values, sought):
+        found = rough.whole(start)
+        if is_close and np.isfinite(found.cost) and not rough.explains(found):
+            if is_weak and rough.holds_at_any_length(found):
+                # Equations that agree with all states of the records, and errors that do not grow: the rig lacks something.
+                best = found
+                break
+            pieces, whole = rough.lengthening(start)
+            if pieces is not None and not rough.explains(whole):
+                # The motion is chaotic: no search finds values that a simulation of the whole could follow any better.
+                best = pieces
+                break
+            found = min(found, whole, key=lambda fit: fit.cost)
+        best = found if best is None else min(best, found, key=lambda fit: fit.cost)
+        if rough.explains(best):
+            break
+    assert best is not None
+    return {p.name: float(best.values[p.name]) for p in rig.parameters}
+
+
+def _minima(
+    rig: Rig, records: Sequence[Record], values: Mapping[str, float], sought: Sequence[Parameter]
+) -> Iterator[tuple[bool, bool, dict[str, float]]]:
+    """Yield values from which simulations may start: whether the equations' own error led there, whether to look twice.
+
+    That is where the lowest of an error is. They come from few searches first, from many if nothing explains the records.
+    """
+    equations, names = equations_of(rig), [p.name for p in sought]
+    rng = np.random.default_rng(_SEED)
+    weak = WeakEquations(equations, records, values, names)
+    space = balanced(sought, weak.term_sizes)
+
+    def ends(
+        errors: Callable[[Floats], Floats], agreeing: int, is_weak: bool
+    ) -> Iterator[tuple[bool, bool, dict[str, float]]]:
+        found = ends_of_search(space, errors, rng, agreeing)[:_LIKELY]
+        for rank, (_, own) in enumerate(found):
+            numbers = dict(zip(names, map(float, own), strict=True))
+            yield is_weak, rank == 0 and agreeing != PERSISTENT, {**values, **numbers}
+
+    if weak.n_records:
+        yield from ends(weak.errors, AGREEING, True)
+    expected = {**values, **dict(zip(names, map(float, space.values(space.start())), strict=True))}
+    middle = [rig_state(equations, record, expected, resting=record.n_samples) for record in records]
+    linear = LinearizedResponses(equations, records, values, names, middle)
+    yield from ends(linear.errors, AGREEING, False)
+    yield from ends(linear.errors, PERSISTENT, False)
+    if weak.n_records:
+        yield from ends(weak.errors, PERSISTENT, True)
+
+
+class _Rough:
+    """Rough fits by simulation from one start after the other."""
+
+    def __init__(
+        self, rig: Rig, records: Sequence[Record], values: Mapping[str, float], free: Sequence[str]
+    ) -> None:
+        most = max(1, _MOST_SAMPLES // len(records))
+        self._rig, self._values, self._free = rig, values, list(free)
+        self._records = [record.slice(0, min(most, record.n_samples)) for record in records]
+        self._noise = {signal.name: _noise(signal.name, records) for signal in rig.outputs}
+
+    def explains(self, fit: FitResult) -> bool:
+        """Return True if a fit leaves not much more than noise."""
+        return fit.cost <= _EXPLAINED**2 * fit.n_samples
+
+    def whole(self, start: Mapping[str, float]) -> FitResult:
+        """Fit the records as they are."""
+        return self._fitted(1, start, scales_at_places(self._rig, self._records, start))
+
+    def holds_at_any_length(self, whole: FitResult) -> bool:
+        """Return True if a fit of the whole is not much worse than one of pieces, each with a state of its own."""
+        if not np.isfinite(whole.cost):
+            return False
+        scales = scales_at_places(self._rig, self._records, whole.values)
+        pieces = self._fitted(_LONG_PIECES, whole.values, scales)
+        return whole.cost / whole.n_samples <= _GROWN**2 * pieces.cost / max(1, pieces.n_samples)
+
+    def lengthening(self, start: Mapping[str, float]) -> tuple[FitResult | None, FitResult]:
+        """Fit pieces of the records, of double length each time, then the whole.
+
+        Over a short piece no motion is far from the one that was measured, however unstable or chaotic it is.
+
+        Returns
+        -------
+        The fit of the longest pieces that it explains, None if they are short, and the one of the whole.
+        """
+        explained: FitResult | None = None
+        values, scales = start, scales_at_places(self._rig, self._records, start)
+        for count in _PIECES:
+            in_pieces = self._fitted(count, values, scales)
+            values = in_pieces.values if np.isfinite(in_pieces.cost) else values
+            if count <= _LONG_PIECES and self.explains(in_pieces):
+                explained = in_pieces
+        return explained, self._fitted(1, values, scales)
+
+    def _fitted(self, count: int, start: Mapping[str, float], scales: Mapping[str, float]) -> FitResult:
+        pieces = []
+        for record in self._records:
+            edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
+            pieces += [record.slice(int(a), int(b)) for a, b in pairwise(edges)]
+        # Each has an initial state of its own: of many, some say enough.
+        if count > 1:
+            pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
+        problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
+        told = _told(problem.information(start, self._free), self._free)
+        return problem.fit(start, told, None, _ROUGH_EVALUATIONS, tolerance=_ROUGH_TOLERANCE, finish=False)
+
+
+def _told(information: Floats, free: Sequence[str]) -> list[str]:
+    """Return parameters that the records tell if the others are held: as many as they tell combinations."""
+    if not np.all(np.isfinite(information)):
+        return list(free)
+    values, vectors = np.linalg.eigh(information)
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    triangle, order = qr(root, mode="r", pivoting=True)
+    rank = int(np.count_nonzero(np.abs(np.diag(triangle)) > _TOLD))
+    return [name for index, name in enumerate(free) if index in order[:rank]]
+
+
+def _noise(name: str, records: Sequence[Record]) -> float:
+    """Return the standard deviation of what is rough in a sensor: what a spline leaves, or the end of its spectrum.
+
+    The larger of the two: fast motion leaves the spline little to smooth.
+    """
+    held = [record for record in records if name in record]
+    if not held:
+        return 1.0
+    rough = [record[name] - smooth_motion(record[name], record.dt)[0] for record in held]
+    left = float(np.sqrt(np.mean(np.concatenate(rough) ** 2)))
+    ends = [_end_of_spectrum(record[name]) for record in held]
+    size = size_of_signal([record[name] for record in held])
+    return max(left, float(np.median(ends)), _LEAST_NOISE * size) or 1.0
+
+
+def _end_of_spectrum(signal: Floats) -> float:
+    """Return the standard deviation of white noise whose spectrum is that at the signal's highest frequencies."""
+    window = np.hanning(signal.size)
+    power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
+    # The median of a line's power is log 2 of its mean.
+    highest = np.median(power[int(_HIGHEST * power.size) :]) / np.log(2.0)
+    return float(np.sqrt(highest / max(float(window @ window), 1e-300)))
+
+
+def _check_moves(rig: Rig, records: Sequence[Record]) -> None:
+    held = [record[s.name] for record in records for s in rig.outputs if s.name in record]
+    if not held:
+        listed = ", ".join(signal.name for signal in rig.outputs)
+        raise InputError(f"No estimation record holds a sensor of the rig '{rig.name}'. It has: {listed}.")
+    if all(np.ptp(signal) <= 1e-12 * np.max(np.abs(signal)) for signal in held):
+        raise InputError("No sensor moves in any estimation record; nothing can be identified.")

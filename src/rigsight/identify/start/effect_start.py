@@ -1,0 +1,159 @@
+"""Start values of an effect from the spectra of the records: grid over what is inside, linear regression for the rest.
+
+The measured motion stands for the simulated one, so that torque, play and drive of an effect become known signals. Effects with
+states, and delays, have no such signal and get none.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect
+from rigsight.effects import symbols as canonical
+from rigsight.identify.start.equation_error import Spectra, Term, solve_in_frequency, spectra_of
+from rigsight.parameters import Parameter
+from rigsight.records.record import Record
+from rigsight.rigs import Rig, evaluated
+from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.units import characteristic_value
+
+_GRID = 12
+_LOWEST_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """Measured signals of a record about the rest position."""
+
+    spectra: Spectra
+    x: NDArray[np.float64]
+    v: NDArray[np.float64]
+    u: NDArray[np.float64]
+
+
+class EffectRegression:
+    """Regression of effects on the records of a driven rig.
+
+    Parameters
+    ----------
+    rig
+        A rig whose input moves a mass.
+    records
+        Estimation records.
+    values
+        Constants and fitted parameters of the rig without the effect.
+    scales
+        Size of each base quantity.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        records: Sequence[Record],
+        values: Mapping[str, float],
+        scales: Mapping[str, float],
+    ) -> None:
+        self._rig = rig
+        self._values = dict(values)
+        self._scales = scales
+        self._gain = self._number(rig.motion.drive_gain)
+        self._spring = self._number(rig.motion.stiffness) > 0.0
+        rest = self._number(rig.motion.rest)
+        source, response = rig.inputs[0].name, rig.outputs[0].name
+        self._motions = []
+        for record in records:
+            x, v = smooth_motion(record[response], record.dt)
+            spectra = spectra_of(record, source, response)
+            if spectra.omega.size == 0:
+                continue  # a stretch in which the input rests
+            self._motions.append(_Motion(spectra, x - rest, v, record[source]))
+        inertia, damping = self._number(rig.motion.inertia), self._number(rig.motion.damping)
+        stiffness = self._number(rig.motion.stiffness)
+        self._denominators = [
+            stiffness - inertia * m.spectra.omega**2 + 1j * damping * m.spectra.omega for m in self._motions
+        ]
+
+    def _number(self, expression: sp.Expr | None) -> float:
+        return evaluated(expression, self._values)
+
+    def start(self, effect: Effect) -> dict[str, float] | None:
+        """Return values of rig and effect parameters to start from, None where the effect has no signal of its own."""
+        if effect.states or effect.spring is not None or not self._motions:
+            return None
+        if effect.torque is None and effect.deflection is None and effect.drive is None:
+            return None
+        fitted = [p for p in effect.parameters if p.fitted]
+        linear = [p for p in fitted if effect.torque is not None and _is_linear(effect.torque, p)]
+        inner = [p for p in fitted if p not in linear]
+        best: dict[str, float] | None = None
+        lowest = float("inf")
+        for values in self._grid(inner):
+            found, error = self._regressed(effect, linear, values)
+            if found is not None and error < lowest:
+                best, lowest = {**found, **values}, error
+        return best
+
+    def _grid(self, inner: Sequence[Parameter]) -> Iterator[dict[str, float]]:
+        axes = []
+        for parameter in inner:
+            size = characteristic_value(parameter.dimension, self._scales)
+            low, high = parameter.search
+            if parameter.logarithmic or high > 1.0:
+                shares = np.geomspace(max(low, _LOWEST_SHARE), min(high, 3.0), _GRID)
+            else:
+                shares = np.linspace(low, high, _GRID + 2)[1:-1]
+            axes.append([float(share * size) for share in shares])
+        for combination in itertools.product(*axes):
+            yield dict(zip((p.name for p in inner), combination, strict=True))
+
+    def _regressed(
+        self, effect: Effect, linear: Sequence[Parameter], inner: Mapping[str, float]
+    ) -> tuple[dict[str, float] | None, float]:
+        torques = [_function(sp.diff(effect.torque, sp.Symbol(p.name, real=True)), inner) for p in linear]
+        deflection = _function(effect.deflection, inner) if effect.deflection is not None else None
+        drive = _function(effect.drive, inner) if effect.drive is not None else None
+        terms: list[list[Term]] = []
+        targets = []
+        for motion in self._motions:
+            spectra = motion.spectra
+            own: list[Term] = [(2, spectra.response), (1, spectra.response)]
+            if self._spring:
+                own.append((0, spectra.response if deflection is None else spectra.of(deflection(motion))))
+            own += [(0, spectra.of(torque(motion))) for torque in torques]
+            terms.append(own)
+            known = spectra.drive if drive is None else spectra.of(drive(motion)) * spectra.hold
+            targets.append(self._gain * known)
+        blocks = [motion.spectra for motion in self._motions]
+        solution = solve_in_frequency(blocks, terms, targets, self._denominators)
+        coefficients = list(solution.coefficients)
+        names = [str(self._rig.motion.inertia), str(self._rig.motion.damping)]
+        names += [str(self._rig.motion.stiffness)] if self._spring else []
+        found = dict(zip([*names, *(p.name for p in linear)], map(float, coefficients), strict=True))
+        if found[names[0]] <= 0.0 or (self._spring and found[names[2]] <= 0.0):
+            return None, float("inf")
+        found[names[1]] = max(found[names[1]], 0.05 * self._number(self._rig.motion.damping))
+        return found, solution.error
+
+
+def _is_linear(expression: sp.Expr, parameter: Parameter) -> bool:
+    symbol = sp.Symbol(parameter.name, real=True)
+    return not sp.diff(expression, symbol).has(symbol)
+
+
+def _function(expression: sp.Expr, inner: Mapping[str, float]):  # type: ignore[no-untyped-def]
+    """Return the expression as a function of the measured signals of a record."""
+    symbols = (canonical.x, canonical.v, canonical.u)
+    numbers = {sp.Symbol(name, real=True): value for name, value in inner.items()}
+    plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2).subs(numbers)
+    compiled = sp.lambdify(symbols, plain, "numpy", cse=True)
+
+    def evaluate(motion: _Motion) -> NDArray[np.float64]:
+        return np.broadcast_to(compiled(motion.x, motion.v, motion.u), motion.x.shape).astype(np.float64)
+
+    return evaluate

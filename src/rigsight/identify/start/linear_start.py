@@ -1,0 +1,196 @@
+"""Linear parameters straight from the spectra of the records, as start values of a grey-box fit.
+
+Of a rig of one motion; others start as `any_rig_start` says. Iterated linear least squares on the equation of motion in the
+frequency domain, weighted by the inverse of the current denominator so that the equation error approaches the output error; a
+polynomial per record takes up the transients. It has no local minimum, and needs no simulation.
+
+References
+----------
+C. K. Sanathanan and J. Koerner, "Transfer function synthesis as a ratio of two complex polynomials", IEEE Trans. Automatic
+Control (1963). R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapter 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.identify.start.any_rig_start import any_rig_start
+from rigsight.identify.start.equation_error import solve_in_frequency, spectra_of
+from rigsight.records.record import Record
+from rigsight.rigs import Follower, Rig, evaluated
+from rigsight.simulate.prescribed_motion import smooth_motion
+
+_UNKNOWN = 1.0
+"""Value of a parameter of which the records say nothing."""
+_STILL = 1e-12
+"""Range of a signal relative to its size that is rounding."""
+
+
+def linear_start(
+    rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
+    """Return a value for every parameter of the rig without effects.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        Estimation records.
+    constants
+        The rig's constants by name.
+    known
+        Parameters that keep their value.
+
+    Raises
+    ------
+    InputError
+        If the records do not move the rig.
+    """
+    if not rig.has_one_motion:
+        return any_rig_start(rig, records, constants, known)
+    found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)
+    if rig.follower is not None:
+        found |= _followed(rig, rig.follower, records, constants, found)
+    parameters = {p.name: p for p in rig.parameters}
+    clipped = {
+        name: float(np.clip(value, parameters[name].lower, parameters[name].upper))
+        for name, value in found.items()
+    }
+    return {**clipped, **known}
+
+
+def _driven(
+    rig: Rig, records: Sequence[Record], constants: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
+    motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
+    gain = evaluated(motion.drive_gain, constants)
+    no_spring = known.get(str(motion.stiffness)) == 0.0
+    inertia, damping, stiffness = second_order(records, source, response, gain, no_spring)
+    offset = 0.0 if no_spring else _mean(records, response) - gain * _mean(records, source) / stiffness
+    assert motion.inertia is not None
+    numbers = ((motion.inertia, inertia), (motion.damping, damping), (motion.stiffness, stiffness))
+    found: dict[str, float] = {}
+    for expression, value in (*numbers, (motion.rest, offset), (motion.bias, 0.0)):
+        found |= _solved(expression, value, {**constants, **found})
+    return found
+
+
+def _followed(
+    rig: Rig,
+    follower: Follower,
+    records: Sequence[Record],
+    constants: Mapping[str, float],
+    found: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the parameters of the state that follows the motion."""
+    motion, name = rig.outputs[0].name, follower.symbol.name
+    own = (
+        {symbol.name for symbol in (follower.gain * follower.creepage).free_symbols}
+        - set(constants)
+        - set(found)
+    )
+    own -= {rig.motion.displacement.name, name}
+    seen = [record for record in records if name in record]
+    if not seen:
+        return {p: 0.0 if p in _offsets(follower) else _UNKNOWN for p in own}
+    slope, rate = first_order(seen, motion, name)
+    solved = _solved(follower.gain, slope, constants)
+    solved |= _solved(follower.feedback, rate / slope, {**constants, **solved})
+    static = evaluated(follower.static_gain, {**constants, **solved})
+    return solved | dict.fromkeys(_offsets(follower), _mean(seen, name) - static * _mean(seen, motion))
+
+
+def _offsets(follower: Follower) -> set[str]:
+    return {symbol.name for symbol in follower.displacement.free_symbols if symbol != follower.symbol}
+
+
+def _solved(expression: sp.Expr, value: float, known: Mapping[str, float]) -> dict[str, float]:
+    """Return the one number that an expression lacks, so that it has a value; several are taken as equal."""
+    lacking = sorted(
+        (symbol for symbol in expression.free_symbols if symbol.name not in known),
+        key=lambda symbol: str(symbol.name),
+    )
+    if not lacking:
+        return {}
+    unknown = sp.Symbol("unknown", real=True)
+    equation = expression.subs(
+        {symbol: known[symbol.name] for symbol in expression.free_symbols if symbol not in lacking}
+    )
+    solutions = [
+        s for s in sp.solve(equation.subs(dict.fromkeys(lacking, unknown)) - value, unknown) if s.is_real
+    ]
+    return {symbol.name: float(solutions[-1]) if solutions else _UNKNOWN for symbol in lacking}
+
+
+def _mean(records: Sequence[Record], name: str) -> float:
+    return float(np.mean([np.mean(record[name]) for record in records]))
+
+
+def _prescribed(rig: Rig, records: Sequence[Record]) -> dict[str, float]:
+    motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
+    for name in (source, response):
+        _check_moves(records, name)
+    rows, forces = [], []
+    for record in records:
+        x, v = smooth_motion(record[source], record.dt)
+        rows.append(np.column_stack([v, x, np.ones_like(x)]))
+        forces.append(record[response])
+    solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(forces), rcond=None)[0]
+    return dict(
+        zip(map(str, (motion.damping, motion.stiffness, motion.bias)), map(float, solution), strict=True)
+    )
+
+
+def _check_moves(records: Sequence[Record], name: str) -> None:
+    # The mean of a constant differs from it by rounding, so the comparison needs a scale.
+    if all(np.ptp(r[name]) <= _STILL * np.max(np.abs(r[name])) for r in records):
+        raise InputError(
+            f"Signal '{name}' does not move in any estimation record; nothing can be identified."
+        )
+
+
+def second_order(
+    records: Sequence[Record], source: str, response: str, gain: float, no_spring: bool = False
+) -> tuple[float, float, float]:
+    """Return inertia, damping and stiffness of ``m x'' + d x' + k x = gain u`` that fit best.
+
+    Raises
+    ------
+    InputError
+        If input or response do not move.
+    """
+    orders = (2, 1) if no_spring else (2, 1, 0)
+    solution = _equation_error(records, source, response, orders, gain)
+    inertia, damping = solution[0], solution[1]
+    stiffness = 0.0 if no_spring else solution[2]
+    if inertia <= 0.0 or (stiffness <= 0.0 and not no_spring):
+        inertia, stiffness = abs(inertia) or 1.0, abs(stiffness) or 1.0
+    smallest = 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0
+    return float(inertia), float(max(damping, smallest)), float(stiffness)
+
+
+def first_order(records: Sequence[Record], source: str, response: str) -> tuple[float, float]:
+    """Return slope and rate of ``y' = slope x - rate y`` that fit best; x is measured too."""
+    # The hold tells of the rig's input; a measured output that drives a later stage is smooth between its samples.
+    smooth = [replace(record, hold="band_limited") for record in records]
+    tau, unity = _equation_error(smooth, source, response, (1, 0), 1.0)
+    slope, rate = 1.0 / tau, unity / tau
+    return float(abs(slope)), float(abs(rate) or 1.0)
+
+
+def _equation_error(
+    records: Sequence[Record], source: str, response: str, orders: tuple[int, ...], gain: float
+) -> NDArray[np.float64]:
+    """Solve ``sum_i a_i (j omega)^order_i X = gain U + transient`` for the a_i."""
+    for name in (source, response):
+        _check_moves(records, name)
+    blocks = [spectra_of(record, source, response) for record in records]
+    terms = [[(order, block.response) for order in orders] for block in blocks]
+    return solve_in_frequency(blocks, terms, [gain * block.drive for block in blocks]).coefficients

@@ -1,0 +1,150 @@
+"""How large are motion, force, drive and time at each joint, drive and sensor of a rig, and each of its own numbers?
+
+They come from how the rig moves in the records according to its equations, so that it does not matter what sensors show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.rig_equations import RigEquations, equations_of
+from rigsight.identify.start.rig_motion import simulated_motion
+from rigsight.identify.typical_size import size_about_zero, size_of_signal
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.units import size_of
+
+Floats = NDArray[np.float64]
+_Signals = Mapping[str, list[Floats]]
+
+_LEAST_SHARE = 1e-3
+"""Share of what would matter as much as anything else in the equations, below which a value tells no size: it may as well be
+zero, and steps in its unit would be lost in rounding."""
+_UNKNOWN = 1.0
+"""Size of what is zero everywhere."""
+
+
+def scales_at_places(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
+    """Return the size of each base quantity at each place of a rig, and of each of its numbers.
+
+    Parameters
+    ----------
+    rig, records, values
+        As of `characteristic_scales`.
+
+    Returns
+    -------
+    As of `characteristic_scales`.
+    """
+    equations = equations_of(rig)
+    signals: dict[str, list[Floats]] = {}
+    own_sizes: list[Floats] = []
+    for record in records:
+        found, own_size = _in_record(equations, record, values)
+        own_sizes.append(own_size)
+        for name, samples in found.items():
+            signals.setdefault(name, []).append(samples)
+    scales: dict[str, float] = {}
+    joints = {joint.name: _of_joint(joint.name, signals) for joint in rig.mechanism.joints}
+    first = next(
+        iter(joints.values()), {"x": _UNKNOWN, "force": _UNKNOWN, "drive": _UNKNOWN, "time": _UNKNOWN}
+    )
+    sources = [size_of_signal(signals[f"input {s.name}"]) for s in rig.inputs]
+    own_states = [f"value {state.name}" for state in rig.mechanism.states]
+    length = size_of_signal(signals[own_states[0]]) if own_states else _UNKNOWN
+    plain = {**first, "input": next(iter(sources), 0.0) or _UNKNOWN, "length": length or _UNKNOWN}
+    places: dict[str, dict[str, float]] = {name: {**plain, **sizes} for name, sizes in joints.items()}
+    for drive in rig.mechanism.drives:
+        moved = next((name for name in joints if f"{drive.name}>{name}" in signals), None)
+        own = {
+            "input": size_of_signal(signals[f"signal@{drive.name}"]),
+            "drive": size_of_signal(signals[f"force@{drive.name}"]),
+        }
+        places[drive.name] = {**plain, **(joints[moved] if moved else {}), **_not_zero(own)}
+    for name in [*(s.name for s in rig.mechanism.states), *equations.sensor_names]:
+        key = f"reading@{name}" if name in equations.sensor_names else f"value {name}"
+        slope = f"slope@{name}" if name in equations.sensor_names else f"change {name}"
+        x = size_of_signal(signals[key])
+        places[name] = {**plain, **_not_zero({"x": x, "time": _over(x, size_about_zero(signals[slope]))})}
+    scales |= plain
+    for place, sizes in places.items():
+        scales |= {f"{base}@{place}": size for base, size in sizes.items()}
+    for name in equations.state_names:
+        scales[size_of(name)] = size_of_signal(signals[f"value {name}"]) or _UNKNOWN
+    numbers = equations.parameters(values, records[0])
+    for name, number, role in zip(equations.structure.names, numbers, np.min(own_sizes, axis=0), strict=True):
+        least = _LEAST_SHARE * role if np.isfinite(role) else 0.0
+        scales[size_of(name)] = float(max(abs(number), least)) or _UNKNOWN
+    return scales
+
+
+def _in_record(
+    equations: RigEquations, record: Record, values: Mapping[str, float]
+) -> tuple[dict[str, Floats], Floats]:
+    """Return what moves and pulls at each place in a record, and the size at which each parameter matters."""
+    motion, p = simulated_motion(equations, record, values), equations.parameters(values, record)
+    z, u, n = motion.z, motion.u, equations.n_coordinates
+    rates = equations.rates(z, u, p)
+    accelerations = rates[n : 2 * n]
+    found = equations.at_places(z, u, p)
+    found |= {f"value {name}": row for name, row in zip(equations.state_names, z, strict=True)}
+    found |= {f"change {name}": row for name, row in zip(equations.state_names, rates, strict=True)}
+    found |= {f"input {s.name}": record[s.name] for s in equations.rig.inputs}
+    shown, slopes = equations.readings(z, u, p), equations.reading_slopes(z, u, p)
+    for name, reading, slope in zip(equations.sensor_names, shown, slopes, strict=True):
+        found |= {f"reading@{name}": record.signals.get(name, reading), f"slope@{name}": slope}
+    found |= _inertial(equations, z, u, p, record.dt, found)
+    return found, _own_sizes(equations, z, u, p, accelerations)
+
+
+def _inertial(
+    equations: RigEquations, z: Floats, u: Floats, p: Floats, dt: float, found: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """Return the force of inertia along each joint, and the one there that would accelerate it as a drive does (``D>J``)."""
+    mechanism, along = equations.rig.mechanism, equations.slopes_along(z, u, p)
+    own: dict[str, Floats] = {}
+    if equations.n_coordinates == 0 or z.shape[1] < 2:
+        return own
+    mobility = np.linalg.pinv(equations.mass(z, u, p))
+    for joint in mechanism.joints:
+        slopes = along[joint.name]
+        if not np.any(slopes):
+            continue
+        inertia = 1.0 / np.einsum("ik,kij,jk->k", slopes, mobility, slopes)
+        own[f"inertia@{joint.name}"] = inertia * np.gradient(found[f"rate@{joint.name}"], dt)
+        for drive in mechanism.drives:
+            share = inertia * np.einsum("ik,kij,jk->k", slopes, mobility, along[drive.name])
+            if np.any(share):
+                own[f"{drive.name}>{joint.name}"] = share * found[f"force@{drive.name}"]
+    return own
+
+
+def _of_joint(name: str, signals: _Signals) -> dict[str, float]:
+    x = size_of_signal(signals[f"motion@{name}"])
+    driven = [key for key in signals if key.endswith(f">{name}")]
+    keys = [f"inertia@{name}", f"spring@{name}", f"damper@{name}", f"own@{name}", *driven]
+    drive = max(size_of_signal(signals[key]) for key in keys if key in signals)
+    force = size_of_signal(signals[f"spring@{name}"]) or drive
+    time = _over(x, size_about_zero(signals[f"rate@{name}"]))
+    return _not_zero({"x": x, "force": force, "drive": drive, "time": time})
+
+
+def _own_sizes(equations: RigEquations, z: Floats, u: Floats, p: Floats, accelerations: Floats) -> Floats:
+    """Return the size at which each parameter matters as much as the largest part of an equation, shape (n_parameters,)."""
+    largest, changes = equations.changes_of_equations(z, u, p, accelerations)
+    size = np.sqrt(np.mean(largest**2, axis=1))[:, None]
+    change = np.sqrt(np.mean(changes**2, axis=2))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.where((change > 0.0) & (size > 0.0), size / change, np.inf)
+    return np.asarray(np.nanmin(np.where(np.isfinite(own), own, np.inf), axis=0))
+
+
+def _over(x: float, rate: float) -> float:
+    return x / rate if rate > 0.0 else 0.0
+
+
+def _not_zero(sizes: Mapping[str, float]) -> dict[str, float]:
+    return {base: size or _UNKNOWN for base, size in sizes.items()}

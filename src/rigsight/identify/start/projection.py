@@ -1,0 +1,105 @@
+"""Which lines of which stretches of a record say something, and what are signals there? Windowed Fourier integrals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.rig_equations import RigEquations
+from rigsight.identify.start.measured_states import MeasuredStates
+from rigsight.records.record import Record
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+_STRETCHES = 4
+"""Stretches that a record is long; each overlaps the next by half."""
+_SHORTEST = 64
+"""Samples of a stretch at least."""
+_SIGNIFICANT_POWER = 25.0
+"""Power over that of the noise from which a line of a sensor says something."""
+_USABLE_BAND = 0.5
+"""Share of the band below half the sampling rate in which sums stand for integrals."""
+_LEAST_NOISE = 1e-6
+"""Noise of a sensor that shows none, relative to its size."""
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Integrals of signals times a window and ``e^{-j omega t}`` over stretches of a record.
+
+    Attributes
+    ----------
+    omega
+        Shape (n_points,).
+    stretch, line
+        Of each point.
+    starts, length
+        Samples of the stretches.
+    dt
+        Sample time.
+    """
+
+    omega: Floats
+    stretch: NDArray[np.intp]
+    line: NDArray[np.intp]
+    starts: NDArray[np.intp]
+    length: int
+    dt: float
+
+    def of(self, signal: Floats) -> Complexes:
+        """Return the integrals of a signal."""
+        return self._lines(signal, np.sin(np.pi * np.arange(self.length) / self.length) ** 2)
+
+    def of_rate(self, signal: Floats) -> Complexes:
+        """Return the integrals of the derivative of a signal, by parts."""
+        phase, rate = 2.0 * np.pi * np.arange(self.length) / self.length, np.pi / (self.length * self.dt)
+        return 1j * self.omega * self.of(signal) - self._lines(signal, rate * np.sin(phase))
+
+    def _lines(self, signal: Floats, window: Floats) -> Complexes:
+        cut = signal[self.starts[:, None] + np.arange(self.length)] * window
+        return np.asarray(np.fft.rfft(cut, axis=1)[self.stretch, self.line])
+
+
+def projected(
+    equations: RigEquations, record: Record, measured: MeasuredStates, most: int
+) -> tuple[Projection, Floats]:
+    """Return the projection on lines that say something, and the power of each sensor's noise on a line, shape (n_sensors,).
+
+    Parameters
+    ----------
+    equations
+        The rig's.
+    record
+        What was measured.
+    measured
+        Its states.
+    most
+        Lines of all stretches together.
+    """
+    n_samples = record.n_samples
+    length = min(max(n_samples // _STRETCHES, _SHORTEST), n_samples)
+    starts = np.unique(np.linspace(0, n_samples - length, max(1, 2 * n_samples // length - 1)).astype(int))
+    stretch, line = (a.ravel() for a in np.indices((starts.size, length // 2 + 1)))
+    omega: Floats = np.asarray(2.0 * np.pi * line / (length * record.dt), dtype=np.float64)
+    every = Projection(omega, stretch, line, starts, length, record.dt)
+    floors = np.zeros(len(equations.sensor_names))
+    says = np.zeros(omega.size, dtype=bool)
+    for i, name in enumerate(equations.sensor_names):
+        if name in record:
+            power = np.abs(every.of(record[name] - np.mean(record[name]))) ** 2
+            quiet = power[line > 0.9 * (length // 2)]
+            floors[i] = max(float(np.median(quiet)) / np.log(2.0), (_LEAST_NOISE**2) * float(np.mean(power)))
+            says |= power > _SIGNIFICANT_POWER * floors[i]
+    for source in equations.rig.inputs:
+        power = np.abs(every.of(record[source.name] - np.mean(record[source.name]))) ** 2
+        says |= power > _SIGNIFICANT_POWER * _LEAST_NOISE * np.max(power)
+    # What is known up to a constant has no line zero, nor one beside it.
+    first = 2 if measured.is_integrated else 0
+    kept = np.flatnonzero(says & (line >= first) & (omega < _USABLE_BAND * np.pi / record.dt))
+    if kept.size == 0:
+        kept = np.flatnonzero((line >= first) & (omega < _USABLE_BAND * np.pi / record.dt))
+    kept = kept[:: max(1, kept.size // most)]
+    return Projection(omega[kept], stretch[kept], line[kept], starts, length, record.dt), floors

@@ -1,0 +1,323 @@
+"""What is left of a rig's equations in measured motion? Their error in the weak form, weighted by what noise makes of it.
+
+``d/dt P = R`` for each coordinate (P its momentum, R all forces) and each own state, multiplied by ``w(t) e^{-j omega t}`` on
+overlapping stretches and integrated by parts, so that no second derivative of a measured signal is taken. Nothing is simulated:
+the error costs a sum, and large motion is as good as small. Its covariance follows from the noise of the sensors through the
+linearized equations, so that the minimum is that of errors in variables: a stiff shaft whose twist is below the noise is not
+taken for a soft one.
+
+References
+----------
+M. Shinbrot, Trans. ASME 79 (1957) 547, and A. E. Pearson and F. C. Lee, Control Theory Adv. Technol. 1 (1985) 241, for modulating
+functions. R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapter 8, for errors
+in variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.identify.rig_equations import FUNCTIONS, RigEquations, rows_of
+from rigsight.identify.start.measured_states import (
+    MeasuredStates,
+    measured_states,
+    sensor_factors,
+    supposed_states,
+)
+from rigsight.identify.start.projection import Projection, projected
+from rigsight.records.record import Record
+from rigsight.simulate.structure import input_symbols
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+_MOST_POINTS = 400
+"""Lines of all records together that are looked at, evenly chosen; parameters are some ten."""
+_MODEL_ERROR = 3e-3
+"""Error of each term of an equation by itself, relative to it: rates from splines, and inputs between samples."""
+
+
+@dataclass(frozen=True)
+class _Term:
+    """``factor(p) * signal(z, u)``, part of the momentum (or the forces) of one equation; factors hold what is unknown."""
+
+    equation: int
+    is_momentum: bool
+    factor: sp.Expr
+    signal: sp.Expr
+
+
+@dataclass(frozen=True)
+class _Block:
+    """One record: the terms on its lines, and how equations answer to noise of the states there.
+
+    Attributes
+    ----------
+    omega
+        Shape (n_points,).
+    terms
+        Projected signals of the terms, shape (n_terms, n_points).
+    squares
+        Their squared absolute values.
+    slopes
+        Derivatives of the terms by coordinates and own states, for each power of ``j omega``: (n_terms, 3, n_states').
+    noise
+        Square root of the covariance of coordinates and own states, shape (n_points, n_states', n_sensors).
+    p
+        The record's parameter vector with its own constants.
+    mixed
+        Signals and projection of what does not fall into terms.
+    """
+
+    omega: Floats
+    terms: Complexes
+    squares: Floats
+    slopes: Floats
+    noise: Complexes
+    p: Floats
+    measured: MeasuredStates
+    u: Floats
+    projection: Projection
+
+
+class WeakEquations:
+    """The error of a rig's equations in records as a function of its parameters.
+
+    Parameters
+    ----------
+    equations
+        The rig's.
+    records
+        Estimation records; those that do not show all states say nothing here.
+    values
+        Value of each known constant and parameter.
+    free
+        Names of the parameters that are sought.
+
+    Attributes
+    ----------
+    n_records
+        Records that show all states; with none only `term_sizes` means something.
+    """
+
+    def __init__(
+        self,
+        equations: RigEquations,
+        records: Sequence[Record],
+        values: Mapping[str, float],
+        free: Sequence[str],
+    ) -> None:
+        self._equations = equations
+        self._free = tuple(free)
+        factors = sensor_factors(equations, frozenset(free))
+        unknown = dict.fromkeys(free, 1.0)
+        shown: list[tuple[Record, Floats, MeasuredStates]] = []
+        for record in records:
+            p = equations.parameters({**unknown, **values}, record)
+            measured = measured_states(equations, record, p, factors)
+            if measured is not None:
+                shown.append((record, p, measured))
+        self.n_records = len(shown)
+        self._columns = [equations.structure.names.index(name) for name in free]
+        if not shown:
+            # Sizes of terms can be told all the same.
+            record = records[0]
+            p = equations.parameters({**unknown, **values}, record)
+            shown = [(record, p, supposed_states(equations, record, p, factors))]
+        self._terms, self._mixed = self._separated(shown[0][2])
+        self._term_functions = self._written()
+        of_equation = np.array([term.equation for term in self._terms])
+        self._of_equation = [np.flatnonzero(of_equation == i) for i in range(self.n_equations)]
+        self._memberships = (of_equation == np.arange(self.n_equations)[:, None]).astype(np.float64)
+        most = max(1, _MOST_POINTS // len(shown))
+        self._blocks = [self._block(record, p, measured, most) for record, p, measured in shown]
+
+    @property
+    def n_equations(self) -> int:
+        """Coordinates and own states."""
+        return self._equations.n_states - self._equations.n_coordinates
+
+    @property
+    def n_errors(self) -> int:
+        """Length of the vector of errors."""
+        return sum(2 * block.omega.size for block in self._blocks) * self.n_equations
+
+    def errors(self, values: Floats) -> Floats:
+        """Return the weighted errors for values of the free parameters, shape (n_errors,): of size one if noise makes them."""
+        found = []
+        for block in self._blocks:
+            p = block.p.copy()
+            p[self._columns] = values
+            with np.errstate(all="ignore"):
+                white = self._whitened(block, p)
+            found += [white.real.ravel(), white.imag.ravel()]
+        return np.nan_to_num(np.concatenate(found), nan=1e6, posinf=1e6, neginf=-1e6)
+
+    def term_sizes(self, values: Floats) -> list[tuple[int, float, Floats]]:
+        """Return of each term its equation, its size for these values, and its powers in them, shape (n_free,)."""
+        found = []
+        sizes = np.sqrt(np.mean(np.concatenate([np.abs(b.terms) ** 2 for b in self._blocks], axis=1), axis=1))
+        p = self._blocks[0].p.copy()
+        p[self._columns] = values
+        factors = self._factors(p)
+        powers = np.zeros((len(self._terms), len(self._free)))
+        for i, column in enumerate(self._columns):
+            moved = p.copy()
+            moved[column] *= 1.01
+            with np.errstate(all="ignore"):
+                powers[:, i] = np.log(np.abs(self._factors(moved) / factors)) / np.log(1.01)
+        for term, size, factor, power in zip(self._terms, sizes, factors, powers, strict=True):
+            found.append((term.equation, float(np.abs(factor) * size), np.nan_to_num(power)))
+        return found
+
+    def _separated(self, measured: MeasuredStates) -> tuple[list[_Term], list[_Term]]:
+        """Return the terms of all equations, and those in which signals and unknown parameters cannot be told apart."""
+        equations = self._equations
+        structure = equations.structure
+        symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))
+        unknown = {symbols[name] for name in self._free}
+        shift = self._offsets(measured, set(structure.parameter_symbols))
+        signals = [
+            *structure.states,
+            *(s for i in range(len(equations.rig.inputs)) for s in input_symbols(i)),
+        ]
+        terms: dict[tuple[int, bool, sp.Expr], sp.Expr] = {}
+        mixed: list[_Term] = []
+        momenta, forces = equations.momenta_and_forces
+        for is_momentum, sides in ((True, momenta), (False, forces)):
+            for index, side in enumerate(sides):
+                moved = side.xreplace(shift)
+                expanded = sp.expand(sp.expand_trig(moved) if shift else moved)
+                for part in sp.Add.make_args(expanded):
+                    factor, signal = part.as_independent(*signals, as_Add=False)
+                    known, sought = factor.as_independent(*unknown, as_Add=False)
+                    if signal.free_symbols & unknown:
+                        mixed.append(_Term(index, is_momentum, sp.S.One, part))
+                    elif part != 0:
+                        key = (index, is_momentum, known * signal)
+                        terms[key] = terms.get(key, sp.S.Zero) + sought
+        return [_Term(i, m, factor, signal) for (i, m, signal), factor in terms.items()], mixed
+
+    def _offsets(self, measured: MeasuredStates, known: set[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
+        """Return what stands for each coordinate and own state where sensors add unknown numbers to their readings."""
+        equations = self._equations
+        states = equations.structure.states
+        n = equations.n_coordinates
+        rest = dict.fromkeys(states, sp.S.Zero)
+        added = [e.xreplace(rest) for e in equations.structure.outputs[: len(equations.sensor_names)]]
+        shift = {}
+        for row, state in zip(measured.by_reading, [*states[:n], *states[2 * n :]], strict=True):
+            parts = [
+                sp.Float(-f) * e
+                for f, e in zip(row, added, strict=True)
+                if f != 0.0 and e.free_symbols <= known
+            ]
+            offset = sp.Add(*parts)
+            if offset != 0:
+                shift[state] = state + offset
+        return shift
+
+    def _written(self) -> tuple[Any, Any, Any, Any, Any]:
+        """Return as functions: factors, signals, their derivatives, and of the mixed terms signals and derivatives."""
+        arguments, states = self._equations.arguments, self._equations.structure.states
+
+        def function(expressions: list[sp.Expr]) -> Any:
+            return sp.lambdify(arguments, expressions, modules=[FUNCTIONS, "numpy"], cse=True)
+
+        p = list(self._equations.structure.parameter_symbols)
+        factors = sp.lambdify(p, [t.factor for t in self._terms], modules=[FUNCTIONS, "numpy"], cse=True)
+        signals = function([t.signal for t in self._terms])
+        slopes = function([sp.diff(t.signal, s) for t in self._terms for s in states])
+        mixed = function([t.signal for t in self._mixed])
+        mixed_slopes = function([sp.diff(t.signal, s) for t in self._mixed for s in states])
+        return factors, signals, slopes, mixed, mixed_slopes
+
+    def _factors(self, p: Floats) -> Floats:
+        return np.array(self._term_functions[0](*p), dtype=np.float64).reshape(len(self._terms))
+
+    def _block(self, record: Record, p: Floats, measured: MeasuredStates, most: int) -> _Block:
+        equations = self._equations
+        u = equations.inputs_of(record)[1].copy()
+        if record.hold == "zoh":
+            # Around a sample an input that is held is half the one before.
+            u[0::3, 1:] = (u[0::3, 1:] + u[0::3, :-1]) / 2.0
+        projection, floors = projected(equations, record, measured, most)
+        arguments = [*measured.z, *u, 0.0, *p]
+        _, signals, slopes, _, _ = self._term_functions
+        n_samples = measured.z.shape[1]
+        terms = self._projected(projection, self._terms, rows_of(signals(*arguments), n_samples))
+        of_states = rows_of(slopes(*arguments), n_samples).reshape(
+            len(self._terms), equations.n_states, n_samples
+        )
+        s = 1j * projection.omega[:, None, None]
+        through = measured.by_reading + measured.by_integral / np.where(s == 0.0, 1.0, s)
+        return _Block(
+            omega=projection.omega,
+            terms=terms,
+            squares=np.abs(terms) ** 2,
+            slopes=self._slopes(self._terms, np.mean(of_states, axis=2)),
+            noise=np.asarray(through * np.sqrt(floors), dtype=np.complex128),
+            p=p,
+            measured=measured,
+            u=u,
+            projection=projection,
+        )
+
+    def _projected(self, projection: Projection, terms: Sequence[_Term], signals: Floats) -> Complexes:
+        found = np.empty((len(terms), projection.omega.size), dtype=np.complex128)
+        for row, term, signal in zip(found, terms, signals, strict=True):
+            row[:] = projection.of_rate(signal) if term.is_momentum else -projection.of(signal)
+        return found
+
+    def _slopes(self, terms: Sequence[_Term], means: Floats) -> Floats:
+        """Return derivatives of the errors by coordinates and own states for each power of ``j omega``."""
+        n = self._equations.n_coordinates
+        found = np.zeros((len(terms), 3, self.n_equations))
+        for own, term, mean in zip(found, terms, means, strict=True):
+            first, sign = (1, 1.0) if term.is_momentum else (0, -1.0)
+            own[first, :n] += sign * mean[:n]
+            own[first + 1, :n] += sign * mean[n : 2 * n]
+            own[first, n:] += sign * mean[2 * n :]
+        return found
+
+    def _whitened(self, block: _Block, p: Floats) -> Complexes:
+        """Return the errors of a record divided by the root of their covariance, shape (n_points, n_equations)."""
+        factors = self._factors(p)
+        n_points, n = block.omega.size, self.n_equations
+        error = np.empty((n_points, n), dtype=np.complex128)
+        spread = np.empty((n_points, n))
+        for equation, own in enumerate(self._of_equation):
+            error[:, equation] = factors[own] @ block.terms[own]
+            spread[:, equation] = factors[own] ** 2 @ block.squares[own]
+        response = (self._memberships * factors) @ block.slopes.reshape(len(self._terms), 3 * n)
+        response = response.reshape(n, 3, n).swapaxes(0, 1)
+        if self._mixed:
+            _, _, _, mixed, mixed_slopes = self._term_functions
+            arguments = [*block.measured.z, *block.u, 0.0, *p]
+            n_samples, n_states = block.measured.z.shape[1], self._equations.n_states
+            added = self._projected(block.projection, self._mixed, rows_of(mixed(*arguments), n_samples))
+            of_states = rows_of(mixed_slopes(*arguments), n_samples).reshape(len(self._mixed), n_states, -1)
+            slopes = self._slopes(self._mixed, np.mean(of_states, axis=2))
+            for term, size, slope in zip(self._mixed, added, slopes, strict=True):
+                error[:, term.equation] += size
+                spread[:, term.equation] += np.abs(size) ** 2
+                response[:, term.equation] += slope
+        s = 1j * block.omega[:, None, None]
+        through = (response[0] + s * response[1] + s**2 * response[2]) @ block.noise
+        covariance = through @ np.conj(np.swapaxes(through, 1, 2))
+        covariance[:, np.arange(n), np.arange(n)] += _MODEL_ERROR**2 * spread + 1e-300
+        # Of one unit each, so that the root exists whatever the units of the equations are.
+        size = np.sqrt(np.real(covariance[:, np.arange(n), np.arange(n)]))
+        correlation = covariance / (size[:, :, None] * size[:, None, :])
+        correlation[:, np.arange(n), np.arange(n)] += 1e-12
+        try:
+            root = np.linalg.cholesky(correlation)
+        except np.linalg.LinAlgError:
+            return np.full((n_points, n), np.nan, dtype=np.complex128)
+        return np.asarray(np.linalg.solve(root, (error / size)[:, :, None])[:, :, 0])

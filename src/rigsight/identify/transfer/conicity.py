@@ -1,0 +1,185 @@
+"""What records tell about the equivalent conicity delta_0, and what they cannot.
+
+delta_0 enters the equations of the rig only inside the product v c_y, with ``c_y = cos^2 d - (2 r_0 / b) sin d cos d`` (thesis,
+2.12). So in every record, whatever drives it, the sensitivity to delta_0 is the sensitivity to ln c_y times
+``(dc_y/dd) / c_y``, and the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 %
+of c_y, of the speed v, or of the ratio of the two sensors' scales is one of 0.014 rad. No record or static relation evades
+this; what can be chosen is how well c_y is known, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from rigsight.errors import InputError
+from rigsight.identify.transfer.physical import LEVEL
+from rigsight.rigs import ROLLING, evaluated
+from rigsight.rigs.conicity import conicity_slope, creep_factor
+
+PLAUSIBLE = 0.3
+"""Conicities of profiled wheels [rad]; an interval that covers them all tells nothing. A choice, far above the thesis's 0.05."""
+
+
+@dataclass(frozen=True)
+class ConicityEstimate:
+    """Equivalent conicity with its interval and a plain statement.
+
+    Attributes
+    ----------
+    value
+        Estimate bounded to what (2.12) allows, 0 to where c_y vanishes [rad].
+    unbounded
+        Root of (2.12) without the bound [rad], as the thesis's -0.15; None where (2.12) has none.
+    standard_error
+        Of the unbounded value [rad], by the delta method.
+    interval
+        Confidence interval inside the bounds [rad]; None where no admissible conicity is compatible with c_y.
+    level
+        Its confidence level.
+    determined
+        True where the interval excludes zero and is narrower than the range of plausible conicities.
+    statement
+        What that means, one or two sentences.
+    """
+
+    value: float
+    unbounded: float | None
+    standard_error: float
+    interval: tuple[float, float] | None
+    level: float
+    determined: bool
+    statement: str
+
+
+def estimate_conicity(
+    c_y: float,
+    standard_error: float,
+    r_0: float,
+    b: float,
+    level: float = LEVEL,
+    plausible: float = PLAUSIBLE,
+) -> ConicityEstimate:
+    """Return delta_0 from the creep factor, bounded to positive, with its interval.
+
+    The interval maps the normal interval of c_y through (2.12), which is monotonic between the bounds: near a bound it is exact
+    where the delta method is not.
+
+    Parameters
+    ----------
+    c_y, standard_error
+        Creep factor and its standard error (may be infinite).
+    r_0, b
+        Wheel radius and track width [m].
+    level
+        Confidence level.
+    plausible
+        Upper end of the conicities that make sense [rad].
+
+    Raises
+    ------
+    InputError
+        If c_y is not positive, its error negative, or the level not between 0 and 1.
+    """
+    if not (c_y > 0.0 and standard_error >= 0.0 and 0.0 < level < 1.0):
+        raise InputError(
+            f"A conicity needs c_y above 0, its standard error at least 0 and a level between 0 and 1; got c_y = {c_y:g} "
+            f"+- {standard_error:g} at level {level:g}."
+        )
+    largest = math.atan2(b, 2.0 * r_0)
+    width = float(norm.ppf(0.5 + 0.5 * level)) * standard_error
+    low_c, high_c = c_y - width, c_y + width
+    value = _bounded(c_y, largest, r_0, b)
+    unbounded = _unbounded(c_y, largest, r_0, b)
+    slope = abs(conicity_slope(value if unbounded is None else unbounded, r_0, b))
+    # At its maximum c_y is flat in delta_0, and the delta method says nothing.
+    error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
+    percent = f"{100.0 * level:g} %"
+    if low_c >= 1.0:
+        return ConicityEstimate(
+            0.0,
+            unbounded,
+            error,
+            None,
+            level,
+            False,
+            f"c_y = {c_y:.4g} lies above 1 with its whole {percent} interval ({low_c:.4g} to {high_c:.4g}): no positive conicity "
+            "gives this. Speed, sensor scales, or a lag between the sensors are off by more than the noise; delta_0 is not "
+            "determined.",
+        )
+    interval = (_bounded(high_c, largest, r_0, b), _bounded(low_c, largest, r_0, b))
+    text = f"{percent} interval {interval[0]:.3g} to {interval[1]:.3g} rad"
+    reached = interval[1] - interval[0] < plausible
+    if interval[0] <= 0.0 and interval[1] >= plausible:
+        return ConicityEstimate(
+            value,
+            unbounded,
+            error,
+            interval,
+            level,
+            False,
+            f"The records do not determine delta_0: its {text} covers every plausible conicity (up to {plausible:g} rad). "
+            f"It would take c_y to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %.",
+        )
+    if interval[0] <= 0.0:
+        statement = f"The records give an upper limit only: delta_0 is below {interval[1]:.3g} rad ({percent}); zero is possible."
+        return ConicityEstimate(value, unbounded, error, interval, level, False, statement)
+    statement = f"delta_0 = {value:.4g} rad, {text}."
+    if not reached:
+        statement += (
+            " It differs from zero, but its interval is wider than the range of plausible conicities."
+        )
+    return ConicityEstimate(value, unbounded, error, interval, level, reached, statement)
+
+
+def creep_error_of_sine(
+    omega: float,
+    psi_amplitude: float,
+    y_noise: float,
+    n_samples: int,
+    l_0: float,
+    omega_b: float,
+) -> tuple[float, float]:
+    """Return the smallest relative standard errors of l_0 and of c_y that a sine record allows.
+
+    Cramer-Rao bound for white noise on y and an exact psi. With ``G = 2 l_0 omega_b / (s + omega_b)`` and
+    ``omega_b = v c_y / (2 l_0)``: ``dG/d ln c_y = 2 l_0 omega_b s / (s + omega_b)^2`` and
+    ``dG/d ln l_0 = 2 l_0 omega_b^2 / (s + omega_b)^2``. They are 90 degrees apart at every frequency, so l_0 and c_y are
+    independent in every sine record, and the first is largest at the break frequency: that is the record for c_y.
+
+    Parameters
+    ----------
+    omega
+        Angular frequency of the sine [rad/s].
+    psi_amplitude
+        Amplitude of the yaw angle [rad].
+    y_noise
+        Standard deviation of the noise of y [m].
+    n_samples
+        Samples of the record, whole periods.
+    l_0, omega_b
+        Distance [m] and break frequency [rad/s].
+    """
+    common = evaluated(ROLLING.static_gain, {"l_0": l_0}) * omega_b / (omega**2 + omega_b**2)
+    per_sine = y_noise * math.sqrt(2.0 / n_samples) / psi_amplitude
+    return per_sine / (common * omega_b), per_sine / (common * omega)
+
+
+def _bounded(c_y: float, largest: float, r_0: float, b: float) -> float:
+    if c_y >= 1.0:
+        return 0.0
+    if c_y <= creep_factor(largest, r_0, b):
+        return largest
+    return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, 0.0, largest))
+
+
+def _unbounded(c_y: float, largest: float, r_0: float, b: float) -> float | None:
+    top = -0.5 * math.atan(2.0 * r_0 / b)
+    if c_y > creep_factor(top, r_0, b):
+        return None
+    if c_y <= creep_factor(largest, r_0, b):
+        return largest
+    return float(brentq(lambda delta: creep_factor(delta, r_0, b) - c_y, top, largest))

@@ -1,0 +1,126 @@
+"""Where would a driven rig rest? Offsets of a sweep from what its fitted transfer functions leave.
+
+A sweep is no noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis hold for what
+remains when the motion is taken away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.signal import lfilter
+from scipy.stats import norm, t
+
+from rigsight.errors import InputError
+from rigsight.identify.fit.covariance import SMOOTHED, colored_covariance
+from rigsight.identify.transfer.physical import LEVEL, PhysicalEstimates
+from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.records.record import Hold, Record
+
+_LEAST_SAMPLES = 20
+_DIFFERENCE = 1e-4
+_NUMBERS = SMOOTHED - 1
+"""Real numbers behind the spectrum at frequency zero: lines below it mirror those above, and the offset takes its own."""
+
+
+def driven_offsets(
+    record: Record, motion: TransferFit, lateral: TransferFit | None = None, name: str = "psi_off"
+) -> PhysicalEstimates:
+    """Return the offsets of a driven record: the constant beside the motion that the fits explain.
+
+    Small errors of the fits, and motion that fades from before the record, are told from the offset. y is held against the
+    measured yaw angle, so a yaw motion that is no PT2 leaves y_off alone.
+
+    Parameters
+    ----------
+    record
+        With the sources and responses of the fits.
+    motion
+        From the input to the motion (u to psi).
+    lateral
+        From psi to y; None leaves y_off out.
+    name
+        Name of the motion's offset.
+
+    Returns
+    -------
+    Offsets; their errors hold the colored noise that is left, and motion that no such transfer function explains.
+
+    Raises
+    ------
+    InputError
+        If the record is too short.
+    """
+    if record.n_samples < _LEAST_SAMPLES:
+        raise InputError(
+            f"Record '{record.name}': {record.n_samples} samples show no offset; at least {_LEAST_SAMPLES} are needed."
+        )
+    # psi is measured: it is smooth between its samples, whatever the current does.
+    parts: list[tuple[str, TransferFit, Hold]] = [(name, motion, record.hold)]
+    if lateral is not None:
+        parts.append(("y_off", lateral, "band_limited"))
+    values: dict[str, float] = {}
+    residuals, designs = [], []
+    for own, fit, hold in parts:
+        held = replace(record, hold=hold)
+        found = np.array([fit.values[parameter] for parameter in fit.form.names])
+        left = _unexplained(held, fit, found)
+        design = np.column_stack(
+            [np.ones(record.n_samples), _fading(fit, record.n_samples, record.dt), _errors(held, fit, found)]
+        )
+        solved = np.linalg.lstsq(design, left, rcond=None)[0]
+        values[own] = float(solved[0])
+        residuals.append(left - design @ solved)
+        designs.append(design)
+    places = np.cumsum([0, *(design.shape[1] for design in designs)])[:-1]
+    stacked = block_diag(*designs)
+    noise = colored_covariance([(np.concatenate(residuals), stacked)], stacked.shape[1], [len(parts)])
+    covariance = _few_numbers() * noise[np.ix_(places, places)]
+    return PhysicalEstimates(
+        tuple(values),
+        values,
+        covariance,
+        f"(2.26), (2.27) from what the fits leave of record '{record.name}'",
+    )
+
+
+def _few_numbers() -> float:
+    """Return the factor by which the variance of an offset grows because so few numbers show the noise near frequency zero."""
+    share = 0.5 + 0.5 * LEVEL
+    return float((t.ppf(share, _NUMBERS) / norm.ppf(share)) ** 2 * SMOOTHED / _NUMBERS)
+
+
+def _unexplained(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the response less what a form with these parameters makes of the source, shape (n_samples,)."""
+    named = dict(zip(fit.form.names, found, strict=True))
+    theta = fit.form.vector(named["omega_b"], named.get("zeta", 1.0), named.get("dead_time", 0.0))
+    theta[0] = named["gain"]
+    source = record[fit.source]
+    moved = fit.form.over_time(source - source[0], record.dt, record.hold, theta)
+    return np.asarray(record[fit.response] - named["gain"] * source[0] - moved)
+
+
+def _fading(fit: TransferFit, n_samples: int, dt: float) -> NDArray[np.float64]:
+    """Return shapes that span the form's motion without input, shape (n_samples, order)."""
+    omega_b = fit.values["omega_b"]
+    inertia = [] if fit.form.order == "pt1" else [omega_b**-2]
+    poles = np.roots([*inertia, 2.0 * fit.values.get("zeta", 0.5) / omega_b, 1.0])
+    pulse = np.zeros(n_samples)
+    pulse[0] = 1.0
+    first = lfilter([1.0], np.poly(np.exp(poles * dt)).real, pulse)
+    shapes = [np.append(np.zeros(late), first[: n_samples - late]) for late in range(poles.size)]
+    return np.asarray(np.column_stack(shapes) / np.max(np.abs(first)))
+
+
+def _errors(record: Record, fit: TransferFit, found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what small errors of each parameter leave, shape (n_samples, n_parameters)."""
+    columns = []
+    for i, size in enumerate(found):
+        step = np.zeros_like(found)
+        step[i] = _DIFFERENCE * (record.dt if fit.form.names[i] == "dead_time" else abs(size))
+        change = _unexplained(record, fit, found + step) - _unexplained(record, fit, found)
+        columns.append(change / max(float(np.max(np.abs(change))), 1e-300))
+    return np.column_stack(columns)

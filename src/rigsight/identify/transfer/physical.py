@@ -1,0 +1,306 @@
+"""Which physical parameters of the running gear a PT2 and a PT1 stand for, with their uncertainty.
+
+Thesis, equations (2.21), (2.24), (2.26) and (2.27). The factor v is where (2.12) and the lateral equation put it,
+``c_y = 2 l_0 omega_b / v``; (2.25) prints it on the wrong side, which v = 1 m/s hides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from rigsight.errors import InputError
+from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
+from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.records.record import Record
+from rigsight.rigs import ROLLING, RUNNING_GEAR, Rig, evaluated, relative_slopes
+
+LEVEL = 0.95
+"""Confidence level of intervals where none is given."""
+_POSITIVE = frozenset({"J_z", "k_c", "k_d", "l_0", "c_y"})
+_RESTS = 1e-3
+_LEAST_SAMPLES = 20
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalEstimates:
+    """Physical parameters with their joint uncertainty.
+
+    Attributes
+    ----------
+    names
+        In the order of `covariance`.
+    values, standard_errors
+        By name, in SI units.
+    covariance
+        Shape (n_parameters, n_parameters).
+    method
+        Equations and records they come from.
+    positive
+        Names of those that are positive by nature.
+    """
+
+    names: tuple[str, ...]
+    values: dict[str, float]
+    covariance: NDArray[np.float64]
+    method: str
+    positive: frozenset[str] = _POSITIVE
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard error by name; infinite where the records do not determine the parameter."""
+        return dict(zip(self.names, map(float, np.sqrt(np.diag(self.covariance))), strict=True))
+
+    def interval(self, name: str, level: float = LEVEL) -> tuple[float, float]:
+        """Return the confidence interval of a parameter.
+
+        Parameters that are positive by nature get an interval that is symmetric in their logarithm.
+        """
+        value, error = self.values[name], self.standard_errors[name]
+        width = float(norm.ppf(0.5 + 0.5 * level))
+        if not math.isfinite(error):
+            return (0.0 if name in self.positive else -math.inf), math.inf
+        if name in self.positive:
+            factor = math.exp(min(width * error / value, 700.0))
+            return value / factor, value * factor
+        return value - width * error, value + width * error
+
+
+def yaw_parameters(
+    fit: TransferFit,
+    constants: Mapping[str, float],
+    constant_errors: Mapping[str, float] | None = None,
+) -> PhysicalEstimates:
+    """Return k_c [N m/rad], J_z [kg m^2] and k_d [N m s/rad] of a PT2 from current to yaw angle, by (2.21).
+
+    Parameters
+    ----------
+    fit
+        PT2 from u to psi.
+    constants
+        ``b``, ``k_tau``, ``r_0``.
+    constant_errors
+        Standard errors of constants, by name; missing ones count as exact.
+
+    Raises
+    ------
+    InputError
+        If the fit is no PT2, or its gain is not positive.
+    """
+    check_fit(fit, "pt2", "yaw", "psi / u")
+    return motion_parameters(RUNNING_GEAR, fit, constants, constant_errors, f"(2.21) from the {fit.method}")
+
+
+def motion_parameters(
+    rig: Rig,
+    fit: TransferFit,
+    constants: Mapping[str, float],
+    constant_errors: Mapping[str, float] | None,
+    method: str,
+) -> PhysicalEstimates:
+    """Return stiffness, inertia and damping of a rig from the PT2 of its motion.
+
+    Parameters
+    ----------
+    rig
+        A rig whose stiffness, inertia and damping are one parameter each.
+    fit
+        PT2 from its input to its displacement.
+    constants
+        Those of its drive.
+    constant_errors
+        Standard errors of constants, by name; missing ones count as exact.
+    method
+        What the estimates are said to come from.
+    """
+    gain, omega_b, zeta = (fit.values[name] for name in ("gain", "omega_b", "zeta"))
+    motion = rig.motion
+    assert motion.inertia is not None
+    slopes = relative_slopes(motion.drive_gain, constants)
+    stiffness = evaluated(motion.drive_gain, constants) / gain
+    inertia = stiffness / omega_b**2
+    damping = 2.0 * zeta * inertia * omega_b
+    # Rows: d ln parameter / d ln (gain, omega_b, zeta, constants of the drive).
+    of_fit = np.array([[-1.0, 0.0, 0.0], [-1.0, -2.0, 0.0], [-1.0, -1.0, 1.0]])
+    of_drive = np.tile(list(slopes.values()), (3, 1))
+    return _propagated(
+        {motion.stiffness.name: stiffness, motion.inertia.name: inertia, motion.damping.name: damping},
+        np.hstack([of_fit, of_drive]),
+        np.array([gain, omega_b, zeta, *(constants[name] for name in slopes)]),
+        fit.covariance_of("gain", "omega_b", "zeta"),
+        [(constant_errors or {}).get(name, 0.0) for name in slopes],
+        method,
+    )
+
+
+def lateral_parameters(
+    fit: TransferFit,
+    constants: Mapping[str, float],
+    constant_errors: Mapping[str, float] | None = None,
+    known_l_0: tuple[float, float] | None = None,
+) -> PhysicalEstimates:
+    """Return l_0 [m] and c_y of a PT1 from yaw angle to lateral displacement, by (2.24) with v on the right side.
+
+    Gain and break frequency go in with their covariance: above the break frequency the PT1 is an integrator of slope v c_y, so
+    their errors largely cancel in c_y.
+
+    Parameters
+    ----------
+    fit
+        PT1 from psi to y.
+    constants
+        ``v`` [m/s].
+    constant_errors
+        Standard errors of constants, by name; missing ones count as exact.
+    known_l_0
+        Value and standard error of a measured length [m]. It replaces the static gain in c_y: a break frequency is a time, so the
+        scales of both sensors then cancel.
+
+    Raises
+    ------
+    InputError
+        If the fit is no PT1, its gain is not positive, or the known length is not.
+    """
+    check_fit(fit, "pt1", "lateral", "y / psi")
+    gain, omega_b, speed = fit.values["gain"], fit.values["omega_b"], constants["v"]
+    speed_error = (constant_errors or {}).get("v", 0.0)
+    if known_l_0 is None:
+        l_0 = gain / 2.0
+        powers = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, -1.0]])
+        inputs = np.array([gain, omega_b, speed])
+        covariance, errors = fit.covariance_of("gain", "omega_b"), [speed_error]
+        how = "(2.24)"
+    else:
+        l_0, l_0_error = known_l_0
+        if not (l_0 > 0.0 and l_0_error >= 0.0):
+            raise InputError(
+                f"A known l_0 must be a positive length with an error of at least 0 m, got {known_l_0}."
+            )
+        powers = np.array([[0.0, 1.0, 0.0], [1.0, 1.0, -1.0]])
+        inputs = np.array([omega_b, l_0, speed])
+        covariance, errors = fit.covariance_of("omega_b"), [l_0_error, speed_error]
+        how = "(2.24b) with the known l_0"
+    values = {"l_0": l_0, "c_y": 2.0 * l_0 * omega_b / speed}
+    return _propagated(values, powers, inputs, covariance, errors, f"{how} from the {fit.method}")
+
+
+def static_lateral(l_0: float) -> tuple[float, float]:
+    """Return the lateral displacement per yaw angle at rest [m/rad], and its derivative with respect to l_0."""
+    gain = ROLLING.static_gain
+    (length,) = gain.free_symbols
+    numbers = {length.name: l_0}
+    return evaluated(gain, numbers), evaluated(sp.diff(gain, length), numbers)
+
+
+def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:
+    """Refuse a fit of another order, or one whose gain says that a signal counts the other way round.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    order
+        Order that is needed.
+    which, ratio
+        What is wanted of it, and of which signals, in words.
+
+    Raises
+    ------
+    InputError
+        If the order is another or the gain is not positive.
+    """
+    if fit.form.order != order:
+        raise InputError(
+            f"The {which} parameters need a {order.upper()} ({ratio}), got a {fit.form.order.upper()}."
+        )
+    if not fit.values["gain"] > 0.0:
+        raise InputError(
+            f"The {which} parameters need a positive gain of {ratio}, got {fit.values['gain']:.4g} {fit.unit}: a sensor "
+            "or the current counts the other way round. Change the sign of that signal."
+        )
+
+
+def _propagated(
+    values: dict[str, float],
+    powers: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    independent_errors: list[float],
+    method: str,
+) -> PhysicalEstimates:
+    """Propagate through products of powers: fitted inputs with their covariance, then independent ones."""
+    n = covariance.shape[0]
+    joint = np.diag(np.concatenate([np.zeros(n), np.square(independent_errors)]))
+    joint[:n, :n] = covariance
+    chain = np.array(list(values.values()))[:, None] * powers / inputs
+    return PhysicalEstimates(tuple(values), values, propagated_covariance(joint, chain), method)
+
+
+def offsets(
+    record: Record,
+    l_0: float,
+    l_0_error: float = 0.0,
+    static_gain: float | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+) -> PhysicalEstimates:
+    """Return psi_off [rad] and y_off [m] from a stationary stretch of a record, by (2.26) and (2.27).
+
+    Parameters
+    ----------
+    record
+        With u, psi and y.
+    l_0, l_0_error
+        Distance wheel carrier to middle frame and its standard error [m].
+    static_gain
+        psi / u at rest [rad/A], to take out the mean of the input; None requires an input that is zero on the mean.
+    start, stop
+        The stretch [s], default the whole record: a rest, or a constant current. Of a sweep `driven_offsets` knows more.
+
+    Returns
+    -------
+    Offsets; their errors allow for colored noise. The errors of y_off and psi_off are correlated through (2.27).
+
+    Raises
+    ------
+    InputError
+        If the stretch is too short, or the input has a mean and no static gain is given.
+    """
+    begin = record.t[0] if start is None else start
+    end = record.t[-1] if stop is None else stop
+    inside = (record.t >= begin - 0.5 * record.dt) & (record.t <= end + 0.5 * record.dt)
+    what = f"Record '{record.name}', {begin:g} to {end:g} s"
+    if np.count_nonzero(inside) < _LEAST_SAMPLES:
+        raise InputError(
+            f"{what}: {np.count_nonzero(inside)} samples are no stationary stretch; at least {_LEAST_SAMPLES} are needed."
+        )
+    u_mean = float(np.mean(record["u"][inside]))
+    size = float(np.max(np.abs(record["u"])))
+    if static_gain is None and abs(u_mean) > _RESTS * size:
+        raise InputError(
+            f"{what}: the current has a mean of {u_mean:.3g} A, which also moves psi and y. Choose a stretch at zero current or "
+            "give static_gain."
+        )
+    psi_mean, psi_error = _mean(record["psi"][inside])
+    y_mean, y_error = _mean(record["y"][inside])
+    pushed = u_mean * (static_gain or 0.0)
+    psi_off = psi_mean - pushed
+    # (2.27) with the stationary yaw angle: what the current pushes moves y too.
+    per_radian, per_length = static_lateral(l_0)
+    y_off = y_mean - per_radian * psi_mean
+    chain = np.array([[1.0, 0.0, 0.0], [-per_radian, 1.0, -per_length * psi_mean]])
+    covariance = chain @ np.diag(np.square([psi_error, y_error, l_0_error])) @ chain.T
+    values = {"psi_off": psi_off, "y_off": y_off}
+    return PhysicalEstimates(tuple(values), values, covariance, f"(2.26), (2.27) from {what}")
+
+
+def _mean(samples: NDArray[np.float64]) -> tuple[float, float]:
+    mean = float(np.mean(samples))
+    variance = colored_covariance([(samples - mean, np.ones((samples.size, 1)))], 1)
+    return mean, float(np.sqrt(variance[0, 0]))

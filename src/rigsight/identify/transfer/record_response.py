@@ -1,0 +1,205 @@
+"""Which frequency response does a record show, by which method, and how fine is it?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, check_option
+from rigsight.frequency import (
+    FrequencyResponse,
+    averaged_response,
+    local_polynomial_response,
+    local_rational_response,
+    thesis_response,
+)
+from rigsight.frequency.signal_pair import excited, line_frequencies
+from rigsight.identify.transfer.transfer_form import Order
+from rigsight.records.periods import repeated_period
+from rigsight.records.record import Hold, Record
+
+Method = Literal["local_rational", "local_polynomial", "h1", "thesis"]
+METHODS: tuple[Method, ...] = ("local_rational", "local_polynomial", "h1", "thesis")
+
+_BAND_LINES = {"local_rational": 15, "local_polynomial": 13}
+"""Lines of one local band: its unknowns and six degrees of freedom more, to the next odd number."""
+_LOCAL_VALUES = 3.0
+_HANN_LINES = 1.5
+"""Equivalent noise bandwidth of a Hann window."""
+_SEGMENTS = 8
+"""Half-overlapping segments of an averaged spectrum hold this share of the record: a compromise of bias and variance."""
+_PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thesis": 2.0}
+"""Lines (or distances of averaged frequencies) that the half-power width of a peak must hold for a method to follow it."""
+_CLEAR = 100.0
+"""Power over variance (20 dB) from which a local model of a noisy response can be trusted."""
+_MOSTLY, _LEAST_SHARE = 0.8, 0.05
+_THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
+_THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
+
+
+@dataclass(frozen=True, eq=False)
+class RecordResponse:
+    """A frequency response with what its reading needs.
+
+    Attributes
+    ----------
+    response
+        The frequency response in the band where it stands out.
+    lines_per_value
+        Lines per independent value, by which a covariance that counts lines as independent is too small. A local model of degree
+        two has three numbers for the response in its band; a Hann window ties neighbors together.
+    resolution
+        Distance of its frequencies [rad/s].
+    narrowest
+        Half-power width of the narrowest peak that the method follows at this resolution [rad/s].
+    coherence
+        H1 with its coherence from segments of the same record; None where it is not wanted or the record is too short for it.
+    """
+
+    response: FrequencyResponse
+    lines_per_value: float
+    resolution: float
+    narrowest: float
+    coherence: FrequencyResponse | None
+
+
+def record_response(
+    record: Record,
+    source: str,
+    response: str,
+    order: Order,
+    method: Method = "local_rational",
+    resolution: float | None = None,
+    hold: Hold = "band_limited",
+    band: tuple[float, float] | None = None,
+    least_clearness: float = _CLEAR,
+    with_coherence: bool = True,
+    wanted: NDArray[np.float64] | None = None,
+) -> RecordResponse:
+    """Return the frequency response of one record.
+
+    Parameters
+    ----------
+    record
+        A sweep, a multisine, or anything that drives a band. Whole periods of an input that repeats are averaged, without the
+        first, which holds the transient.
+    source, response
+        Names of the signals.
+    order
+        What the response is believed to be; only the thesis's pipeline needs it.
+    method
+        ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
+    resolution
+        Width wished for [rad/s]: of a local band, or between averaged frequencies. None takes what the record gives.
+    hold
+        How the source goes on between its samples, see `rigsight.frequency.hold_response`.
+    band
+        Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
+    least_clearness
+        Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
+    with_coherence
+        False where nobody reads the coherence: it takes as long as a third of a local model.
+    wanted
+        Frequencies [rad/s] that somebody reads; a local method leaves out other lines. None for all.
+
+    Raises
+    ------
+    InputError
+        If the record is too short, or does not excite anything, or nothing is left inside the band.
+    """
+    check_option("The method", method, METHODS)
+    periodic, note = _mean_period(record)
+    span = periodic.n_samples * periodic.dt
+    line = 2.0 * math.pi / span
+    coherence = _coherence(record, source, response, hold) if with_coherence else None
+    shared = 1.0
+    if method == "thesis":
+        found, width = _thesis(periodic, source, response, order), line
+    elif method == "h1":
+        width = resolution or _SEGMENTS * 2.0 * math.pi / (record.n_samples * record.dt)
+        found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
+    else:
+        lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
+        local = local_rational_response if method == "local_rational" else local_polynomial_response
+        bandwidth = resolution or lines * line
+        found = local(
+            periodic,
+            source,
+            response,
+            bandwidth=bandwidth,
+            transient=periodic is record,
+            hold=hold,
+            wanted=wanted,
+        )
+        width, shared = line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
+        found = _clear(found, lines, least_clearness)
+    if note:
+        found = replace(found, method=f"{found.method}, {note}")
+    if band is not None:
+        found = found.band(*band)
+    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence)
+
+
+def _mean_period(record: Record) -> tuple[Record, str]:
+    """Return the mean of all periods but the first of a repeated input, or the record as it is."""
+    period = repeated_period(next(iter(record.signals.values())))
+    count = record.n_samples // period if period else 1
+    if period is None or count < 2:
+        return record, ""
+    kept = {
+        name: samples[period : count * period].reshape(count - 1, period).mean(axis=0)
+        for name, samples in record.signals.items()
+    }
+    which = "period 2" if count == 2 else f"mean of periods 2 to {count}"
+    return replace(record, signals=kept), which
+
+
+def _coherence(record: Record, source: str, response: str, hold: Hold) -> FrequencyResponse | None:
+    width = _SEGMENTS * 2.0 * math.pi / (record.n_samples * record.dt)
+    try:
+        return averaged_response(record, source, response, width, hold=hold)
+    except InputError:
+        return None
+
+
+def _thesis(record: Record, source: str, response: str, order: Order) -> FrequencyResponse:
+    omega = line_frequencies(record.n_samples, record.dt)
+    power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
+    smooth = np.convolve(power, np.full(15, 1.0 / 15.0), mode="same")
+    heard = omega[excited(omega, smooth, None, f"Record '{record.name}': the source '{source}'")]
+    # The cuts are those of the thesis's rig: its resonance lies near 12 rad/s.
+    upper = min(_THESIS_CUTS[order], float(heard[-1]))
+    return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
+
+
+def _clear(found: FrequencyResponse, lines: int, least: float) -> FrequencyResponse:
+    """Keep the lines between the outermost local bands in which most stand clearly out of their uncertainty.
+
+    Single lines seem clear by chance, most of all where the begin of a sweep cannot be told from a transient.
+    """
+    assert found.variance is not None
+    clear = np.abs(found.values) ** 2 > least * found.variance
+    if clear.size <= lines or least == 0.0:
+        return found
+    share = np.convolve(
+        np.pad(clear.astype(np.float64), lines // 2, mode="edge"), np.ones(lines) / lines, "valid"
+    )
+    inside = np.flatnonzero(clear & (share[: clear.size] >= _MOSTLY))
+    if inside.size < _LEAST_SHARE * clear.size:
+        return found
+    kept = np.zeros(clear.size, dtype=np.bool_)
+    kept[inside[0] : inside[-1] + 1] = True
+    return found.at(kept)
+
+
+def driven_band(record: Record, source: str) -> tuple[float, float]:
+    """Return the band that holds 99 % of the power of a source [rad/s]."""
+    omega = line_frequencies(record.n_samples, record.dt)
+    power = np.abs(np.fft.rfft(record[source] - np.mean(record[source]))[1 : omega.size + 1]) ** 2
+    total = np.cumsum(power) / np.sum(power)
+    low, high = np.searchsorted(total, [0.005, 0.995])
+    return float(omega[low]), float(omega[min(high, omega.size - 1)])

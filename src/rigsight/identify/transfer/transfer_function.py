@@ -1,0 +1,346 @@
+"""Which PT1 or PT2 a measured frequency response shows: bounded grid search, then weighted least squares.
+
+References
+----------
+R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach* (Wiley 2012), chapters 9 and 11, for the
+maximum likelihood cost and its covariance. G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, for the gain that is
+solved for at every point of the grid. W. K. Newey and K. D. West, Econometrica 55 (1987) 703, for dependent lines.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rigsight.errors import InputError, check_option
+from rigsight.frequency import FrequencyResponse
+from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
+from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.transfer_form import Order, TransferForm
+from rigsight.identify.undetermined import POORLY_KNOWN
+
+Weighting = Literal["variance", "uniform", "relative"]
+
+_GRID_FREQUENCIES = 41
+_GRID_DAMPINGS = np.geomspace(0.01, 10.0, 19)
+_MOST_GRID_LINES = 500
+_MOST_DEAD_TIMES = 80
+_STARTS = 5
+_BEYOND = 10.0
+"""A break frequency is looked for this factor beyond either end of the band."""
+_DAMPING_RANGE = (1e-4, 1e3)
+_STANDS_OUT = 4.0
+"""Power of a line over its variance from which it tells something (two standard deviations)."""
+_COHERENT = 0.05
+_MISFIT = 3.0
+
+
+def fit_frequency_response(
+    measured: FrequencyResponse,
+    order: Order,
+    longest_dead_time: float = 0.0,
+    magnitude_only: bool = False,
+    weighting: Weighting | None = None,
+    dependent_lines: int = 0,
+) -> TransferFit:
+    """Fit a PT1 or PT2 to a frequency response.
+
+    Parameters
+    ----------
+    measured
+        The frequency response; cut it with `FrequencyResponse.band` first.
+    order
+        ``"pt1"`` (thesis, 2.7) or ``"pt2"`` (2.9).
+    longest_dead_time
+        Longest dead time to look for [s]; 0 fits none.
+    magnitude_only
+        Fit the magnitudes and leave the phase unread, as the thesis's manual grid search (section 4.4). The sign of the gain is
+        then positive by convention.
+    weighting
+        ``"variance"`` (maximum likelihood for circular normal errors), ``"uniform"`` (absolute errors) or ``"relative"``.
+        Default: variances where they exist, else uniform.
+    dependent_lines
+        Over how many neighbors the errors of a line reach, for a response that does not know it itself
+        (`FrequencyResponse.noise_shares`, as local models do); 0 for independent lines.
+
+    Returns
+    -------
+    The fit. Standard errors follow from the variances, widened by the misfit where that is above 1; without variances the
+    residuals give their size. ``success`` is False, with the reason as ``message``, where the optimizer did not converge or the
+    band does not show the break frequency.
+
+    Raises
+    ------
+    InputError
+        If there are too few lines, no line stands out of its uncertainty, the weighting needs variances that do not exist, or a
+        dead time is asked of magnitudes.
+    """
+    problem = _problem(measured, order, longest_dead_time, magnitude_only, weighting)
+    lower, upper = problem.bounds()
+    best = None
+    for start in problem.starts():
+        inside = np.clip(start, lower, upper)
+        found = least_squares(
+            problem.residual, inside, jac=problem.jacobian, bounds=(lower, upper), x_scale="jac", ftol=1e-12
+        )
+        if best is None or found.cost < best.cost:
+            best = found
+    assert best is not None
+    values, chain = problem.form.natural(best.x)
+    covariance = propagated_covariance(problem.covariance(best.x, dependent_lines), np.diag(chain))
+    errors = np.sqrt(np.diag(covariance))
+    misfit = problem.misfit(best.x) if problem.weighting == "variance" else float("nan")
+    notes = [] if best.status > 0 else [str(best.message)]
+    notes += _band_notes(measured, float(values[1]), errors)
+    success = not notes
+    notes += _reading_notes(magnitude_only, misfit)
+    names = problem.form.names
+    kind = "magnitude" if magnitude_only else "complex"
+    return TransferFit(
+        form=problem.form,
+        names=names,
+        values=dict(zip(names, map(float, values), strict=True)),
+        standard_errors=dict(zip(names, map(float, errors), strict=True)),
+        covariance=covariance,
+        residuals=problem.errors(best.x),
+        misfit=misfit,
+        success=success,
+        message=" ".join(notes) or "Converged.",
+        source=measured.source,
+        response=measured.response,
+        unit=measured.unit,
+        method=f"{kind} least squares, {problem.weighting} weights, on {measured.method or 'a frequency response'}",
+        records=measured.records,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Weighted errors and their derivatives as functions of the parameter vector of a form."""
+
+    form: TransferForm
+    omega: NDArray[np.float64]
+    values: NDArray[np.complex128]
+    weights: NDArray[np.float64]
+    """One over the standard deviation of a real component, shape (n_lines,)."""
+    magnitude_only: bool
+    weighting: Weighting
+    longest_dead_time: float
+    measured: FrequencyResponse
+
+    def errors(self, theta: NDArray[np.float64]) -> NDArray[np.complex128] | NDArray[np.float64]:
+        fitted = self.form.response(self.omega, theta)
+        if self.magnitude_only:
+            return np.asarray(np.abs(self.values) - np.abs(fitted))
+        return np.asarray(self.values - fitted)
+
+    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _components(self.errors(theta) * self.weights)
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        slopes = self.form.derivatives(self.omega, theta)
+        if self.magnitude_only:
+            fitted = self.form.response(self.omega, theta)
+            size = np.abs(fitted)
+            direction = fitted.conj() / np.where(size > 0.0, size, 1.0)
+            return np.asarray(-np.real(direction[:, None] * slopes) * self.weights[:, None])
+        return _components(-slopes * self.weights[:, None])
+
+    def misfit(self, theta: NDArray[np.float64]) -> float:
+        residual = self.residual(theta)
+        return float(np.sqrt(residual @ residual / (residual.size - theta.size)))
+
+    def covariance(self, theta: NDArray[np.float64], dependent_lines: int) -> NDArray[np.float64]:
+        slopes, residual = self.jacobian(theta), self.residual(theta)
+        bread = slopes.T @ slopes
+        if self.measured.noise_shares is not None:
+            widened = 1.0
+            if self.weighting == "variance":
+                widened = max(self.misfit(theta), 1.0) ** 2 * _scattered_weights(self.measured.noise_freedom)
+            return sandwich_covariance(bread, widened * self._shared_filling(theta))
+        if dependent_lines > 0:
+            per_line = (slopes * residual[:, None]).reshape(self.omega.size, -1, theta.size).sum(axis=1)
+            return sandwich_covariance(bread, _dependent_filling(per_line, dependent_lines))
+        misfit = self.misfit(theta)
+        size = max(misfit, 1.0) if self.weighting == "variance" else misfit
+        return sandwich_covariance(bread, size**2 * bread)
+
+    def _shared_filling(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance of J^T r from what each independent line of noise has in all values."""
+        shares, lines = self.measured.noise_shares, self.measured.noise_lines
+        assert shares is not None
+        assert lines is not None
+        slopes: NDArray[np.complex128] = self.form.derivatives(self.omega, theta).conj()
+        if self.magnitude_only:
+            # A magnitude reads the part of an error that lies along the fitted value.
+            fitted = self.form.response(self.omega, theta)
+            along = fitted.conj() / np.maximum(np.abs(fitted), np.finfo(np.float64).tiny)
+            slopes = np.real(along[:, None] * slopes.conj()) * along[:, None]
+        scores = (self.weights**2)[:, None, None] * slopes[:, None, :] * shares[:, :, None]
+        first = int(lines.min())
+        gathered = np.zeros((int(lines.max()) - first + 1, theta.size), dtype=np.complex128)
+        np.add.at(gathered, lines - first, scores)
+        return np.asarray(0.5 * np.real(gathered.conj().T @ gathered))
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        low, high = self._reach()
+        lower = self.form.vector(low, _DAMPING_RANGE[0], 0.0)
+        upper = self.form.vector(high, _DAMPING_RANGE[1], max(self.longest_dead_time, 1e-12))
+        lower[0], upper[0] = (0.0 if self.magnitude_only else -np.inf), np.inf
+        return lower, upper
+
+    def _reach(self) -> tuple[float, float]:
+        positive = self.omega[self.omega > 0.0]
+        return float(positive[0] / _BEYOND), float(positive[-1] * _BEYOND)
+
+    def starts(self) -> list[NDArray[np.float64]]:
+        """Return the best points of the grid, each with the gain that fits best there."""
+        thin = slice(None, None, -(-self.omega.size // _MOST_GRID_LINES))
+        omega, weights = self.omega[thin], self.weights[thin]
+        measured: NDArray[np.complex128] = self.values[thin]
+        low, high = self._reach()
+        goal = np.abs(measured) if self.magnitude_only else measured
+        dampings = _GRID_DAMPINGS if self.form.order == "pt2" else np.ones(1)
+        turns = int(np.ceil(self.longest_dead_time * float(omega[-1]))) + 1
+        delays = np.linspace(0.0, self.longest_dead_time, min(2 * turns, _MOST_DEAD_TIMES))
+        if self.longest_dead_time == 0.0:
+            delays = np.zeros(1)
+        # Turning the measured phase forward by a dead time stands for turning the shape backward.
+        forward = np.exp(1j * np.outer(delays, omega))
+        found = []
+        for omega_b, zeta in itertools.product(np.geomspace(low, high, _GRID_FREQUENCIES), dampings):
+            theta = self.form.vector(float(omega_b), float(zeta), 0.0)
+            shape = self.form.response(omega, theta)
+            if self.magnitude_only:
+                shape = np.abs(shape).astype(np.complex128)
+            energy = float(np.sum((weights * np.abs(shape)) ** 2))
+            crossed = weights**2 * shape.conj() * goal
+            projections = np.real(forward @ crossed)
+            if self.magnitude_only:
+                projections = np.maximum(projections, 0.0)
+            best = int(np.argmax(np.abs(projections)))
+            theta = self.form.vector(float(omega_b), float(zeta), float(delays[best]))
+            theta[0] = projections[best] / energy
+            found.append((-float(projections[best] ** 2) / energy, theta))
+        found.sort(key=lambda pair: pair[0])
+        return [theta for _, theta in found[:_STARTS]]
+
+
+def _problem(
+    measured: FrequencyResponse,
+    order: Order,
+    longest_dead_time: float,
+    magnitude_only: bool,
+    weighting: Weighting | None,
+) -> _Problem:
+    check_option("order", order, ("pt1", "pt2"))
+    if not (np.isfinite(longest_dead_time) and longest_dead_time >= 0.0):
+        raise InputError(f"The longest dead time must be at least 0 s and finite, got {longest_dead_time!r}.")
+    if magnitude_only and longest_dead_time > 0.0:
+        raise InputError(
+            "A dead time changes the phase only, so magnitudes cannot tell it. Fit the complex values (magnitude_only=False) "
+            "or leave the dead time away."
+        )
+    form = TransferForm(order, longest_dead_time > 0.0)
+    _check_informative(measured, form)
+    known = measured.variance is not None and bool((measured.variance > 0.0).any())
+    chosen: Weighting = weighting or ("variance" if known else "uniform")
+    check_option("weighting", chosen, ("variance", "uniform", "relative"))
+    size = measured.magnitude
+    if chosen == "variance":
+        if measured.variance is None or not known:
+            raise InputError(
+                f"Weighting by variance needs variances, and {measured.source} -> {measured.response} has none. "
+                "Use weighting='uniform' or 'relative', or an estimator that gives variances."
+            )
+        least = 1e-9 * float(np.median(measured.variance[measured.variance > 0.0]))
+        weights = np.sqrt(2.0 / np.maximum(measured.variance, least))
+    elif chosen == "relative":
+        weights = 1.0 / np.maximum(size, 1e-9 * float(np.max(size)))
+    else:
+        weights = np.full(size.size, 1.0 / float(np.max(size)))
+    return _Problem(
+        form, measured.omega, measured.values, weights, magnitude_only, chosen, longest_dead_time, measured
+    )
+
+
+def _check_informative(measured: FrequencyResponse, form: TransferForm) -> None:
+    what = f"Frequency response {measured.source} -> {measured.response}"
+    band = f"from {measured.omega[0]:.4g} to {measured.omega[-1]:.4g} rad/s"
+    least = len(form.names) + 2
+    if np.count_nonzero(measured.omega > 0.0) < least:
+        raise InputError(
+            f"{what}: {measured.omega.size} lines {band} are too few for {len(form.names)} parameters; at least {least} above "
+            "0 rad/s are needed. Widen the band or use a longer record."
+        )
+    size = measured.magnitude
+    telling = size > 0.0
+    if measured.variance is not None:
+        telling &= size**2 > _STANDS_OUT * measured.variance
+    if measured.coherence is not None:
+        telling &= measured.coherence > _COHERENT
+    # Of pure noise, exp(-4) of the lines seem to stand out.
+    needed = max(least, int(np.ceil(0.05 * size.size)))
+    if np.count_nonzero(telling) < needed:
+        raise InputError(
+            f"{what}: only {np.count_nonzero(telling)} of {size.size} lines {band} stand out of their uncertainty, {needed} are "
+            f"needed. The record has no excitation in this band: choose one that '{measured.source}' drives, or drive it there."
+        )
+
+
+def _band_notes(measured: FrequencyResponse, omega_b: float, errors: NDArray[np.float64]) -> list[str]:
+    low, high = float(measured.omega[0]), float(measured.omega[-1])
+    if np.all(np.isfinite(errors)) and errors[1] < POORLY_KNOWN * omega_b and low <= omega_b <= high:
+        return []
+    return [
+        f"The band from {low:.4g} to {high:.4g} rad/s does not show the break frequency, fitted as {omega_b:.4g} rad/s: "
+        "use a wider band or a record that drives it."
+    ]
+
+
+def _reading_notes(magnitude_only: bool, misfit: float) -> list[str]:
+    notes = []
+    if magnitude_only:
+        notes.append("Magnitudes do not tell the sign of the gain (taken as positive), nor a dead time.")
+    if misfit > _MISFIT:
+        notes.append(
+            f"The residuals are {misfit:.1f} times what the variances explain: this form is not the whole of the rig."
+        )
+    return notes
+
+
+def _components(
+    values: NDArray[np.complex128] | NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return real and imaginary part of each row next to each other, so that a line stays together."""
+    if not np.iscomplexobj(values):
+        return np.asarray(values, dtype=np.float64)
+    parts = np.stack([values.real, values.imag], axis=1)
+    return np.asarray(parts.reshape(2 * values.shape[0], *values.shape[1:]))
+
+
+def _scattered_weights(freedom: float) -> float:
+    """Return what covariances gain by weights that scatter themselves.
+
+    Lines whose variance was estimated too small weigh too much and claim to be good at once. For a chi-squared variance x of
+    n = 2 freedom degrees the noise of the sum is E[1/x^2], the claim E[1/x], and the misfit sees E[1/x]:
+    ``E[1/x^2] / E[1/x]^2 = (n - 2) / (n - 4)``.
+    """
+    if not np.isfinite(freedom):
+        return 1.0
+    n = max(2.0 * freedom, 5.0)
+    return (n - 2.0) / (n - 4.0)
+
+
+def _dependent_filling(per_line: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
+    """Return the covariance of the summed rows of shape (n_lines, n_parameters), dependent over `reach` neighbors."""
+    filling = per_line.T @ per_line
+    for lag in range(1, min(reach, per_line.shape[0] - 1) + 1):
+        crossed = per_line[lag:].T @ per_line[:-lag] * (1.0 - lag / (reach + 1.0))
+        filling += crossed + crossed.T
+    return np.asarray(filling)

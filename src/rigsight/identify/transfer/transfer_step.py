@@ -1,0 +1,234 @@
+"""Which PT1 or PT2 a recorded step shows: output fit over a time window, from rest.
+
+References
+----------
+L. Ljung, *System Identification* (Prentice Hall 1999), chapters 7 and 9, for output error and its covariance with colored
+residuals. The window is the thesis's (section 5.2.2: 0.6 A at 180 s, compared from 180 to 184 s, offset removed).
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rigsight.errors import InputError, check_option
+from rigsight.identify.fit.covariance import propagated_covariance
+from rigsight.identify.transfer.step_residuals import step_covariance
+from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.identify.transfer.transfer_form import Order, TransferForm
+from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.records.record import Hold, Record
+
+_GRID_FREQUENCIES = 17
+_GRID_DAMPINGS = np.geomspace(0.03, 5.0, 6)
+_GRID_DEAD_TIMES = 6
+_STARTS = 2
+_DAMPING_RANGE = (1e-4, 1e3)
+_LEAST_AFTER = 20
+_STEP_OVER_NOISE = 10.0
+_DIFFERENCE = 1e-5
+
+
+def fit_step(
+    record: Record,
+    source: str,
+    response: str,
+    order: Order,
+    start: float | None = None,
+    stop: float | None = None,
+    longest_dead_time: float = 0.0,
+) -> TransferFit:
+    """Fit a PT1 or PT2 and an offset to the recorded answer to a step.
+
+    Parameters
+    ----------
+    record
+        Measured record. The input need not be an ideal step: the samples are simulated as they are, with the record's hold.
+    source, response
+        Names of the input and of the output.
+    order
+        ``"pt1"`` (thesis, 2.7) or ``"pt2"`` (2.9).
+    start, stop
+        Window [s] in the record's time, default the whole record. The rig rests at its start; it may be the time of the step.
+    longest_dead_time
+        Longest dead time to look for [s]; 0 fits none.
+
+    Returns
+    -------
+    The fit, ``offset`` (the response at rest) among its parameters; standard errors allow for colored residuals. ``success`` is
+    False, with the reason as ``message``, where a parameter stays undetermined.
+
+    Raises
+    ------
+    InputError
+        If the window holds no step, or too few samples after it, or the order or the dead time is not allowed.
+    """
+    check_option("order", order, ("pt1", "pt2"))
+    if not (np.isfinite(longest_dead_time) and longest_dead_time >= 0.0):
+        raise InputError(f"The longest dead time must be at least 0 s and finite, got {longest_dead_time!r}.")
+    form = TransferForm(order, longest_dead_time > 0.0)
+    problem = _problem(record, source, response, form, start, stop, longest_dead_time)
+    lower, upper = problem.bounds()
+    best = None
+    for guess in problem.starts():
+        inside = np.clip(guess, lower, upper)
+        found = least_squares(problem.residual, inside, bounds=(lower, upper), x_scale="jac", ftol=1e-12)
+        if best is None or found.cost < best.cost:
+            best = found
+    assert best is not None
+    natural, chain = form.natural(best.x[:-1])
+    values, chain = np.append(natural, best.x[-1]), np.append(chain, 1.0)
+    residual = problem.residual(best.x)
+    shaped = dict(zip(form.names, natural, strict=True))
+    slopes = problem.slopes(best.x, upper)
+    covariance = step_covariance(residual, slopes, problem.dt, shaped["omega_b"], shaped.get("zeta"))
+    covariance = propagated_covariance(covariance, np.diag(chain))
+    names = (*form.names, "offset")
+    errors = np.sqrt(np.diag(covariance))
+    poor = [
+        name
+        for name, value, error in zip(names[:2], values, errors, strict=False)
+        if not error < POORLY_KNOWN * abs(value)
+    ]
+    notes = [] if best.status > 0 else [str(best.message)]
+    if poor:
+        notes.append(
+            f"The step does not determine {' and '.join(poor)}: the answer of '{response}' does not stand out of the noise, or "
+            "the window ends before it settles."
+        )
+    unit = f"{record.units.get(response, '1')}/{record.units.get(source, '1')}"
+    return TransferFit(
+        form=form,
+        names=names,
+        values=dict(zip(names, map(float, values), strict=True)),
+        standard_errors=dict(zip(names, map(float, errors), strict=True)),
+        covariance=covariance,
+        residuals=residual,
+        misfit=float("nan"),
+        success=not notes,
+        message=" ".join(notes) or "Converged.",
+        source=source,
+        response=response,
+        unit=unit,
+        method=f"output fit of a step, {problem.begin:g} to {problem.end:g} s",
+        records=(record.name,),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Residuals as a function of the parameters of a form, and of the offset as the last one."""
+
+    form: TransferForm
+    u: NDArray[np.float64]
+    """Input less its value at rest, one sample before the window to its end, shape (1 + n_samples,)."""
+    measured: NDArray[np.float64]
+    dt: float
+    hold: Hold
+    longest_dead_time: float
+    begin: float
+    end: float
+
+    def residual(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return measured minus fitted, shape (n_samples,)."""
+        fitted = self.form.over_time(self.u, self.dt, self.hold, theta[:-1])[1:]
+        return np.asarray(self.measured - theta[-1] - fitted)
+
+    def slopes(self, theta: NDArray[np.float64], upper: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives of the residuals, shape (n_samples, n_parameters)."""
+        columns = []
+        for i in range(theta.size):
+            step = np.zeros_like(theta)
+            scale = max(abs(theta[i]), 1e-6) if i in (0, theta.size - 1) else 1.0
+            if self.form.with_dead_time and i == theta.size - 2:
+                scale = 1e2 * self.dt
+            step[i] = _DIFFERENCE * scale * (-1.0 if theta[i] + _DIFFERENCE * scale > upper[i] else 1.0)
+            columns.append((self.residual(theta + step) - self.residual(theta)) / step[i])
+        return np.column_stack(columns)
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what the parameters may be."""
+        low, high = self._reach()
+        longest = max(self.longest_dead_time, 1e-12)
+        lower = np.append(self.form.vector(low, _DAMPING_RANGE[0], 0.0), -np.inf)
+        upper = np.append(self.form.vector(high, _DAMPING_RANGE[1], longest), np.inf)
+        lower[0], upper[0] = -np.inf, np.inf
+        return lower, upper
+
+    def _reach(self) -> tuple[float, float]:
+        return 0.3 / (self.dt * self.measured.size), 0.8 * np.pi / self.dt
+
+    def starts(self) -> list[NDArray[np.float64]]:
+        """Return the best points of the grid, each with gain and offset that fit best there."""
+        low, high = self._reach()
+        dampings = _GRID_DAMPINGS if self.form.order == "pt2" else np.ones(1)
+        delays = (
+            np.linspace(0.0, self.longest_dead_time, _GRID_DEAD_TIMES)
+            if self.form.with_dead_time
+            else np.zeros(1)
+        )
+        found = []
+        for omega_b, zeta, delay in itertools.product(
+            np.geomspace(low, high, _GRID_FREQUENCIES), dampings, delays
+        ):
+            theta = self.form.vector(float(omega_b), float(zeta), float(delay))
+            shape = self.form.over_time(self.u, self.dt, self.hold, theta)[1:]
+            centered = shape - np.mean(shape)
+            theta[0] = centered @ self.measured / max(float(centered @ centered), 1e-300)
+            offset = float(np.mean(self.measured - theta[0] * shape))
+            error = float(np.sum((self.measured - theta[0] * shape - offset) ** 2))
+            found.append((error, np.append(theta, offset)))
+        found.sort(key=lambda pair: pair[0])
+        return [theta for _, theta in found[:_STARTS]]
+
+
+def _problem(
+    record: Record,
+    source: str,
+    response: str,
+    form: TransferForm,
+    start: float | None,
+    stop: float | None,
+    longest_dead_time: float,
+) -> _Problem:
+    t, dt = record.t, record.dt
+    begin = t[0] if start is None else start
+    end = t[-1] if stop is None else stop
+    inside = np.flatnonzero((t >= begin - 0.5 * dt) & (t <= end + 0.5 * dt))
+    what = f"Record '{record.name}', {begin:g} to {end:g} s"
+    if inside.size < _LEAST_AFTER:
+        raise InputError(
+            f"{what}: the window holds {inside.size} samples, at least {_LEAST_AFTER} are needed. The record reaches from "
+            f"{t[0]:g} to {t[-1]:g} s."
+        )
+    first, last = int(inside[0]), int(inside[-1]) + 1
+    before = max(first - 1, 0)
+    u = record[source][before:last]
+    # A record that begins with the window rested at its first sample.
+    u = np.concatenate([u[:1], u]) if first == before else u
+    scatter = float(np.median(np.abs(np.diff(u))))
+    if np.ptp(u) <= max(_STEP_OVER_NOISE * scatter, 1e-12 * float(np.max(np.abs(u)))):
+        raise InputError(
+            f"{what}: '{source}' makes no step, it stays between {np.min(u):.4g} and {np.max(u):.4g}. Choose a window that "
+            "begins before the step or with it."
+        )
+    jump = int(np.argmax(np.abs(u - u[0]) > 0.5 * np.max(np.abs(u - u[0]))))
+    if u.size - jump < _LEAST_AFTER:
+        raise InputError(
+            f"{what}: '{source}' steps {u.size - jump} samples before the end; at least {_LEAST_AFTER} samples of the answer are "
+            "needed. End the window later."
+        )
+    return _Problem(
+        form,
+        u - u[0],
+        np.asarray(record[response][first:last]),
+        dt,
+        record.hold,
+        longest_dead_time,
+        float(begin),
+        float(end),
+    )

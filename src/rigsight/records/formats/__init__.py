@@ -1,0 +1,1 @@
+"""Measurement files of every format, read so that a damaged one harms nothing."""

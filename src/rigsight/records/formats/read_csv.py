@@ -1,0 +1,263 @@
+"""How do columns of a delimited text file become numbers in SI units?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, nearest
+from rigsight.records.column_mapping import ColumnMapping, Columns
+from rigsight.records.formats.channel import check_count, printable
+from rigsight.records.formats.dialect import Dialect, is_comment, looks_like_names, sniff
+from rigsight.records.formats.text_file import read_text
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the columns of a text file are laid out.
+
+    Attributes
+    ----------
+    dialect
+        How cells and numbers are written.
+    names
+        Of the columns; their numbers where the file has no header.
+    n_above
+        How many of the kept lines stand above the first row of numbers.
+    has_names
+        Whether the file has a header.
+    notes
+        What was assumed.
+    units
+        Cells of a units row, empty where there is none.
+    """
+
+    dialect: Dialect
+    names: tuple[str, ...]
+    n_above: int
+    has_names: bool
+    notes: tuple[str, ...]
+    units: tuple[str, ...] = ()
+
+
+def read_csv(
+    path: Path,
+    columns: Mapping[str, ColumnMapping],
+    *,
+    optional: Sequence[str] = (),
+    separator: str | None = None,
+    decimal: str | None = None,
+    header: bool | None = None,
+    comment: str | None = None,
+) -> Columns:
+    """Read the columns that `columns` asks for; others may hold anything.
+
+    Parameters
+    ----------
+    path
+        Text file in UTF-8, UTF-16 with a byte order mark, or Latin-1.
+    columns
+        Signal name -> where it stands.
+    optional
+        Signals that may be missing.
+    separator, decimal, header, comment
+        The file's dialect; what is None is found out.
+
+    Raises
+    ------
+    InputError
+        Naming file, line and column, and the mend: the file cannot be read or is too large, a column is missing,
+        a row has another width, a cell is not a finite number.
+    """
+    if separator is not None and (len(separator) != 1 or separator in '"\r\n'):
+        raise InputError(
+            f"{path.name}: separator is {separator!r}; name one character, neither a quote nor a line end."
+        )
+    if separator is not None and separator == decimal:
+        raise InputError(
+            f"{path.name}: separator and decimal sign are both '{decimal}'; name two different ones."
+        )
+    lines = read_text(path).split("\n")
+    kept = kept_lines(lines, comment)
+    if not kept:
+        raise InputError(
+            f"{path.name} is empty (nothing but blank or comment lines): a header and rows of numbers are needed."
+        )
+    layout = find_layout(path, lines, kept, separator, decimal, header, comment)
+    found = {
+        signal: position
+        for signal, mapping in columns.items()
+        if (position := _position(path, signal, mapping, layout, signal in optional)) is not None
+    }
+    rows = kept[layout.n_above :]
+    if not rows:
+        raise InputError(f"{path.name} has a header but no rows of numbers below line {kept[-1]}.")
+    table = _numbers(path, lines, rows, layout, found) if found else np.empty((len(rows), 0))
+    values = {signal: np.ascontiguousarray(table[:, i]) for i, signal in enumerate(found)}
+    for signal, column in values.items():
+        finite = np.isfinite(column)
+        if not finite.all():
+            row, count = int(np.argmin(finite)), int(np.count_nonzero(~finite))
+            raise InputError(
+                f"{path.name}, line {rows[row]}, column '{layout.names[found[signal]]}': {column[row]} is not a finite "
+                f"number ({count} such cell{'s' if count > 1 else ''}). Cut the record there or fill the gap before reading."
+            )
+    labels = {signal: layout.names[position] for signal, position in found.items()}
+    return Columns(values, labels, np.array(rows, dtype=np.int64), layout.notes)
+
+
+def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:
+    """Return the numbers, from 1, of the lines that are neither blank nor comments."""
+    return [
+        number
+        for number, line in enumerate(lines, 1)
+        if line and not line.isspace() and not is_comment(line, comment)
+    ]
+
+
+def find_layout(
+    path: Path,
+    lines: Sequence[str],
+    kept: Sequence[int],
+    separator: str | None,
+    decimal: str | None,
+    header: bool | None,
+    comment: str | None,
+) -> Layout:
+    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out."""
+    dialect = sniff([lines[number - 1] for number in kept[:100]], separator, decimal)
+    first = [printable(cell) for cell in dialect.cells(lines[kept[0] - 1])]
+    check_count(path.name, len(first))
+    if header is None:
+        header = looks_like_names(dialect, first)
+    if not header:
+        names = _names_in_comment(lines, kept[0], dialect, len(first), comment)
+        numbers = tuple(str(i + 1) for i in range(len(first)))
+        return Layout(dialect, names or numbers, 0, bool(names), ())
+    notes: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    n_above = 1
+    if len(kept) > 1:
+        second = [printable(cell) for cell in dialect.cells(lines[kept[1] - 1])]
+        if any(second) and all(dialect.is_text(cell) for cell in second):
+            n_above = 2
+            units = tuple(second)
+            listed = ", ".join(second)
+            notes = (
+                f"{path.name}, line {kept[1]}: taken as a row of units ({listed}); values are not converted by it.",
+            )
+    return Layout(dialect, tuple(first), n_above, True, notes, units)
+
+
+def _names_in_comment(
+    lines: Sequence[str], first_row: int, dialect: Dialect, width: int, comment: str | None
+) -> tuple[str, ...] | None:
+    """Return the names in a commented header right above the first row, where there is one."""
+    if first_row < 2 or not is_comment(lines[first_row - 2], comment):
+        return None
+    above = lines[first_row - 2].strip()
+    names = [
+        printable(name)
+        for name in dialect.cells(above.removeprefix(comment) if comment else above.lstrip("#%/"))
+    ]
+    names = [name for name in names if name] if dialect.separator == " " else names
+    return tuple(names) if len(names) == width and looks_like_names(dialect, names) else None
+
+
+def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, optional: bool) -> int | None:
+    """Return the index of a signal's column, None if it is missing and may be."""
+    listed = ", ".join(f"'{name}'" for name in layout.names)
+    if isinstance(mapping.name, int):
+        if 1 <= mapping.name <= len(layout.names):
+            return mapping.name - 1
+        raise InputError(
+            f"{path.name}: signal '{signal}' is to stand in column {mapping.name}, "
+            f"but the columns are 1 to {len(layout.names)}: {listed}."
+        )
+    count = layout.names.count(mapping.name)
+    if count == 1:
+        return layout.names.index(mapping.name)
+    if count > 1:
+        raise InputError(
+            f"{path.name}: {count} columns are called '{mapping.name}'; "
+            f"name the one for signal '{signal}' by its number, counted from 1."
+        )
+    if optional:
+        return None
+    if not layout.has_names:
+        raise InputError(
+            f"{path.name} has no header, so there is no column '{mapping.name}' for signal '{signal}'; "
+            f"name it by its number, 1 to {len(layout.names)}: {signal} = 1, for instance."
+        )
+    hint = nearest(mapping.name, layout.names)
+    raise InputError(
+        f"{path.name} has no column '{mapping.name}' for signal '{signal}'.{hint} Its columns: {listed}. "
+        "Map it under columns, or name the separator if these are not the columns."
+    )
+
+
+def _numbers(
+    path: Path, lines: Sequence[str], rows: Sequence[int], layout: Layout, found: Mapping[str, int]
+) -> NDArray[np.float64]:
+    """Return the columns asked for, shape (n_rows, n_columns asked for)."""
+    dialect = layout.dialect
+    texts = [lines[number - 1] for number in rows]
+    _check_widths(path, texts, rows, layout)
+    if dialect.decimal == ",":
+        if any("." in text for text in texts):
+            _report_culprit(path, texts, rows, layout, found)
+        texts = [text.replace(",", ".") for text in texts]
+    try:
+        table = np.loadtxt(
+            texts,
+            delimiter=None if dialect.separator == " " else dialect.separator,
+            usecols=list(found.values()),
+            quotechar='"',
+            comments=None,
+            ndmin=2,
+        )
+    except ValueError:
+        _report_culprit(path, [lines[number - 1] for number in rows], rows, layout, found)
+        raise InputError(f"{path.name} cannot be read as numbers; name separator and decimal sign.") from None
+    return np.asarray(table, dtype=np.float64)
+
+
+def _check_widths(path: Path, texts: Sequence[str], rows: Sequence[int], layout: Layout) -> None:
+    """Refuse rows of another width: a cut last line, or a decimal comma between commas."""
+    separator = layout.dialect.separator
+    width = len(layout.names)
+    for text, number in zip(texts, rows, strict=True):
+        n_cells = len(text.split()) if separator == " " else text.count(separator) + 1
+        if n_cells != width and (n_cells := len(layout.dialect.cells(text))) != width:
+            ends = number == rows[-1]
+            mend = (
+                "The file ends there: delete the incomplete line."
+                if ends
+                else "Mend it, or name separator and decimal sign."
+            )
+            raise InputError(f"{path.name}, line {number}: {n_cells} columns, but {width} above it. {mend}")
+
+
+def _report_culprit(
+    path: Path, texts: Sequence[str], rows: Sequence[int], layout: Layout, found: Mapping[str, int]
+) -> None:
+    """Raise for the first cell that is not a number; slow, so only after the fast reading failed."""
+    dialect = layout.dialect
+    for text, number in zip(texts, rows, strict=True):
+        cells = dialect.cells(text)
+        for position in found.values():
+            cell = cells[position]
+            if dialect.number(cell) is not None:
+                continue
+            other = Dialect(dialect.separator, "," if dialect.decimal == "." else ".")
+            if not cell:
+                what = "the cell is empty. Cut the record there or fill the gap before reading."
+            elif other.number(cell) is not None:
+                what = f"'{cell}' has another decimal sign than '{dialect.decimal}'. Name it: decimal = \"{other.decimal}\"."
+            else:
+                what = f"'{cell}' is not a number. Mend the cell; time is given as a number of seconds."
+            raise InputError(f"{path.name}, line {number}, column '{layout.names[position]}': {what}")

@@ -1,0 +1,75 @@
+"""Which channels does an HDF5 file hold?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from rigsight.records.formats.channel import (
+    Channel,
+    ChannelFile,
+    Refused,
+    check_count,
+    columns_of,
+    kept_last,
+    stated_unit,
+    with_distinct_names,
+)
+
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+
+
+def open_hdf5(path: Path) -> Iterator[ChannelFile]:
+    """Yield the channels of an HDF5 file: every real dataset, named by its path; units from its attribute ``unit``.
+
+    Time is a dataset like any other. Links into other files are not followed and references not resolved: a file that was
+    sent to someone must not read what is none of its business.
+    """
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        channels: list[Channel] = []
+        refused: list[Refused] = []
+        kept: dict[str, NDArray[Any]] = {}
+
+        def visit(stored: str | bytes, item: Any) -> None:
+            # A name that is no UTF-8 comes as bytes.
+            name = stored.decode("utf-8", errors="replace") if isinstance(stored, bytes) else stored
+            check_count(path.name, len(channels) + len(refused))
+            if not isinstance(item, h5py.Dataset):
+                return
+            read = kept_last(kept, name, lambda: item[()])
+            found = columns_of(name, item.shape or (), read, _unit(item))
+            reason = _refusal(item)
+            if reason is not None:
+                refused.append(Refused(name, reason))
+            elif isinstance(found, Refused):
+                refused.append(found)
+            else:
+                channels.extend(found)
+
+        file.visititems(visit)
+        yield ChannelFile("HDF5", with_distinct_names(channels), tuple(refused))
+
+
+def _refusal(dataset: Any) -> str | None:
+    """Return why a dataset is no channel, None if it may be one."""
+    if dataset.shape is None:
+        return "is empty"
+    if dataset.dtype.kind == "O":
+        return "holds text or object references, which are not followed"
+    if dataset.dtype.kind not in "iuf":
+        return f"is of type {dataset.dtype}, no real numbers"
+    if dataset.is_virtual or dataset.external:
+        return "keeps its data in another file, which is not followed; copy the data into this one"
+    return None
+
+
+def _unit(dataset: Any) -> str | None:
+    for name in UNIT_ATTRIBUTES:
+        if name in dataset.attrs:
+            return stated_unit(dataset.attrs[name])
+    return None

@@ -1,0 +1,94 @@
+"""Which channels does an MDF4 file (ASAM, automotive loggers) hold?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.formats.channel import (
+    Channel,
+    ChannelFile,
+    Load,
+    Refused,
+    TimeAxis,
+    check_count,
+    stated_unit,
+    with_distinct_names,
+)
+
+# Types of asammdf.blocks.v4_constants: numbers, and conversions that are formulas with numbers, not text.
+_NUMBERS = range(6)
+_NO_CONVERSION, _ALGEBRAIC, _LAST_NUMERIC = (None, 0), 3, 6
+_FORMULA = "is converted by a formula in text, which is not executed; export it with physical values"
+
+
+def open_mdf(path: Path) -> Iterator[ChannelFile]:
+    """Yield the channels of an MDF file of version 4, each with the time of its group.
+
+    Channels whose conversion is a formula in text are refused: evaluating it would execute what the file says.
+    """
+    from asammdf import MDF
+
+    with path.open("rb") as stream:
+        if stream.read(12)[8:9] < b"4":
+            raise InputError(
+                f"{path.name} is an MDF file of version 2 or 3; save it as version 4.10 or newer."
+            )
+        stream.seek(0)
+        with MDF(stream) as file:
+            channels: list[Channel] = []
+            refused: list[Refused] = []
+            groups: list[Any] = list(file.groups)
+            for number, group in enumerate(groups):
+                master = file.masters_db.get(number)
+                n_samples = int(group.channel_group.cycles_nr)
+                axis = _axis(file, group, number, master, n_samples)
+                label = group.channel_group.acq_name or f"group {number + 1}"
+                prefix = f"{label}/" if len(groups) > 1 else ""
+                for index, channel in enumerate(group.channels):
+                    check_count(path.name, len(channels) + len(refused))
+                    if index == master:
+                        continue
+                    name = prefix + channel.name
+                    reason = _refusal(channel, n_samples, axis)
+                    if reason is not None:
+                        refused.append(Refused(name, reason))
+                        continue
+                    unit = stated_unit(channel.unit) or stated_unit(getattr(channel.conversion, "unit", None))
+                    channels.append(Channel(name, n_samples, _load(file, number, index), unit, axis))
+            yield ChannelFile("MDF4", with_distinct_names(channels), tuple(refused))
+
+
+def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int) -> TimeAxis | None:
+    if master is None or _conversion(group.channels[master]) == _ALGEBRAIC:
+        return None
+    unit = stated_unit(group.channels[master].unit) or "s"
+    return TimeAxis(n_samples, load=lambda: file.get_master(number), unit=unit)
+
+
+def _load(file: Any, number: int, index: int) -> Load:
+    def samples() -> NDArray[Any]:
+        read: NDArray[Any] = file.get(group=number, index=index, samples_only=True)[0]
+        return read
+
+    return samples
+
+
+def _refusal(channel: Any, n_samples: int, axis: TimeAxis | None) -> str | None:
+    """Return why a channel is no signal, None if it may be one."""
+    conversion = _conversion(channel)
+    if conversion == _ALGEBRAIC:
+        return _FORMULA
+    if channel.data_type not in _NUMBERS or (conversion not in _NO_CONVERSION and conversion > _LAST_NUMERIC):
+        return "holds text, a list or other bytes, no numbers"
+    if n_samples < 2:
+        return "holds a single number" if n_samples else "is empty"
+    return None if axis is not None else "has no time"
+
+
+def _conversion(channel: Any) -> int | None:
+    return None if channel.conversion is None else int(channel.conversion.conversion_type)

@@ -1,0 +1,79 @@
+"""Which channels does a Parquet file hold?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.records.formats.channel import (
+    Channel,
+    ChannelFile,
+    Load,
+    Refused,
+    check_count,
+    stated_unit,
+    with_distinct_names,
+)
+from rigsight.records.formats.time_stamps import seconds_since_first
+
+UNIT_KEYS = (b"unit", b"units", b"Unit", b"Units")
+
+
+def open_parquet(path: Path) -> Iterator[ChannelFile]:
+    """Yield the columns of numbers of a Parquet file; units from the metadata ``unit`` of a column.
+
+    Time is a column like any other; dates and durations count in seconds from the first.
+    """
+    from pyarrow.parquet import ParquetFile
+
+    with ParquetFile(path) as file:
+        schema = file.schema_arrow
+        check_count(path.name, len(schema))
+        n_rows = file.metadata.num_rows
+        channels: list[Channel] = []
+        refused: list[Refused] = []
+        for column in schema:
+            if schema.names.count(column.name) > 1:
+                refused.append(Refused(column.name, "stands twice in the file"))
+            elif not _is_numeric(column.type):
+                refused.append(Refused(column.name, f"is of type {column.type}, no numbers"))
+            elif n_rows < 2:
+                refused.append(Refused(column.name, "holds a single number" if n_rows else "is empty"))
+            else:
+                unit = "s" if _is_time(column.type) else _unit(column.metadata)
+                channels.append(Channel(column.name, n_rows, _load(file, column.name), unit))
+        yield ChannelFile("Parquet", with_distinct_names(channels), tuple(refused))
+
+
+def _load(file: Any, name: str) -> Load:
+    def samples() -> NDArray[Any]:
+        column = file.read(columns=[name]).column(name)
+        if _is_time(column.type):
+            return seconds_since_first(column.to_numpy())
+        # Missing cells of whole numbers become NaN, and are told as such.
+        return np.asarray(column.to_numpy())
+
+    return samples
+
+
+def _is_numeric(kind: Any) -> bool:
+    from pyarrow import types
+
+    return bool(types.is_integer(kind) or types.is_floating(kind)) or _is_time(kind)
+
+
+def _is_time(kind: Any) -> bool:
+    from pyarrow import types
+
+    return bool(types.is_timestamp(kind) or types.is_duration(kind))
+
+
+def _unit(metadata: Any) -> str | None:
+    for key in UNIT_KEYS:
+        if metadata and (unit := stated_unit(metadata.get(key))) is not None:
+            return unit
+    return None

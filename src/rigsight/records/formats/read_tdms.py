@@ -1,0 +1,79 @@
+"""Which channels does a TDMS file of LabVIEW hold?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.records.formats.channel import (
+    Channel,
+    ChannelFile,
+    Load,
+    Refused,
+    TimeAxis,
+    stated_unit,
+    with_distinct_names,
+)
+from rigsight.records.formats.time_stamps import seconds_since_first
+
+UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
+
+
+def open_tdms(path: Path) -> Iterator[ChannelFile]:
+    """Yield the channels of a TDMS file, named ``group/channel``.
+
+    A waveform's own axis comes from ``wf_increment`` and ``wf_start_offset``, its unit from ``unit_string``. A channel of time
+    stamps counts in seconds from its first.
+    """
+    from nptdms import TdmsFile
+
+    with TdmsFile.open(path) as file:
+        if file.file_status.incomplete_final_segment:
+            raise ValueError("the last segment is incomplete")
+        channels: list[Channel] = []
+        refused: list[Refused] = []
+        for group in file.groups():
+            for channel in group.channels():
+                name = f"{group.name}/{channel.name}"
+                kind = np.dtype(channel.dtype).kind
+                if kind not in "iufM":
+                    refused.append(
+                        Refused(name, "holds text or complex numbers" if len(channel) else "is empty")
+                    )
+                elif len(channel) < 2:
+                    refused.append(Refused(name, "holds a single number" if len(channel) else "is empty"))
+                else:
+                    unit = "s" if kind == "M" else _unit(channel.properties)
+                    channels.append(Channel(name, len(channel), _load(channel, kind), unit, _axis(channel)))
+        yield ChannelFile("TDMS", with_distinct_names(channels), tuple(refused))
+
+
+def _load(channel: Any, kind: str) -> Load:
+    def samples() -> NDArray[Any]:
+        read: NDArray[Any] = channel[:]
+        return seconds_since_first(read) if kind == "M" else read
+
+    return samples
+
+
+def _axis(channel: Any) -> TimeAxis | None:
+    properties = channel.properties
+    increment = properties.get("wf_increment")
+    if not isinstance(increment, int | float) or not increment > 0.0:
+        return None
+    start = properties.get("wf_start_offset", 0.0)
+    unit = stated_unit(properties.get("wf_xunit_string")) or "s"
+    return TimeAxis(
+        len(channel), float(increment), float(start) if isinstance(start, int | float) else 0.0, unit=unit
+    )
+
+
+def _unit(properties: Any) -> str | None:
+    for name in UNIT_PROPERTIES:
+        if (unit := stated_unit(properties.get(name))) is not None:
+            return unit
+    return None

@@ -1,0 +1,91 @@
+"""What does a reader say about a file, asked in a process of its own?
+
+asammdf, libhdf5, scipy and pyarrow read in C, and a damaged file can make them crash, run in circles or ask for all memory;
+the process that asked then gets a message instead. Run as ``python -P -m rigsight.records.formats.reader_process FORMAT FILE``:
+one line of JSON tells what the file holds; then every line ``channel INDEX`` or ``axis INDEX`` on stdin is answered by a line of
+JSON with type and size of the samples, and their bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+import sys
+import warnings
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from rigsight.records.formats.channel import ChannelFile, TimeAxis
+from rigsight.records.formats.isolated_reader import PACKAGES, most_memory
+
+LONGEST_WORK = 600
+"""Processor time [s]."""
+
+
+def main(kind: str, path: Path) -> None:
+    """Answer until stdin ends."""
+    answers = os.fdopen(os.dup(1), "wb")
+    # What libraries print must not come between the answers.
+    os.dup2(2, 1)
+    logging.disable(logging.CRITICAL)
+    warnings.simplefilter("ignore")
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        # Who asked ends what runs in circles; if it was killed, nobody does.
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
+    reader = getattr(import_module(f"rigsight.records.read_{kind}"), f"open_{kind}")
+    try:
+        # Before the limit: what libraries set aside for their threads is no matter of the file.
+        import_module(PACKAGES[kind])
+        limit_memory(most_memory(path))
+        with contextlib.contextmanager(reader)(path) as file:
+            axes = list(dict.fromkeys(one.axis for one in file.channels if one.axis is not None))
+            _answer(answers, _contents(file, axes))
+            for line in sys.stdin:
+                what, index = line.split()
+                load = file.channels[int(index)].load if what == "channel" else axes[int(index)].stamps
+                samples = np.ascontiguousarray(load())
+                answer = {"type": samples.dtype.str, "n_bytes": samples.nbytes}
+                _answer(answers, answer, samples.tobytes())
+    except Exception as error:
+        _answer(answers, {"error": type(error).__name__, "reason": str(error)})
+    # Clearing up after a failure may fail as well.
+    answers.flush()
+    os._exit(0)
+
+
+def limit_memory(more: int) -> None:
+    """Let this process take so many bytes from now on and no more, where the system can be told so."""
+    with contextlib.suppress(ImportError, ValueError, OSError, IndexError):
+        import resource
+
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
+        limit = pages * resource.getpagesize() + more
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+
+
+def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> None:
+    answers.write(json.dumps(content).encode() + b"\n" + data)
+    answers.flush()
+
+
+def _contents(file: ChannelFile, axes: list[TimeAxis]) -> dict[str, Any]:
+    return {
+        "format": file.format,
+        "channels": [
+            [one.name, one.n_samples, one.unit, None if one.axis is None else axes.index(one.axis)]
+            for one in file.channels
+        ],
+        "axes": [[axis.n_samples, axis.unit] for axis in axes],
+        "refused": [[one.name, one.reason] for one in file.refused],
+    }
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))

@@ -1,0 +1,1 @@
+"""The score of a blind bench for people: words, figures, page, text."""

@@ -1,0 +1,166 @@
+"""What does a rig file hold? Its tables, its expressions as parsed, and the place of each, for messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NoReturn
+
+import sympy as sp
+from pydantic import ValidationError
+
+from rigsight.errors import InputError
+from rigsight.rigs.mechanism import reading_symbol
+from rigsight.rigs.reading.expression_values import to_sympy
+from rigsight.rigs.reading.expressions import (
+    Expression,
+    ExpressionError,
+    force_name,
+    parsed,
+    rate_name,
+)
+from rigsight.rigs.reading.rig_tables import RigTable, told
+
+Path = tuple[str | int, ...]
+
+NAMED = ("inputs", "constants", "parameters", "alternatives", "coordinates", "states", "signals", "drives")
+"""Tables whose names no two entries may share."""
+JOINT_PARTS = ("motion", "stiffness", "damping", "rest", "force")
+DRIVE_PARTS = ("signal", "force", "along")
+_EXPRESSIONS: Mapping[str, tuple[str, ...]] = {
+    "joints": (*JOINT_PARTS, "inertia"),
+    "drives": DRIVE_PARTS,
+    "sensors": ("reads",),
+    "states": ("rate", "start"),
+    "alternatives": ("value",),
+}
+"""Keys of each table whose values are expressions."""
+_LONGEST_QUOTE = 60
+
+
+class Declaration:
+    """The tables of a rig file with their expressions.
+
+    Parameters
+    ----------
+    content
+        What TOML made of the file.
+    places
+        Line and column of each value, see `toml_places`.
+    source
+        How messages call the file.
+
+    Attributes
+    ----------
+    content, table
+        Its tables, as TOML made them and as they are checked.
+    expressions
+        Each expression by its path of keys.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown or missing, a value has the wrong type, or an expression cannot be read.
+    """
+
+    def __init__(self, content: dict[str, Any], places: Mapping[Path, tuple[int, int]], source: str) -> None:
+        self.content = content
+        self._places = places
+        self._source = source
+        try:
+            self.table = RigTable.model_validate(content)
+        except ValidationError as error:
+            # A key that is missing may be the one that is misspelled.
+            first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
+            self.refuse(*told(first))
+        self.expressions: dict[Path, Expression] = {}
+        self._parse()
+        self.symbols = self._declared_symbols()
+
+    def refuse(self, path: Path, message: str, within: int | None = None) -> NoReturn:
+        """Raise a message with the place of a value, or of the nearest table around it.
+
+        Parameters
+        ----------
+        path
+            Keys of the value.
+        message
+            What is wrong, what was got and what to write, without a full stop.
+        within
+            Character of the value that it is about, from 0.
+        """
+        place, length = None, 0
+        for length in range(len(path), 0, -1):
+            own = path[:length]
+            # A table may have no header of its own, but one within it.
+            place = self._places.get(own) or next(
+                (inner for key, inner in self._places.items() if key[:length] == own), None
+            )
+            if place is not None:
+                break
+        where = ""
+        if place is not None:
+            column = place[1] + (within + 1 if within is not None and len(path) == length else 0)
+            where = f", line {place[0]}, column {column}"
+        named = ".".join(map(str, path))
+        raise InputError(
+            f"{self._source}{where}: {named}: {message}." if named else f"{self._source}{where}: {message}."
+        )
+
+    def refuse_expression(self, path: Path, error: ExpressionError) -> NoReturn:
+        """Raise what is wrong with an expression, with a quote of it."""
+        text = self.expressions[path].text if path in self.expressions else ""
+        self.refuse(path, f"{error}, in '{quoted(text)}'" if text else str(error), error.place)
+
+    def names(self, *keys: str) -> set[str]:
+        """Return the names that tables declare."""
+        return {name for key in keys for name in getattr(self.table, key)}
+
+    def reads_sensor(self, path: Path, name: str) -> bool:
+        """Return True if a name in an expression is a sensor's reading, not the coordinate or state that is called the same."""
+        if name not in self.table.sensors:
+            return False
+        shared = name in self.table.coordinates or name in self.table.states
+        in_control = path[0] == "drives" and path[-1] == "signal"
+        return in_control or not shared
+
+    def sympy(self, path: Path) -> sp.Expr:
+        """Return an expression as sympy sees it."""
+        symbols: dict[str, sp.Expr] = dict(self.symbols)
+        symbols |= {
+            name: reading_symbol(name) for name in self.table.sensors if self.reads_sensor(path, name)
+        }
+        try:
+            return to_sympy(self.expressions[path], symbols)
+        except ExpressionError as error:
+            self.refuse_expression(path, error)
+
+    def _parse(self) -> None:
+        table = self.table
+        for name in ("kinetic", "potential"):
+            self._parse_one(("energy", name), getattr(table.energy, name))
+        for key, fields in _EXPRESSIONS.items():
+            for name, own in getattr(table, key).items():
+                for field in fields:
+                    if getattr(own, field) is not None:
+                        self._parse_one((key, name, field), getattr(own, field))
+        for key in ("signals", "initial"):
+            for name, formula in getattr(table, key).items():
+                self._parse_one((key, name), formula)
+
+    def _parse_one(self, path: Path, formula: str | float) -> None:
+        text = formula if isinstance(formula, str) else f"{formula:.17g}"
+        try:
+            self.expressions[path] = parsed(text)
+        except ExpressionError as error:
+            self.refuse(path, f"{error}, in '{quoted(text)}'" if text.strip() else str(error), error.place)
+
+    def _declared_symbols(self) -> dict[str, sp.Symbol]:
+        names = [*self.names(*NAMED, "sensors"), *map(force_name, self.table.joints)]
+        rates = {rate_name(name): own.rate or rate_name(name) for name, own in self.table.coordinates.items()}
+        written = dict(zip(names, names, strict=True)) | rates
+        return {name: sp.Symbol(symbol, real=True) for name, symbol in written.items()}
+
+
+def quoted(text: str) -> str:
+    """Return the text of an expression as messages quote it."""
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[: _LONGEST_QUOTE - 3]}..."

@@ -1,0 +1,243 @@
+"""Are the names of a rig file free, known where they are read, and read at all?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rigsight.errors import nearest, shown
+from rigsight.rigs.reading.declaration import NAMED, Declaration, Path
+from rigsight.rigs.reading.expressions import RATE, force_name, is_identifier, rate_name
+from rigsight.rigs.reading.functions import FUNCTIONS
+
+_LONGEST_NAME = 60
+_NEEDED = {
+    "coordinates": "something that moves",
+    "joints": "a place where friction and other effects can act; one that resists nothing has a motion alone",
+    "sensors": "something that is recorded",
+}
+"""Tables without which there is nothing to diagnose."""
+_PLACES = ("joints", "drives", "sensors")
+"""Tables whose entries are places where effects act."""
+
+
+def check_declared_names(declaration: Declaration) -> None:
+    """Refuse names that are none, that are taken, and those that stand for nothing where a name must.
+
+    Raises
+    ------
+    InputError
+        With the place of the name.
+    """
+    table = declaration.table
+    for key, what in _NEEDED.items():
+        if not getattr(table, key):
+            declaration.refuse((), f"a rig needs at least one [{key}.NAME], {what}")
+    # Results and exported files are called after it.
+    _check_name(declaration, ("name",), table.name)
+    taken: dict[str, str] = {}
+    for key in NAMED:
+        for name in getattr(table, key):
+            _check_name(declaration, (key, name), name)
+            _check_free(declaration, (key, name), name, taken)
+            taken[name] = f"{key}.{name}"
+    for name in table.sensors:
+        _check_name(declaration, ("sensors", name), name)
+        # A column may be called as the coordinate or state that it shows.
+        if name not in table.coordinates and name not in table.states:
+            _check_free(declaration, ("sensors", name), name, taken)
+    for name, own in table.coordinates.items():
+        if own.rate is not None:
+            path = ("coordinates", name, "rate")
+            _check_name(declaration, path, own.rate)
+            _check_free(declaration, path, own.rate, taken)
+            taken[own.rate] = f"coordinates.{name}.rate"
+    _check_places(declaration)
+    _check_references(declaration)
+
+
+def _check_name(declaration: Declaration, path: Path, name: str) -> None:
+    if not is_identifier(name):
+        declaration.refuse(
+            path, f"{shown(name)} is no name: letters, digits and _ make one, and it begins with no digit"
+        )
+    # `force` and `d` are functions only where parentheses follow.
+    if name in FUNCTIONS or name == "t":
+        what = "the time column" if name == "t" else "a function"
+        declaration.refuse(path, f"'{name}' is {what}; name it otherwise")
+    if len(name) > _LONGEST_NAME:
+        declaration.refuse(path, f"a name may have {_LONGEST_NAME} characters, this one has {len(name)}")
+
+
+def _check_free(declaration: Declaration, path: Path, name: str, taken: dict[str, str]) -> None:
+    if name in taken:
+        declaration.refuse(path, f"the name '{name}' is taken by [{taken[name]}]; name it otherwise")
+
+
+def _check_places(declaration: Declaration) -> None:
+    places: dict[str, str] = {}
+    for key in _PLACES:
+        for name in getattr(declaration.table, key):
+            _check_name(declaration, (key, name), name)
+            if name in places:
+                declaration.refuse(
+                    (key, name),
+                    f"[{places[name]}.{name}] has the same name; effects act at places, so each needs its own",
+                )
+            places[name] = key
+
+
+def _check_references(declaration: Declaration) -> None:
+    """Refuse names in keys and values that stand for a declared thing, and do not."""
+    table = declaration.table
+    for name, own in table.coordinates.items():
+        if own.prescribed_by is not None and own.prescribed_by not in table.inputs:
+            declaration.refuse(
+                ("coordinates", name, "prescribed_by"),
+                f"there is no input '{own.prescribed_by}'.{nearest(own.prescribed_by, table.inputs)} "
+                f"Declared: {_listed(table.inputs)}",
+            )
+    for name, alternative in table.alternatives.items():
+        if alternative.gives not in table.parameters:
+            declaration.refuse(
+                ("alternatives", name, "gives"),
+                f"there is no parameter '{alternative.gives}'.{nearest(alternative.gives, table.parameters)} "
+                f"Declared: {_listed(table.parameters)}",
+            )
+    free = [name for name, own in table.coordinates.items() if own.prescribed_by is None]
+    known = [*free, *map(rate_name, free), *table.states]
+    for name in table.initial:
+        if name in table.states and table.states[name].start is not None:
+            declaration.refuse(
+                ("initial", name), f"'{name}' starts twice: states.{name}.start says it too; take one out"
+            )
+        if name in known:
+            continue
+        if (
+            name in declaration.symbols
+            and name.removeprefix(f"{RATE}(").removesuffix(")") in table.coordinates
+        ):
+            declaration.refuse(
+                ("initial", name),
+                f"'{name}' is prescribed by an input, which says where it starts; take it out",
+            )
+        declaration.refuse(
+            ("initial", name),
+            f"'{name}' is no coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}",
+        )
+
+
+def check_names_read(declaration: Declaration) -> None:
+    """Refuse names that an expression cannot read.
+
+    Raises
+    ------
+    InputError
+        With the place of the name.
+    """
+    for path, expression in declaration.expressions.items():
+        allowed = _allowed(declaration, path)
+        for name, place in expression.reads.items():
+            if name not in allowed:
+                declaration.refuse(path, _why_not(declaration, path, name, allowed), place)
+
+
+def _allowed(declaration: Declaration, path: Path) -> set[str]:
+    """Return what an expression may read."""
+    names = declaration.names
+    numbers, motion = names("constants", "parameters"), names("coordinates")
+    rates = set(map(rate_name, motion))
+    everything = numbers | motion | rates | names("inputs", "states", "signals", "drives", "sensors")
+    match path:
+        case ("energy", "potential") | ("joints", _, "motion") | ("drives", _, "along"):
+            return numbers | motion
+        case ("energy", "kinetic"):
+            return numbers | motion | rates
+        case ("joints", _, "force"):
+            return numbers | motion | rates | names("states", "signals")
+        case ("joints", _, _) | ("initial", _) | ("states", _, "start"):
+            return numbers
+        case ("alternatives", name, _):
+            return names("constants") | {str(name)}
+        case ("sensors", _, _):
+            return everything | set(map(force_name, names("joints")))
+    return everything
+
+
+def _made_of(path: Path) -> str:
+    """Return in words what an expression is made of."""
+    match path:
+        case ("energy", "kinetic"):
+            return "a kinetic energy is made of coordinates, rates, parameters and constants"
+        case ("energy", "potential"):
+            return "a potential energy is made of coordinates, parameters and constants"
+        case ("joints", _, "motion"):
+            return "a joint's motion is made of coordinates, parameters and constants"
+        case ("joints", _, "force"):
+            return "a joint's force is made of coordinates, rates, states, signals, parameters and constants"
+        case ("joints", _, part):
+            return f"a joint's {part} is made of parameters and constants"
+        case ("drives", _, "along"):
+            return "what a force acts along is made of coordinates, parameters and constants"
+        case ("alternatives", name, _):
+            return f"the value that follows is made of '{name}' and of constants"
+    return "a start value is made of parameters and constants"
+
+
+def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str]) -> str:
+    """Return why an expression cannot read a name, and what to write."""
+    table = declaration.table
+    inner = name.partition("(")[2].removesuffix(")")
+    if name in declaration.symbols:
+        if inner in table.joints and name == force_name(inner):
+            return (
+                f"'{name}' can be read by sensors alone: the force of a joint can be recorded, not fed back"
+            )
+        if name in table.alternatives:
+            return f"'{name}' is known in the place of '{table.alternatives[name].gives}'; read that one"
+        return f"'{name}' cannot be read here: {_made_of(path)}"
+    if name == force_name(inner):
+        return f"there is no joint '{inner}'.{nearest(inner, table.joints)} Joints: {_listed(table.joints)}"
+    if inner:
+        return (
+            f"'{name}' is a rate, and there is no coordinate '{inner}'.{nearest(inner, table.coordinates)} "
+            f"Coordinates: {_listed(table.coordinates)}"
+        )
+    rate = next(
+        (r for r in map(rate_name, table.coordinates) if name == r.replace("(", "").replace(")", "")), None
+    )
+    meant = nearest(name, allowed) if rate is None else f" Did you mean '{rate}'?"
+    declare = f"[parameters.{name}] to identify it, [constants.{name}] if it is known"
+    return f"'{name}' is not declared.{meant} {'Or declare' if meant else 'Declare'} it: {declare}"
+
+
+def check_all_used(declaration: Declaration) -> None:
+    """Refuse what no equation reads: it would be ignored.
+
+    Raises
+    ------
+    InputError
+        With the place of its table.
+    """
+    table, expressions = declaration.table, declaration.expressions
+    read = {name for expression in expressions.values() for name in expression.reads}
+    read |= {own.prescribed_by for own in table.coordinates.values() if own.prescribed_by is not None}
+    for key in ("inputs", "constants", "parameters", "signals"):
+        for name in getattr(table, key):
+            if name not in read:
+                declaration.refuse((key, name), f"no equation reads '{name}'; take it out, or use it")
+    for name in table.drives:
+        # The force may follow from a state that the drive moves: a current, a pressure.
+        if not any(name in e.reads for path, e in expressions.items() if path != ("drives", name, "signal")):
+            declaration.refuse(
+                ("drives", name, "force"),
+                f"neither it nor another equation reads '{name}', the drive's signal behind the effects; write '{name}' in it",
+            )
+    for name in table.alternatives:
+        if name not in expressions["alternatives", name, "value"].reads:
+            declaration.refuse(
+                ("alternatives", name, "value"), f"it does not read '{name}', from which it is to follow"
+            )
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"

@@ -1,0 +1,225 @@
+"""Do the units of an expression add up?
+
+A number that is part of a formula (2, 0.5) is a plain number. Any other (9.81) may stand for a constant whose unit nobody wrote:
+what it multiplies may have any unit. Angles count as plain numbers, as in SI.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from functools import cache
+from tokenize import TokenError
+from typing import Any
+
+from lark import Token, Tree
+
+from rigsight.rigs.reading.expressions import READS, Expression, ExpressionError, constant, place_of
+from rigsight.rigs.reading.functions import FUNCTIONS
+from rigsight.units import INPUT_UNIT
+
+Dimension = Any
+"""Powers of the base quantities, as pint holds them; None for anything."""
+
+_UNIT = re.compile(r"(?:1|[A-Za-zµΩ°%()]++(?:\^-?\d)?|[ */])+")
+_LONGEST = 60
+_LARGEST_POWER = 100
+"""Largest power of a base unit in a message; equations whose units add up have small ones."""
+_FORMULA_NUMBER = re.compile(r"\d|\d\.(?:0|5|25|75)|0\.125")
+_WORD = re.compile(r"[A-Za-zΩ]+")
+_USUAL = {"Nm": "N m", "Nms": "N m s", "Ohm": "ohm", "Ω": "ohm"}
+
+
+class UnitError(ValueError):
+    """What is wrong with the text of a unit."""
+
+
+@cache
+def dimension(unit: str) -> Dimension:
+    """Return what a unit measures.
+
+    Raises
+    ------
+    UnitError
+        If nobody knows the unit, or it is not the SI unit of what it measures: equations hold in SI alone.
+    """
+    from pint.errors import PintError
+
+    text = (
+        _WORD.sub(lambda word: _USUAL.get(word[0], word[0]), unit.strip())
+        .replace("²", "^2")
+        .replace("³", "^3")
+        .replace("·", " ")
+    )
+    if text in ("", "1"):
+        return _registry().dimensionless.dimensionality
+    if len(text) > _LONGEST:
+        raise UnitError(f"a unit may have {_LONGEST} characters, this one has {len(text)}")
+    if not _UNIT.fullmatch(text) or re.search(r"\)\s*\^|\(\s*\)", text):
+        raise UnitError(f"'{unit}' is no unit; write one like N m/rad, kg m^2 or 1/s")
+    registry = _registry()
+    try:
+        # A blank multiplies, and what follows a stroke in parentheses is all below it.
+        quantity = registry.Quantity(1.0, registry.parse_units(re.sub(r"(?<=[\w)]) +(?=[\w(])", "*", text)))
+        si = quantity.to_base_units()
+    except (
+        PintError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        AssertionError,
+        OverflowError,
+        ZeroDivisionError,
+        SyntaxError,
+        TokenError,
+    ):
+        raise UnitError(f"the unit '{unit}' is not known; write one like N m/rad, kg m^2 or 1/s") from None
+    if abs(float(si.magnitude) - 1.0) > 1e-12:
+        raise UnitError(
+            f"the unit '{unit}' is not SI: equations hold in {_plain(si.units)}, which is {1.0 / si.magnitude:g} {unit}"
+        )
+    return si.dimensionality
+
+
+@cache
+def _registry() -> Any:
+    from pint import UnitRegistry
+
+    registry: Any = UnitRegistry(cache_folder=None)
+    registry.define(f"{INPUT_UNIT} = [{INPUT_UNIT}]")
+    return registry
+
+
+def unit_of(of: Dimension) -> str:
+    """Return an SI unit of a dimension in base units, for messages."""
+    registry = _registry()
+    return _plain(
+        registry.get_base_units(registry.UnitsContainer({_BASES[name]: power for name, power in of.items()}))[
+            1
+        ]
+    )
+
+
+def measured_in(of: Dimension) -> str:
+    """Return ``"in kg m/s^2"``, or that there is no unit, for messages."""
+    unit = unit_of(of)
+    return "without a unit (angles have none)" if unit == "1" else f"in {unit}"
+
+
+_BASES = {
+    "[length]": "meter",
+    "[mass]": "kilogram",
+    "[time]": "second",
+    "[current]": "ampere",
+    "[temperature]": "kelvin",
+    "[substance]": "mole",
+    "[luminosity]": "candela",
+    f"[{INPUT_UNIT}]": INPUT_UNIT,
+}
+
+
+def _plain(units: Any) -> str:
+    text = f"{units:~C}".replace("**", "^").replace("*", " ")
+    return text or "1"
+
+
+def dimension_of(expression: Expression, dimensions: Mapping[str, Dimension]) -> Dimension:
+    """Return what an expression measures.
+
+    Parameters
+    ----------
+    expression
+        Parsed.
+    dimensions
+        What each name, and each rate as ``"d(name)"``, measures.
+
+    Raises
+    ------
+    ExpressionError
+        If it adds or compares what cannot be, or takes a function of what is no plain number.
+    """
+    return _Walk(expression.text, dimensions).of(expression.tree)
+
+
+class _Walk:
+    def __init__(self, text: str, dimensions: Mapping[str, Dimension]) -> None:
+        self._text = text
+        self._dimensions = dimensions
+        self._plain = _registry().dimensionless.dimensionality
+
+    def of(self, node: Tree[Token] | Token) -> Dimension:
+        assert isinstance(node, Tree)
+        if node.data == "number":
+            text = str(node.children[0])
+            is_plain = _FORMULA_NUMBER.fullmatch(text) is not None and float(text) != 0.0
+            return self._plain if is_plain else None
+        if node.data in READS:
+            name = str(node.children[0])
+            return self._dimensions[READS[str(node.data)](name)]
+        if node.data == "call":
+            return self._call(node)
+        if node.data == "power":
+            return self._power(node)
+        parts = [self.of(child) for child in node.children]
+        if node.data == "sum":
+            return self._same(node.children, parts, "are added or subtracted")
+        if node.data == "product":
+            return None if None in parts else math.prod(parts[1:], start=parts[0])
+        if node.data == "over":
+            return None if parts[0] is None else 1 / parts[0]
+        return parts[0]
+
+    def _call(self, node: Tree[Token]) -> Dimension:
+        name, *arguments = node.children
+        kind, parts = FUNCTIONS[str(name)].kind, [self.of(argument) for argument in arguments]
+        if kind == "pure":
+            if parts[0] is not None and parts[0] != self._plain:
+                raise ExpressionError(
+                    f"{name}(...) takes a plain number, but {self._quoted(arguments[0])} is {measured_in(parts[0])}",
+                    place_of(arguments[0]),
+                )
+            return self._plain
+        if kind == "root":
+            return None if parts[0] is None else parts[0] ** 0.5
+        common = self._same(arguments, parts, f"are compared by {name}")
+        return self._plain if kind in ("sign", "ratio") else common
+
+    def _power(self, node: Tree[Token]) -> Dimension:
+        base, exponent = (self.of(child) for child in node.children)
+        if exponent is not None and exponent != self._plain:
+            raise ExpressionError(
+                f"an exponent is a plain number, but {self._quoted(node.children[1])} is {measured_in(exponent)}",
+                place_of(node.children[1]),
+            )
+        if base is None or base == self._plain:
+            return base
+        power = constant(node.children[1])
+        # An exponent that is a parameter gives a unit that nobody can write down, and so do powers of powers.
+        if power is None or max(abs(p * power) for p in base.values()) > _LARGEST_POWER:
+            return None
+        return base**power
+
+    def _same(self, nodes: list[Any], parts: list[Dimension], what: str) -> Dimension:
+        common, first = None, nodes[0]
+        for node, part in zip(nodes, parts, strict=True):
+            if common is None:
+                common, first = part, node
+            elif part is not None and part != common:
+                raise ExpressionError(
+                    f"{self._quoted(first)} {measured_in(common)} and {self._quoted(node)} {measured_in(part)} {what}",
+                    place_of(node),
+                )
+        return common
+
+    def _quoted(self, node: Tree[Token] | Token) -> str:
+        text = self._text[place_of(node) : _end_of(node)].strip()
+        return f"'{text if len(text) <= 40 else text[:37] + '...'}'"
+
+
+def _end_of(node: Tree[Token] | Token) -> int:
+    if isinstance(node, Token):
+        return node.end_pos or 0
+    return max((_end_of(child) for child in node.children), default=0) + (
+        node.data in ("rate", "force", "call")
+    )

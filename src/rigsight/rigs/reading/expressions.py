@@ -1,0 +1,231 @@
+"""What may stand in an expression of a rig file, and what does it mean? Text is parsed, never executed.
+
+Numbers, names, ``+ - * / ^``, parentheses, ``d(coordinate)`` for a rate, and a few functions. Kinks are written through the
+functions that the simulation knows how to cross (`rigsight.rigs.reading.functions`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from lark import Lark, Token, Tree
+from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken
+
+from rigsight.errors import nearest
+from rigsight.rigs.reading.functions import FUNCTIONS
+
+_GRAMMAR = r"""
+?sum: product | product (plus | minus)+
+plus: "+" product
+minus: "-" product
+?product: signed | signed (times | over)+
+times: "*" signed
+over: "/" signed
+?signed: "-" signed -> negative | "+" signed | power
+?power: atom | atom "^" signed -> power
+?atom: NUMBER -> number | NAME -> name | NAME "(" [sum ("," sum)*] ")" -> call | "(" sum ")"
+NUMBER: /(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?/
+NAME: /[A-Za-z_][A-Za-z_0-9]*/
+%ignore /[ \t\r\n]+/
+"""
+_LONGEST = 5000
+_DEEPEST = 60
+MOST_POWER = 20
+"""Largest exponent: no law of mechanics has a larger one, and what is made of one would leave the range of numbers."""
+_DEEPEST_TREE = 120
+"""Powers of powers and signs of signs: deeper ones are no formula, and what walks through them would not return."""
+RATE = "d"
+"""``d(NAME)`` is the time derivative of a coordinate; a name without parentheses may be a parameter called d."""
+FORCE = "force"
+"""``force(JOINT)`` is all that a joint resists with; sensors of rigs with a prescribed motion read it."""
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
+
+
+class ExpressionError(ValueError):
+    """What is wrong with an expression, and at which of its characters, counted from 0."""
+
+    def __init__(self, message: str, place: int = 0) -> None:
+        super().__init__(message)
+        self.place = place
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression.
+
+    Attributes
+    ----------
+    text
+        As it was written.
+    tree
+        Its syntax.
+    """
+
+    text: str
+    tree: Tree[Token]
+
+    @property
+    def reads(self) -> dict[str, int]:
+        """What it reads, ``phi``, ``d(phi)`` or ``force(shaft)``, with the place where each first stands, from 0."""
+        found: dict[str, int] = {}
+        for node in self.tree.iter_subtrees_topdown():  # type: ignore[no-untyped-call]
+            if node.data in READS:
+                found.setdefault(READS[str(node.data)](str(node.children[0])), place_of(node))
+        return found
+
+
+def parsed(text: str) -> Expression:
+    """Return the syntax of an expression.
+
+    Raises
+    ------
+    ExpressionError
+        If the text is none, or calls something that is not known.
+    """
+    if len(text) > _LONGEST:
+        raise ExpressionError(f"an expression may have {_LONGEST} characters, this one has {len(text)}")
+    depth = deepest = 0
+    for sign in text:
+        depth += (sign == "(") - (sign == ")")
+        deepest = max(deepest, depth)
+    if deepest > _DEEPEST:
+        raise ExpressionError(f"parentheses may be nested {_DEEPEST} deep, these are {deepest} deep")
+    if not text.strip():
+        raise ExpressionError("an expression is missing")
+    try:
+        tree = _parser().parse(text)
+    except UnexpectedInput as error:
+        raise _told(error, text) from None
+    if not isinstance(tree, Tree):
+        raise ExpressionError("this is no expression")
+    if _depth(tree) > _DEEPEST_TREE:
+        raise ExpressionError(f"powers and signs may be nested {_DEEPEST_TREE} deep")
+    return Expression(text, _checked(tree))
+
+
+def _depth(tree: Tree[Token]) -> int:
+    deepest, waiting = 0, [(tree, 1)]
+    while waiting:
+        node, depth = waiting.pop()
+        deepest = max(deepest, depth)
+        waiting += [(child, depth + 1) for child in node.children if isinstance(child, Tree)]
+    return deepest
+
+
+def rate_name(name: str) -> str:
+    """Return how the rate of a coordinate is written."""
+    return f"{RATE}({name})"
+
+
+def force_name(name: str) -> str:
+    """Return how the force of a joint is written."""
+    return f"{FORCE}({name})"
+
+
+READS: Mapping[str, Callable[[str], str]] = {"name": str, "rate": rate_name, "force": force_name}
+"""How each kind of part that reads a value is written."""
+
+
+def is_identifier(name: str) -> bool:
+    """Return True for a name that expressions can read."""
+    return _IDENTIFIER.fullmatch(name) is not None
+
+
+@cache
+def _parser() -> Lark:
+    return Lark(_GRAMMAR, start="sum", parser="lalr", maybe_placeholders=False)
+
+
+def _told(error: UnexpectedInput, text: str) -> ExpressionError:
+    place = len(text.rstrip())
+    if (isinstance(error, UnexpectedToken) and error.token.type == "$END") or isinstance(
+        error, UnexpectedEOF
+    ):
+        return ExpressionError("the expression ends too early", max(place - 1, 0))
+    place = error.pos_in_stream or 0
+    found = text[place : place + 1]
+    if isinstance(error, UnexpectedCharacters):
+        prime = "; a rate is written d(phi)" if found == "'" else ""
+        return ExpressionError(
+            f"{found} has no meaning here{prime}; allowed are numbers, names, + - * / ^ and parentheses",
+            place,
+        )
+    if text[max(place - 1, 0) : place + 1] == "**":
+        return ExpressionError("powers are written with ^", place - 1)
+    before = text[:place].rstrip()[-1:]
+    mend = (
+        " (a product needs *)"
+        if found and (found.isalnum() or found in "(_") and (before.isalnum() or before in ")_")
+        else ""
+    )
+    return ExpressionError(
+        f"'{error.token if isinstance(error, UnexpectedToken) else found}' is not expected here{mend}", place
+    )
+
+
+def _checked(tree: Tree[Token]) -> Tree[Token]:
+    """Return the tree with rates told from calls; calls of what is not known are refused."""
+    for node in list(tree.iter_subtrees()):
+        if node.data == "power":
+            _check_exponent(node.children[1])
+        if node.data != "call":
+            continue
+        name, *arguments = node.children
+        place = name.start_pos or 0  # type: ignore[union-attr]
+        if name in (RATE, FORCE):
+            if len(arguments) != 1 or not isinstance(arguments[0], Tree) or arguments[0].data != "name":
+                meant = (
+                    "the rate of one coordinate: d(phi)"
+                    if name == RATE
+                    else "that of one joint: force(bearing)"
+                )
+                raise ExpressionError(f"{name}(...) is {meant}", place)
+            node.data = "rate" if name == RATE else "force"
+            node.children = list(arguments[0].children)
+            continue
+        function = FUNCTIONS.get(str(name))
+        if function is None:
+            listed = ", ".join(FUNCTIONS)
+            raise ExpressionError(
+                f"there is no function '{name}'.{nearest(str(name), FUNCTIONS)} Allowed: {listed}", place
+            )
+        if len(arguments) != len(function.arguments):
+            raise ExpressionError(
+                f"{name} takes {len(function.arguments)} arguments, {name}({', '.join(function.arguments)}), and "
+                f"{len(arguments)} are given",
+                place,
+            )
+    return tree
+
+
+def _check_exponent(node: Tree[Token] | Token) -> None:
+    power = constant(node)
+    if power is not None and abs(power) > MOST_POWER:
+        raise ExpressionError(
+            f"an exponent lies within +-{MOST_POWER}, this one is {power:g}", place_of(node)
+        )
+
+
+def constant(node: Any) -> float | None:
+    """Return the value of a number as it is written, with its sign, or of a fraction of two; None for anything else."""
+    if node.data == "number":
+        return float(node.children[0])
+    if node.data == "negative":
+        inner = constant(node.children[0])
+        return None if inner is None else -inner
+    if node.data == "product" and [part.data for part in node.children[1:]] == ["over"]:
+        above, below = constant(node.children[0]), constant(node.children[1].children[0])
+        return None if above is None or not below else above / below
+    return None
+
+
+def place_of(node: Tree[Token] | Token) -> int:
+    """Return the character at which a part of an expression begins, counted from 0."""
+    if isinstance(node, Token):
+        return node.start_pos or 0
+    places = [place_of(child) for child in node.children]
+    return min(places, default=0)

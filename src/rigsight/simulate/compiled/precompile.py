@@ -1,0 +1,25 @@
+"""Compiling kernels ahead of use."""
+
+from __future__ import annotations
+
+from rigsight.simulate.compiled.kernel_cache import compiled as compiled
+from rigsight.simulate.compiled.kernel_cache import kernel_of
+from rigsight.simulate.structure import Structure
+
+
+def compile_kernels(structure: Structure) -> None:
+    """Compile the kernels of a structure and keep them on disk.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+
+    Raises
+    ------
+    InputError
+        If there is no C compiler.
+    MachineError
+        If the cache folder cannot be written, or the compiler fails.
+    """
+    kernel_of(structure)

@@ -1,0 +1,98 @@
+"""How do the equations change with states and constants, so that derivatives can be carried along with a motion?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import sympy as sp
+
+from rigsight.effects.symbols import positive_part
+from rigsight.simulate.compiled.kernel_equations import (
+    KernelEquations,
+    elements,
+    function_body,
+    real,
+    symbols,
+)
+from rigsight.simulate.compiled.linear_forms import linear_forms, slope
+from rigsight.simulate.kinks import absolute
+from rigsight.simulate.printing.c import C, limited
+from rigsight.simulate.structure import INPUT, INPUT_RATE
+
+_EARLIER = sp.Symbol("earlier input", real=True)
+
+
+def carries_tangents(equations: KernelEquations) -> bool:
+    """Return whether derivatives are carried along with the motion, instead of taken as differences of sets side by side.
+
+    Carried along they cost two thirds more where all is sums and products, because a difference needs no derivatives by the
+    constants, and half as much where functions are costly, because these are computed once. Under dry friction they cost
+    the same, and a difference would need a long step: reversals are located to a tolerance. Where states have ends the
+    derivative at one place tells little of the next, however exact it is. Joints that stick and let go together take differences:
+    how one lets go changes when the next does.
+    """
+    structure = equations.structure
+    if equations.limits or structure.measured_late is not None or equations.has_several_frictions:
+        return False
+    expressions = (*equations.lane_rates, *equations.outputs)
+    return bool(equations.frozen.frictions) or any(
+        _is_costly(part) for expression in expressions for part in expression.atoms(sp.Function, sp.Pow)
+    )
+
+
+def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
+    """Return how the equations change with states and constants, by key in the template.
+
+    Of each group of equations there are factors, the same for all directions, and changes: sums of products with them.
+    """
+    structure, n = equations.structure, len(equations.structure.states)
+    of_states = dict(zip(structure.states, symbols("z", n), strict=True))
+    of_constants = dict(zip(equations.constants, symbols("dq", len(equations.constants)), strict=True))
+    arriving = {INPUT: INPUT + _EARLIER * INPUT_RATE} if structure.delay is not None else {}
+    rates, outputs = [rate.xreplace(arriving) for rate in equations.lane_rates], equations.outputs
+    groups: dict[str, tuple[Sequence[str], Sequence[sp.Expr], Mapping[sp.Symbol, sp.Symbol]]] = {
+        "RATE": (elements("r", n), rates, {**of_states, _EARLIER: real("(earlier)")}),
+        "OUTPUT": (elements("r", len(outputs)), outputs, of_states),
+        "DELAY": (["const lanes delay"], equations.delay, {}),
+    }
+    fragments = {"PREPARE_CHANGES": _prepare_changes(equations)}
+    for key, (targets, expressions, own) in groups.items():
+        changes = {**own, **of_constants}
+        forms = linear_forms(expressions, changes, set(equations.constants))
+        now = [factor.xreplace({_EARLIER: sp.Integer(0)}) for factor in forms.factors.values()]
+        numbered = {symbol: f"d[{i}]" for i, symbol in enumerate(forms.factors)}
+        names = {**equations.lane_names, **numbered, **{change: change.name for change in changes.values()}}
+        fragments[f"N_{key}_FACTORS"] = str(max(1, len(now)))
+        fragments[f"{key}_FACTORS"] = function_body((), elements("d", len(now)), now, names, lanes=True)
+        fragments[f"{key}_CHANGES"] = function_body((), targets, forms.sums, names, lanes=True)
+    return fragments
+
+
+def _prepare_changes(equations: KernelEquations) -> str:
+    """Return how constants change with parameters: each common part with its change behind it."""
+    parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
+    shared, reduced = sp.cse(list(equations.constants.values()), symbols=parts, optimizations=None)
+    names = {symbol: f"p[{i}]" for i, symbol in enumerate(equations.structure.parameter_symbols)}
+    changes = {symbol: real(f"d{name}") for symbol, name in names.items()}
+    lines: list[str] = []
+
+    def change(expression: sp.Expr) -> str:
+        present = [symbol for symbol in changes if symbol in expression.free_symbols]
+        total = sp.Add(*(slope(expression, symbol) * changes[symbol] for symbol in present))
+        return C.expression(total, {**names, **{own: own.name for own in changes.values()}})
+
+    for part, expression in shared:
+        lines += [
+            f"const double {part} = {C.expression(expression, names)};",
+            f"const double d{part} = {change(expression)};",
+        ]
+        names[part], changes[part] = part.name, real(f"d{part}")
+    lines += [f"dq[{i}] = {change(expression)};" for i, expression in enumerate(reduced)]
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def _is_costly(part: sp.Expr) -> bool:
+    """Return True for a function or power that takes many times as long as a product."""
+    if isinstance(part, sp.Pow):
+        return not part.exp.is_Integer
+    return not isinstance(part, (sp.Abs, sp.sign, positive_part, limited, absolute))

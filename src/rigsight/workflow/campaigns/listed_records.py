@@ -1,0 +1,158 @@
+"""How does a record that a file lists become a checked `Record` of a rig's signals?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigsight.errors import InputError, nearest, shown
+from rigsight.records import ColumnMapping, Record, read_record
+from rigsight.records.read_record import TIME
+from rigsight.rigs import Rig
+from rigsight.workflow.campaigns.campaign_file import RecordTable
+from rigsight.workflow.campaigns.given_simulation import checked_numbers
+
+
+def inside(path: Path, key: str, asked: str) -> Path:
+    """Return a file that another one names; a campaign that was sent to someone must not read what is none of its business.
+
+    Parameters
+    ----------
+    path
+        The file that names it.
+    key
+        Where it stands there, for messages.
+    asked
+        The name.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it lies outside the folder of `path`.
+    """
+    key = f"{path.name}: {key}"
+    folder = path.parent.resolve()
+    name = Path(asked)
+    try:
+        is_inside, exists = (folder / name).resolve().is_relative_to(folder), (folder / name).is_file()
+    except (OSError, ValueError, RuntimeError):
+        # Longer than names may be, with a null or half a sign in it, or a link to itself.
+        raise InputError(f"{key}: is no file name that can be looked up: {shown(asked)}.") from None
+    if name.is_absolute() or ".." in name.parts or not is_inside:
+        is_link = not name.is_absolute() and ".." not in name.parts
+        how = "is a link that leaves" if is_link else "leaves"
+        raise InputError(f"{key}: '{asked}' {how} the campaign's folder; put the file beside {path.name}.")
+    if not exists:
+        files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
+        raise InputError(
+            f"{key}: '{asked}' does not exist in {path.parent}.{nearest(asked, files)} Check the name."
+        )
+    return path.parent / name
+
+
+def file_inside(path: Path, number: int, record: RecordTable) -> Path:
+    """Return the file of a record.
+
+    Parameters
+    ----------
+    path
+        The file that lists the record.
+    number
+        Place of the record in that file, from 1.
+    record
+        What is listed.
+
+    Raises
+    ------
+    InputError
+        As `inside`.
+    """
+    return inside(path, f"record {number}: file", record.file)
+
+
+def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, file: Path) -> Record:
+    """Read a record as a file that lists it describes it.
+
+    Parameters
+    ----------
+    path
+        The file that lists the record.
+    rig
+        Rig whose signals it holds.
+    number
+        Place of the record in that file, from 1.
+    record
+        What is listed.
+    file
+        See `file_inside`.
+
+    Raises
+    ------
+    InputError
+        Naming the file that lists it, the record, and line and column of what cannot be used.
+    """
+    key = f"{path.name}: record {number} ({record.file})"
+    columns = _columns(key, rig, record)
+    constants = checked_numbers(key, "constants", rig, rig.constants, record.constants)
+    _check_inputs(key, rig, record)
+    try:
+        return read_record(
+            file,
+            rig.inputs,
+            rig.outputs,
+            columns=columns,
+            required_outputs=rig.required_outputs,
+            absent_inputs=rig.absent_inputs,
+            constant_inputs=record.inputs,
+            still_inputs=not rig.has_one_motion,
+            name=record.name,
+            role=record.role,
+            kind=record.kind,
+            amplitude=record.amplitude,
+            hold=record.hold,
+            dt=record.dt,
+            resample=record.resample,
+            separator=record.separator,
+            decimal=record.decimal,
+            header=record.header,
+            comment=record.comment,
+            constants=constants,
+        )
+    except InputError as error:
+        raise InputError(f"{path.name}: record {number}: {error}") from None
+
+
+def _columns(key: str, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping]:
+    known = [TIME, *(signal.name for signal in (*rig.inputs, *rig.outputs))]
+    columns = {}
+    for signal, column in record.columns.items():
+        if signal not in known:
+            raise InputError(
+                f"{key}: columns.{signal}: no signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
+            )
+        try:
+            if isinstance(column, str | int):
+                columns[signal] = ColumnMapping(column)
+            else:
+                columns[signal] = ColumnMapping(column.name, column.scale, column.offset, column.unit)
+        except InputError as error:
+            raise InputError(f"{key}: columns.{signal}: {error}") from None
+    return columns
+
+
+def _check_inputs(key: str, rig: Rig, record: RecordTable) -> None:
+    """Refuse constant values of what is no input, is recorded, or prescribes a motion."""
+    names = [signal.name for signal in rig.inputs]
+    for name in record.inputs:
+        if name not in names:
+            listed = ", ".join(names) or "none"
+            raise InputError(
+                f"{key}: inputs.{name}: no input of {rig.name}.{nearest(name, names)} Inputs: {listed}."
+            )
+        if name in record.columns:
+            raise InputError(
+                f"{key}: inputs.{name}: stands beside columns.{name}, which reads it; give one of the two."
+            )
+        if name not in rig.absent_inputs:
+            raise InputError(
+                f"{key}: inputs.{name}: prescribes a motion of {rig.name}, which must be recorded. Map its column."
+            )

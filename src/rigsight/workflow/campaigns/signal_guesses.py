@@ -1,0 +1,157 @@
+"""Which channels of a file are probably a rig's signals, and which rig is it then?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from rigsight.records.channel_names import closeness, split_unit
+from rigsight.records.channel_units import DRIVES, has_si, is_a
+from rigsight.records.formats.channel import Channel
+from rigsight.records.read_record import TIME
+from rigsight.rigs import Rig
+
+_FITTING_UNIT = 0.5
+_CLEAR = 2.0
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Where a signal may stand.
+
+    Attributes
+    ----------
+    signal, si
+        Signal of the rig and its unit.
+    channel
+        The channel that fits best, None where none or several do.
+    unit
+        Unit of the channel: stated by the file, or else in its name.
+    is_stated
+        Whether the file itself states the unit, in a place made for it.
+    candidates
+        Names of the channels that fit equally well, where several do.
+    """
+
+    signal: str
+    si: str
+    channel: Channel | None = None
+    unit: str | None = None
+    is_stated: bool = False
+    candidates: tuple[str, ...] = ()
+
+    @property
+    def is_clear(self) -> bool:
+        """True if the channel can be named."""
+        return self.channel is not None
+
+
+@dataclass(frozen=True)
+class FileGuess:
+    """What the channels of a file probably are, for one rig."""
+
+    rig: Rig
+    time: Guess
+    signals: tuple[Guess, ...] = field(default=())
+    score: float = 0.0
+
+    @property
+    def open_questions(self) -> int:
+        """Number of signals without a channel that the rig is told by."""
+        return sum(not guess.is_clear for guess in self.signals if guess.signal in telling(self.rig))
+
+
+def telling(rig: Rig) -> tuple[str, ...]:
+    """Return the signals by which a rig is told from others: of one with one motion those of every record, else all."""
+    outputs = rig.required_outputs or tuple(signal.name for signal in rig.outputs)
+    return (*(signal.name for signal in rig.inputs), *outputs)
+
+
+def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) -> FileGuess:
+    """Return the rig that the channels fit best, and which channels its signals are.
+
+    Parameters
+    ----------
+    channels
+        Of an open file; none is read.
+    is_text
+        True for delimited text, whose row of units a reading does not apply.
+    rigs
+        Those that come into question.
+    """
+    guesses = [_guess_rig(rig, channels, is_text) for rig in rigs]
+    found = min(guesses, key=_unlikely)
+    return replace(found, signals=_completed_by_unit(found, channels, is_text))
+
+
+def _unlikely(guess: FileGuess) -> tuple[int, bool, float, int]:
+    """Return what decides between rigs: one motion before several, then the better and the more telling names."""
+    return guess.open_questions, not guess.rig.has_one_motion, -guess.score, -len(guess.signals)
+
+
+def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: bool) -> tuple[Guess, ...]:
+    """Return the guesses; a signal without any takes the one channel left that has its unit, in whatever language it is named."""
+    guesses = list(found.signals)
+    for i, guess in enumerate(guesses):
+        if guess.is_clear or guess.candidates:
+            continue
+        taken = [found.time.channel, *(own.channel for own in guesses)]
+        # A drive has the unit of its amplifier.
+        units = [guess.si] if has_si(guess.si) else DRIVES
+        fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
+        rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
+        if len(fitting) == len(rivals) == 1:
+            guesses[i] = _of_channel(guess, fitting[0], is_text)
+    return tuple(guesses)
+
+
+def _of_channel(guess: Guess, channel: Channel, is_text: bool) -> Guess:
+    # A row of units in delimited text is not applied by a reading, so that it does not count as stated.
+    is_stated = channel.unit is not None and not is_text
+    return Guess(guess.signal, guess.si, channel, _unit_of(channel), is_stated)
+
+
+def _unit_of(channel: Channel) -> str | None:
+    return channel.unit or split_unit(channel.name)[1]
+
+
+def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGuess:
+    time, _ = _guess(TIME, "s", channels, (), is_text)
+    taken = [time.channel] if time.channel is not None else []
+    signals = (*rig.inputs, *rig.outputs)
+    found, score = {}, 0.0
+    # Whose name is clear comes first, so that no other signal takes its channel.
+    for signal in sorted(
+        signals, key=lambda s: -max((closeness(c.name, s.name) for c in channels), default=0.0)
+    ):
+        guess, closest = _guess(signal.name, signal.unit, channels, taken, is_text)
+        if guess.channel is not None:
+            taken.append(guess.channel)
+            score += closest
+        found[signal.name] = guess
+    return FileGuess(rig, time, tuple(found[signal.name] for signal in signals), score / len(signals))
+
+
+def _guess(
+    signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel], is_text: bool
+) -> tuple[Guess, float]:
+    """Return where a signal may stand, and how well it fits there."""
+    scores: list[tuple[float, Channel]] = []
+    for channel in channels:
+        score = 0.0 if channel in taken else closeness(channel.name, signal)
+        if score > 0.0:
+            unit = _unit_of(channel)
+            if unit is not None and has_si(si):
+                score += _FITTING_UNIT if is_a(unit, si) else -_FITTING_UNIT
+            scores.append((score, channel))
+    if not scores:
+        return Guess(signal, si), 0.0
+    best = max(score for score, _ in scores)
+    closest = [channel for score, channel in scores if score == best]
+    # The times of several groups are told apart by the groups of the signals.
+    if len(closest) > 1 and not (signal == TIME and len({channel.short_name for channel in closest}) == 1):
+        return Guess(signal, si, candidates=tuple(channel.name for channel in closest)), 0.0
+    channel = closest[0]
+    if best < _CLEAR - _FITTING_UNIT:
+        return Guess(signal, si, candidates=(channel.name,)), 0.0
+    return _of_channel(Guess(signal, si), channel, is_text), best

@@ -1,0 +1,259 @@
+"""What does `rigsight identify` find on a rig of any shape: responses, one fit over time, poles, and what is identifiable?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
+
+from rigsight.diagnose.windows import cut, window_length
+from rigsight.errors import SimulationError, check_option
+from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
+from rigsight.identify.amplitude_dependence import amplitude_dependence
+from rigsight.identify.helpful_sensors import helpful_sensors
+from rigsight.identify.identifiability import identifiability, relative_errors
+from rigsight.identify.identification import (
+    Identification,
+    JointIdentification,
+    PathIdentification,
+    RecordIdentification,
+)
+from rigsight.identify.information import Information, information
+from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
+from rigsight.identify.record_identification import Wishes, input_peak
+from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.records import Record
+from rigsight.records.plausibility import is_constant
+from rigsight.rigs import RIGS, Rig
+from rigsight.simulate import Structure, compose
+from rigsight.simulate.linearization import Linearization
+from rigsight.simulate.model import Model
+from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.identification.joint import fit_any_rig_jointly, parent
+from rigsight.workflow.identification.warnings import any_rig_warnings, beyond_identified_amplitudes
+from rigsight.workflow.kernels import prepare_kernels
+from rigsight.workflow.progress import Listener, Stage
+
+IDENTIFYING = "Identifying"
+METHODS = ("local_rational", "local_polynomial")
+"""Those that tell several inputs apart."""
+_STEPS_AFTER_RECORDS = 3
+_GROWTHS = 3.0
+"""Time constants of its growth in a window of a rig that is unstable: errors of the start grow twentyfold."""
+
+
+def has_transfer_forms(campaign: Campaign) -> bool:
+    """Return True for the built-in rigs of one motion, whose transfer functions are fitted record by record.
+
+    A rig of the same shape from a file has names of its own; and records of different constants have no such form together.
+    """
+    rig = campaign.rig
+    built_in = rig.name in RIGS and RIGS[rig.name].mechanism == rig.mechanism
+    return built_in and rig.has_one_motion and not any(r.constants for r in campaign.records)
+
+
+def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: Listener) -> Identification:
+    """Identify a rig of any shape.
+
+    Parameters
+    ----------
+    campaign
+        A campaign that was read or made of records.
+    wishes
+        How its records are to be read.
+    n_jobs
+        Records read at the same time.
+    listener
+        Told of every finished step.
+
+    Raises
+    ------
+    InputError
+        If the method cannot tell inputs apart.
+    """
+    check_option("The method for a rig of several inputs or sensors", wishes.method, METHODS)
+    rig, structure = campaign.rig, compose(campaign.rig)
+    records = campaign.estimation
+    prepare_kernels([structure], n_jobs, listener)
+    stage = Stage(IDENTIFYING, len(records) + _STEPS_AFTER_RECORDS, listener)
+    found = []
+    with threadpool_limits(limits=1, user_api="blas"):
+        parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+        for record in parallel(delayed(_record)(record, rig, wishes) for record in records):
+            found.append(record)
+            stage.finished(record.record.name)
+        start, length = _begin(campaign, structure, records)
+        joint = fit_any_rig_jointly(campaign, structure, found, start, length)
+        stage.finished("one set for all records")
+        known, joint = _with_errors(joint, structure, cut(records, length))
+        found = [_with_own(record, joint, rig) for record in found]
+        stage.finished("what is identifiable")
+        views = tuple(_views(structure, joint.fit.fit.values, records, wishes, known))
+    units = {p.name: p.unit for p in structure.parameters}
+    units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
+    statement, changing = amplitude_dependence(found, units, units.get(found[0].source, ""))
+    told = None
+    if known is not None:
+        fit, windows = joint.fit, cut(records, length)
+        scales = characteristic_scales(rig, windows, fit.fit.values)
+        remedies = helpful_sensors(structure, windows, scales, fit.noise, fit.fit)
+        told = replace(identifiability(known), remedies=remedies)
+    identification = Identification(
+        title=campaign.title,
+        rig=rig.name,
+        method=wishes.method,
+        units=units,
+        records=tuple(found),
+        amplitude_statement=statement,
+        changing=changing,
+        joint=joint,
+        model=Model.of(structure, joint.fit.fit.values, records[0].hold).to_json(),
+        warnings=(
+            *any_rig_warnings(campaign, views, joint),
+            *(beyond_identified_amplitudes(campaign, joint) if len(rig.inputs) == 1 else ()),
+        ),
+        views=views,
+        identifiability=told,
+        meanings={parameter.name: parameter.description for parameter in rig.parameters},
+    )
+    stage.finished("poles and responses")
+    return identification
+
+
+def _record(record: Record, rig: Rig, wishes: Wishes) -> RecordIdentification:
+    """Return what one record shows by itself of the responses to the inputs that move in it."""
+    measured = measured_responses([record], rig, wishes.method, wishes.resolution)
+    paths = [
+        PathIdentification(
+            source.name,
+            response.name,
+            measured=measured.found.get((source.name, response.name)),
+            problem=measured.problems.get((source.name, response.name), ""),
+        )
+        for source in rig.inputs
+        for response in rig.outputs
+        if measured is not None and response.name in record and not is_constant(record[source.name])
+    ]
+    amplitude = record.amplitude if record.amplitude is not None else input_peak(record, rig)
+    return RecordIdentification(record, amplitude, tuple(paths))
+
+
+def _begin(
+    campaign: Campaign, structure: Structure, records: Sequence[Record]
+) -> tuple[dict[str, float], float | None]:
+    """Return start values, and the length of windows if the rig runs away from where it was [s]."""
+    rig, constants = campaign.rig, campaign.constants
+    starts = [linear_start(rig, records, constants, {})]
+    given = rig.in_own_parameters(campaign.parameters, constants)
+    if all(p.name in given for p in rig.parameters):
+        starts.append({p.name: given[p.name] for p in rig.parameters})
+    lengths = [_window_length(structure, {**constants, **start}, records) for start in starts]
+    if len(starts) == 1:
+        return starts[0], lengths[0]
+    costs = [
+        _cost(structure, {**constants, **start}, cut(records, length))
+        for start, length in zip(starts, lengths, strict=True)
+    ]
+    best = int(np.argmin(costs))
+    return starts[best], lengths[best]
+
+
+def _cost(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> float:
+    scales = characteristic_scales(structure.rig, records, values)
+    sizes = {
+        signal.name: max(
+            float(np.std(np.concatenate([r[signal.name] for r in records if signal.name in r]))), 1e-300
+        )
+        for signal in structure.rig.outputs
+        if any(signal.name in record for record in records)
+    }
+    return GreyBoxFit(structure, records, scales, sizes).fit(values, (), finish=False).cost
+
+
+def _window_length(
+    structure: Structure, values: Mapping[str, float], records: Sequence[Record]
+) -> float | None:
+    """Return how long a free run may be [s]; None where every record may be run as a whole."""
+    try:
+        linear = near_rest(structure, values, records)
+    except SimulationError:
+        return None
+    if linear.stability == "unstable":
+        growth = float(np.max(linear.poles.real))
+        return min(window_length(structure.rig, records), _GROWTHS / growth)
+    return window_length(structure.rig, records) if _drifts_in_sight(linear, records) else None
+
+
+def _drifts_in_sight(linear: Linearization, records: Sequence[Record]) -> bool:
+    """Return True if what nothing holds shows in a sensor: of a shaft without a spring the angle drifts, the speed does not."""
+    seen = [name for name in linear.outputs if any(name in record for record in records)]
+    return linear.stability == "drifts" and any(
+        np.any(linear.transfer_function(source, response).poles == 0.0)
+        for source in linear.inputs
+        for response in seen
+    )
+
+
+def _with_errors(
+    joint: JointIdentification, structure: Structure, windows: Sequence[Record]
+) -> tuple[Information | None, JointIdentification]:
+    """Return what the records say of the parameters, and the fits with errors that are infinite where that is nothing."""
+    fit = joint.fit
+
+    def corrected(result: FitResult, records: Sequence[Record]) -> tuple[Information | None, FitResult]:
+        if not (np.isfinite(result.cost) and result.residuals):
+            return None, result
+        scales = characteristic_scales(structure.rig, records, result.values)
+        known = information(GreyBoxFit(structure, records, scales, fit.noise), result)
+        errors = relative_errors(known)
+        unknown = [name for name in result.free if errors[name] >= POORLY_KNOWN]
+        place = [result.free.index(name) for name in unknown]
+        covariance = result.covariance.copy()
+        covariance[place, :], covariance[:, place] = 0.0, 0.0
+        covariance[place, place] = np.inf
+        return known, replace(
+            result,
+            standard_errors={**result.standard_errors, **dict.fromkeys(unknown, float("inf"))},
+            covariance=covariance,
+        )
+
+    known, together = corrected(fit.fit, windows)
+    kinds = tuple(
+        replace(kind, fit=corrected(kind.fit, [w for w in windows if parent(w) == kind.kind])[1])
+        for kind in fit.kinds
+    )
+    return known, replace(joint, fit=replace(fit, fit=together, kinds=kinds))
+
+
+def _with_own(found: RecordIdentification, joint: JointIdentification, rig: Rig) -> RecordIdentification:
+    """Give a record the parameters of its own fit."""
+    own = next(kind.fit for kind in joint.fit.kinds if kind.kind == found.record.name)
+    if not np.isfinite(own.cost):
+        return found
+    positive = frozenset(p.name for p in rig.parameters if p.logarithmic)
+    values = {name: own.values[name] for name in own.free}
+    estimates = PhysicalEstimates(own.free, values, own.covariance, "fitted over time", positive)
+    return replace(found, own=estimates)
+
+
+def _views(
+    structure: Structure,
+    values: Mapping[str, float],
+    records: Sequence[Record],
+    wishes: Wishes,
+    known: Information | None,
+) -> list[LinearView]:
+    if known is None:
+        return []
+    views = []
+    for group in by_constants(records):
+        measured = measured_responses(group, structure.rig, wishes.method, wishes.resolution)
+        try:
+            views.append(linear_view(structure, values, group, measured, known))
+        except SimulationError:
+            continue
+    return views

@@ -1,0 +1,294 @@
+"""Does one parameter set serve all estimation records, and how well does it follow the others in free run?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.windows import WINDOW, cut, window_length
+from rigsight.errors import InputError
+from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
+from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
+from rigsight.identify.joint import JointFit
+from rigsight.identify.record_identification import input_peak
+from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.metrics import nrmse
+from rigsight.records import Record
+from rigsight.records.plausibility import is_constant
+from rigsight.report.quantities import gap_percent
+from rigsight.simulate import Structure, compose
+from rigsight.workflow.campaigns.campaign import Campaign
+
+_DIFFERENT = 0.01
+"""Probability of differences as large by chance below which records are said to need sets of their own."""
+_SMALL_LOSS = 0.01
+_UNSERVED = 0.9
+"""Share of a motion that is left where a fit has not followed it at all."""
+_LATERAL = ("l_0", "c_y")
+_BELOW = 1e-6
+
+
+def identify_jointly(
+    campaign: Campaign, found: Sequence[RecordIdentification], no_spring: bool
+) -> JointIdentification:
+    """Fit one set to all estimation records that show the motion, and one to each alone; score every record.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    found
+        What each estimation record shows by itself. A record whose motion could not be identified is left out.
+    no_spring
+        True for an axis without a spring: records are cut into windows, since it drifts in free run.
+
+    Raises
+    ------
+    InputError
+        If no record shows the motion.
+    """
+    records = [r.record for r in found if not r.motion.problem]
+    if not records:
+        reasons = "\n".join(f"- {r.record.name}: {r.motion.problem}" for r in found)
+        raise InputError(
+            f"No estimation record shows the motion of the rig, so nothing can be identified.\n{reasons}"
+        )
+    structure = compose(campaign.rig)
+    length = window_length(campaign.rig, records) if no_spring else None
+    windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
+    known = _known(campaign, records, no_spring)
+    fit = fit_jointly(
+        structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=parent
+    )
+    pooled = _pooled(found) if fit.probability < _DIFFERENT and not known.keys() & _LATERAL else None
+    if pooled is not None:
+        fit = fit_jointly(
+            structure,
+            windows,
+            campaign.constants,
+            known={**known, **pooled.values},
+            start=fit.fit.values,
+            output_noise=fit.noise,
+            group_of=parent,
+        )
+    amplitudes = {r.record.name: r.amplitude for r in found}
+    scores = (
+        *_estimation_scores(fit, windows, amplitudes),
+        *(_validation_score(fit, record, campaign, length) for record in campaign.validation),
+    )
+    errors = {**fit.fit.standard_errors, **(pooled.standard_errors if pooled else {})}
+    conicity = None
+    if "c_y" in errors:
+        conicity = estimate_conicity(
+            fit.fit.values["c_y"], errors["c_y"], campaign.constants["r_0"], campaign.constants["b"]
+        )
+    names = {record.name for record in records}
+    return JointIdentification(
+        fit=fit,
+        names=fit.fit.free,
+        pooled=pooled,
+        statement=_statement(fit, scores, [name for name in amplitudes if name in names]),
+        conicity=conicity,
+        scores=scores,
+        left_out=tuple(r.record.name for r in found if r.record.name not in names),
+    )
+
+
+def fit_any_rig_jointly(
+    campaign: Campaign,
+    structure: Structure,
+    found: Sequence[RecordIdentification],
+    start: Mapping[str, float],
+    length: float | None,
+) -> JointIdentification:
+    """Fit one set of all parameters to all estimation records of a rig of any shape, and one to each alone; score every record.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    structure
+        Its rig.
+    found
+        What each estimation record shows by itself.
+    start
+        Start value of every parameter.
+    length
+        Of windows into which records are cut [s]; None leaves them whole.
+    """
+    windows = cut([r.record for r in found], length)
+    fit = fit_jointly(structure, windows, campaign.constants, start=start, group_of=parent)
+    amplitudes = {r.record.name: r.amplitude for r in found}
+    scores = (
+        *_estimation_scores(fit, windows, amplitudes),
+        *(_validation_score(fit, record, campaign, length) for record in campaign.validation),
+    )
+    return JointIdentification(
+        fit=fit,
+        names=fit.fit.free,
+        pooled=None,
+        statement=_statement(fit, scores, list(amplitudes)),
+        conicity=None,
+        scores=scores,
+        left_out=(),
+    )
+
+
+def _pooled(found: Sequence[RecordIdentification]) -> PhysicalEstimates | None:
+    """Return the mean of the records' own lateral parameters, weighted by inverse variances; None where there are none."""
+    own = [path.physical for r in found for path in r.paths[1:] if path.physical is not None]
+    if not own:
+        return None
+    values, errors = {}, []
+    for name in _LATERAL:
+        estimates = np.array([[p.values[name], p.standard_errors[name]] for p in own])
+        weights = estimates[:, 1] ** -2.0
+        values[name] = float(weights @ estimates[:, 0] / weights.sum())
+        scatter = float(np.sum(weights * (estimates[:, 0] - values[name]) ** 2)) / max(len(own) - 1, 1)
+        errors.append(math.sqrt(max(scatter, 1.0) / weights.sum()))
+    return PhysicalEstimates(
+        _LATERAL,
+        values,
+        np.diag(np.square(errors)),
+        "mean of the records' own, with the measured psi as source",
+    )
+
+
+def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) -> dict[str, float]:
+    """Return the median of what the records show by themselves."""
+    names = {name for r in found if not r.motion.problem for name in r.estimates} - set(known)
+    return {
+        name: float(np.median([r.estimates[name][0] for r in found if name in r.estimates])) for name in names
+    }
+
+
+def parent(record: Record) -> str:
+    """Return the name of the record that a window was cut from."""
+    return record.name.split(WINDOW)[0]
+
+
+def _known(campaign: Campaign, records: Sequence[Record], no_spring: bool) -> dict[str, float]:
+    """Return what these records say nothing about: a spring that is not there, outputs that were not measured."""
+    rig = campaign.rig
+    known: dict[str, float] = {}
+    names = {parameter.name for parameter in rig.parameters}
+    if no_spring:
+        known |= {"k": 0.0, "x_off": 0.0}
+    elif rig.is_driven and "force_off" in names:
+        # A linear spring cannot tell a constant force from a shifted rest position.
+        known["force_off"] = 0.0
+    if rig.downstream and not any(symbol.name in r for symbol in rig.downstream for r in records):
+        placeholders = {"l_0": 1.0, "c_y": 1.0, "y_off": 0.0}
+        known |= {
+            name: campaign.parameters.get(name, placeholders[name]) for name in rig.downstream_parameters
+        }
+    return known
+
+
+def _columns(
+    residuals: Sequence[NDArray[np.float64]], records: Sequence[Record], outputs: Sequence[str]
+) -> dict[str, float]:
+    """Return the NRMSE of each output that was measured, over all windows of one record."""
+    found = {}
+    for i, name in enumerate(outputs):
+        if all(name in record for record in records) and residuals:
+            left = np.concatenate([residual[:, i] for residual in residuals])
+            found[name] = nrmse(left, np.concatenate([record[name] for record in records]))
+    return found
+
+
+def _estimation_scores(
+    fit: JointFit, windows: Sequence[Record], amplitudes: Mapping[str, float]
+) -> list[RecordScore]:
+    outputs = [signal.name for signal in fit.fit.structure.rig.outputs]
+    scores = []
+    for own in fit.kinds:
+        places = [i for i, window in enumerate(windows) if parent(window) == own.kind]
+        records = [windows[i] for i in places]
+        joint = [fit.fit.residuals[i] for i in places] if fit.fit.residuals else []
+        scores.append(
+            RecordScore(
+                own.kind,
+                "estimation",
+                amplitudes[own.kind],
+                _columns(joint, records, outputs),
+                _columns(own.fit.residuals, records, outputs),
+            )
+        )
+    return scores
+
+
+def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length: float | None) -> RecordScore:
+    windows = cut([record], length)
+    scales = characteristic_scales(campaign.rig, windows, fit.fit.values)
+    noise = {s.name: fit.noise.get(s.name, 1.0) for s in campaign.rig.outputs}
+    # Only initial states are estimated: a record may start away from rest.
+    free_run = GreyBoxFit(fit.fit.structure, windows, scales, noise).fit(fit.fit.values, ())
+    measured_in_fit = [s.name for s in campaign.rig.outputs if s.name in fit.noise]
+    scored = _columns(free_run.residuals, windows, [s.name for s in campaign.rig.outputs])
+    amplitude = record.amplitude if record.amplitude is not None else input_peak(record, campaign.rig)
+    return RecordScore(
+        record.name, "validation", amplitude, {n: v for n, v in scored.items() if n in measured_in_fit}, {}
+    )
+
+
+def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str]) -> str:
+    if not fit.fit.success:
+        return f"The joint fit did not converge: {fit.fit.message}. Its numbers are to be doubted."
+    if len(names) < 2:
+        return (
+            "One estimation record was fitted, so there is nothing to compare its parameters with. A step beside a sweep, or "
+            "another amplitude, would test them."
+        )
+    if not math.isfinite(fit.probability):
+        return (
+            "The records have no parameter in common that each of them determines; nothing can be compared."
+        )
+    unserved = [
+        f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
+        for score in scores
+        if score.role == "estimation"
+        for name in score.nrmse
+        if not score.nrmse[name] < _UNSERVED
+    ]
+    if fit.probability >= _DIFFERENT and unserved:
+        return (
+            "The joint fit follows the records too poorly to say whether one parameter set serves all: it leaves "
+            f"{', '.join(unserved[:3])}. Its numbers are to be doubted; look for a signal of the wrong sign, unit or column."
+        )
+    if fit.probability >= _DIFFERENT:
+        return (
+            f"One parameter set serves all {len(names)} estimation records: differences as large arise by chance with "
+            f"probability {fit.probability:.2g}."
+        )
+    chance = f"below {_BELOW:g}" if fit.probability < _BELOW else f"{fit.probability:.1g}"
+    text = f"No single parameter set serves all {len(names)} estimation records (probability of chance {chance})."
+    return f"{text} {_pull(fit, scores)}"
+
+
+def _pull(fit: JointFit, scores: Sequence[RecordScore]) -> str:
+    """Say which record loses most by the common set, and what it wants instead."""
+    losses = [
+        (score.nrmse[name] - score.own_nrmse[name], score, name)
+        for score in scores
+        if score.role == "estimation"
+        for name in score.nrmse
+        if name in score.own_nrmse
+    ]
+    loss, worst, output = max(losses, key=lambda item: item[0])
+    own = next(kind for kind in fit.kinds if kind.kind == worst.record)
+    shifts = {name: shift for name, shift in own.shift.items() if math.isfinite(shift)}
+    joint_left, own_left = gap_percent(worst.nrmse[output]), gap_percent(worst.own_nrmse[output])
+    left = f"the common set leaves {joint_left} of {output}, its own {own_left}"
+    if loss < _SMALL_LOSS:
+        return f"The differences are small, though: '{worst.record}' loses most, and {left}."
+    if not shifts:
+        return f"'{worst.record}' pulls most: {left}."
+    name = max(shifts, key=lambda key: abs(shifts[key]))
+    return (
+        f"'{worst.record}' pulls most: {left}; alone it has {name} = {own.fit.values[name]:.3g} instead of "
+        f"{fit.fit.values[name]:.3g}."
+    )

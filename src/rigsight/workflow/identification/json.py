@@ -1,0 +1,196 @@
+"""How does an identification stand in `identification.json`?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rigsight.identify.identification import (
+    Identification,
+    JointIdentification,
+    PathIdentification,
+    RecordIdentification,
+)
+from rigsight.identify.transfer.conicity import ConicityEstimate
+from rigsight.identify.transfer.physical import LEVEL, PhysicalEstimates
+from rigsight.identify.transfer.transfer_fit import TransferFit
+from rigsight.workflow.identification.linear_json import (
+    finite,
+    identifiability_json,
+    response_json,
+    view_json,
+)
+
+SCHEMA_VERSION = 1
+
+
+def identification_json(identification: Identification, figures: Mapping[str, str]) -> dict[str, Any]:
+    """Return the content of ``identification.json``.
+
+    Parameters
+    ----------
+    identification
+        The result.
+    figures
+        File name -> what it shows.
+    """
+    units = identification.units
+    told = identification.identifiability
+    # Rigs of one motion with transfer functions of their own have neither.
+    of_any_rig = (
+        {}
+        if told is None
+        else {
+            "identifiability": identifiability_json(told),
+            "linear": [view_json(view, units) for view in identification.views],
+        }
+    )
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "title": identification.title,
+        "rig": identification.rig,
+        "method": identification.method,
+        "level": LEVEL,
+        "warnings": list(identification.warnings),
+        "amplitudes": {
+            "statement": identification.amplitude_statement,
+            "changing": list(identification.changing),
+            "table": [_row(record, units) for record in identification.records],
+        },
+        "joint": _joint(identification.joint, units),
+        "validation": [
+            {"record": s.record, "amplitude": finite(s.amplitude), "nrmse": _all_finite(s.nrmse)}
+            for s in identification.joint.scores
+            if s.role == "validation"
+        ],
+        "records": [_record(record, units) for record in identification.records],
+        **of_any_rig,
+        "figures": dict(figures),
+    }
+
+
+def _all_finite(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: finite(value) for name, value in values.items()}
+
+
+def _row(found: RecordIdentification, units: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "record": found.record.name,
+        "kind": found.record.kind,
+        "amplitude": finite(found.amplitude),
+        **{
+            name: {"value": value, "std": finite(error), "unit": units.get(name, "")}
+            for name, (value, error) in found.estimates.items()
+        },
+        "resonance": finite(found.resonance),
+    }
+
+
+def _record(found: RecordIdentification, units: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "record": found.record.name,
+        "kind": found.record.kind,
+        "amplitude": finite(found.amplitude),
+        "identified": found.is_identified,
+        "warnings": list(found.warnings),
+        "paths": [_path(path, units) for path in found.paths],
+        "offsets": None if found.offsets is None else _physical(found.offsets, units),
+        "delta_0": None if found.conicity is None else _conicity(found.conicity),
+        **({} if found.own is None else {"parameters": _physical(found.own, units)}),
+    }
+
+
+def _path(path: PathIdentification, units: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "source": path.source,
+        "response": path.response,
+        "problem": path.problem,
+        "fit": None if path.fit is None else _fit(path.fit),
+        "physical": None if path.physical is None else _physical(path.physical, units),
+        "frequency_response": None if path.measured is None else response_json(path.measured),
+        "coherence": None
+        if path.coherence is None or path.coherence.coherence is None
+        else {
+            "method": path.coherence.method,
+            "omega": path.coherence.omega.tolist(),
+            "values": path.coherence.coherence.tolist(),
+        },
+    }
+
+
+def _fit(fit: TransferFit) -> dict[str, Any]:
+    return {
+        "form": fit.form.order.upper(),
+        "gain_unit": fit.unit,
+        "method": fit.method,
+        "message": fit.message,
+        "misfit": finite(fit.misfit),
+        "values": fit.values,
+        "std": _all_finite(fit.standard_errors),
+    }
+
+
+def _physical(found: PhysicalEstimates, units: Mapping[str, str]) -> dict[str, Any]:
+    errors = found.standard_errors
+    return {
+        name: {
+            "value": found.values[name],
+            "std": finite(errors[name]),
+            "interval": [finite(end) for end in found.interval(name)],
+            "unit": units.get(name, ""),
+            "method": found.method,
+        }
+        for name in found.names
+    }
+
+
+def _conicity(found: ConicityEstimate) -> dict[str, Any]:
+    return {
+        "value": found.value,
+        "unbounded": finite(found.unbounded),
+        "std": finite(found.standard_error),
+        "interval": None if found.interval is None else list(found.interval),
+        "determined": found.determined,
+        "statement": found.statement,
+        "unit": "rad",
+    }
+
+
+def _joint(joint: JointIdentification, units: Mapping[str, str]) -> dict[str, Any]:
+    fit = joint.fit
+    return {
+        "statement": joint.statement,
+        "probability": finite(fit.probability),
+        "success": fit.fit.success,
+        "message": fit.fit.message,
+        "left_out": list(joint.left_out),
+        "parameters": {
+            name: {
+                "value": fit.fit.values[name],
+                "std": finite(fit.fit.standard_errors[name]),
+                "interval": [finite(end) for end in fit.interval(name)],
+                "unit": units.get(name, ""),
+            }
+            for name in joint.names
+        },
+        "pooled": {} if joint.pooled is None else _physical(joint.pooled, units),
+        "delta_0": None if joint.conicity is None else _conicity(joint.conicity),
+        "residual_std": _all_finite(fit.noise),
+        "records": _scores(joint),
+    }
+
+
+def _scores(joint: JointIdentification) -> Sequence[dict[str, Any]]:
+    shifts = {kind.kind: kind.shift for kind in joint.fit.kinds}
+    alone = {kind.kind: kind.fit.values for kind in joint.fit.kinds}
+    return [
+        {
+            "record": score.record,
+            "nrmse": _all_finite(score.nrmse),
+            "nrmse_alone": _all_finite(score.own_nrmse),
+            "values_alone": {name: alone[score.record][name] for name in joint.names},
+            "shift_in_std": _all_finite(shifts[score.record]),
+        }
+        for score in joint.scores
+        if score.role == "estimation"
+    ]

@@ -1,0 +1,1 @@
+"""A user's own rigs and effects: declared, checked, found by name."""

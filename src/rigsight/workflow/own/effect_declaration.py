@@ -1,0 +1,207 @@
+"""Is an effect's declaration complete and consistent, so that a rig can be simulated and fitted with it?
+
+What is checked here needs no simulation; `rigsight.workflow.own.effect_promises` holds the rest.
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+from collections.abc import Iterable, Iterator, Mapping
+
+import sympy as sp
+from sympy.core.function import Application
+
+from rigsight.effects import Effect, Place
+from rigsight.effects import symbols as canonical
+from rigsight.errors import nearest
+from rigsight.parameters import Parameter
+from rigsight.rigs import RIGS, Rig
+from rigsight.simulate import compose
+from rigsight.units import parse_dimension
+from rigsight.workflow.own.effect_types import type_faults
+
+_MOTION = ("x", "v", "t", "k", "m")
+_MAY_READ: Mapping[str, tuple[str, ...]] = {
+    "torque": _MOTION,
+    "spring": (*_MOTION, "spring_torque", "deflection", "deflection_rate"),
+    "deflection": ("x",),
+    "drive": ("u", "t"),
+    "delay": (),
+    "lateral": ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback"),
+    "measured": ("reading", "t"),
+    "measured_late": (),
+}
+_STATES_MAY_READ: Mapping[str, tuple[str, ...]] = {
+    **_MAY_READ,
+    "deflection": ("x", "v"),
+    "delay": (),
+    "lateral": (),
+}
+_PLACES: Mapping[Place, tuple[str, ...]] = {
+    Place.ACTUATOR: ("drive", "delay"),
+    Place.DYNAMICS: ("torque", "spring", "deflection"),
+    Place.DISTURBANCE: ("torque",),
+    Place.LATERAL_DYNAMICS: ("lateral",),
+    Place.SENSOR: ("measured", "measured_late"),
+}
+_WITH_STATES = ("torque", "spring", "deflection", "drive", "measured")
+_KINKS = (sp.Abs, sp.sign, canonical.positive_part)
+_SMOOTH = (
+    sp.exp, sp.log, sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.sinh, sp.cosh, sp.tanh, sp.asinh,
+)  # fmt: skip
+
+
+def declaration_faults(effect: Effect) -> tuple[str, ...]:
+    """Return what is wrong with a declaration, one sentence each; nothing where it is in order."""
+    wrong_types = tuple(type_faults(effect))
+    if wrong_types:
+        # Nothing else can be looked at where a field does not hold what it should.
+        return wrong_types
+    found = tuple(
+        dict.fromkeys([*_name_faults(effect), *_parameter_faults(effect), *_equation_faults(effect)])
+    )
+    return found or tuple(_composition_faults(effect))
+
+
+def equations(effect: Effect) -> dict[str, sp.Expr]:
+    """Return the parts of the rig that an effect changes, by field, with their new expressions."""
+    found = {field: getattr(effect, field) for field in _MAY_READ}
+    return {field: expression for field, expression in found.items() if expression is not None}
+
+
+def _name_faults(effect: Effect) -> Iterator[str]:
+    if not effect.name.isidentifier() or not effect.name.isascii() or effect.name != effect.name.lower():
+        yield f"the name '{effect.name}' must consist of lower-case letters, digits and underscores."
+    for symbol in (*(p.name for p in effect.parameters), *(state.symbol.name for state in effect.states)):
+        if not symbol.isidentifier() or not symbol.isascii() or keyword.iskeyword(symbol):
+            yield f"the symbol '{symbol}' must consist of letters, digits and underscores, and not be a word of Python."
+    if not effect.summary.strip():
+        yield "the summary is empty; say in one sentence what the effect does."
+
+
+def _parameter_faults(effect: Effect) -> Iterator[str]:
+    expressions = [*equations(effect).values(), *(s.rate for s in effect.states)]
+    expressions += [state.limit for state in effect.states if state.limit is not None]
+    used = {symbol.name for expression in expressions for symbol in expression.free_symbols}
+    names = [p.name for p in effect.parameters]
+    signals = {name for names in _STATES_MAY_READ.values() for name in names}
+    if not effect.null_values():
+        yield "no parameter has a null value; give null=... to one at whose value the effect vanishes."
+    for p in effect.parameters:
+        if names.count(p.name) > 1:
+            yield f"parameter {p.name} is declared {names.count(p.name)} times."
+        if p.name in signals:
+            yield f"parameter {p.name} has the name of a signal of the rig; name it otherwise."
+        if p.name not in used:
+            yield f"parameter {p.name} is declared but stands in no equation.{nearest(p.name, used - set(names))}"
+        if not p.description.strip():
+            yield f"parameter {p.name} is not explained; give a description."
+        yield from _range_faults(p)
+        yield from _dimension_faults(p)
+    for name in effect.special_cases:
+        if name not in names:
+            yield f"special_cases names {name}, which is no parameter.{nearest(name, names)}"
+    for pair in effect.searched_as:
+        for name in {pair.first, pair.second} - set(names):
+            yield f"searched_as names {name}, which is no parameter.{nearest(name, names)}"
+    for field in ("elastic_share", "pulsation"):
+        name = getattr(effect, field)
+        if name is not None and name not in names:
+            yield f"{field} names {name}, which is no parameter.{nearest(str(name), names)}"
+    for start in effect.starts:
+        for name in start.values.keys() - {*names, "k"}:
+            yield f"a start gives a value to {name}, which is no parameter.{nearest(name, names)}"
+
+
+def _range_faults(p: Parameter) -> Iterator[str]:
+    if not p.lower < p.upper:
+        yield f"parameter {p.name}: lower {p.lower:g} must be below upper {p.upper:g}."
+    for label, value in (("null", p.null), ("default", p.default)):
+        if value is not None and not p.lower <= value <= p.upper:
+            yield f"parameter {p.name}: {label} {value:g} lies outside [{p.lower:g}, {p.upper:g}]."
+    if not p.fitted:
+        if p.default is None:
+            yield f"parameter {p.name} is not fitted; give it a default."
+        return
+    if not (all(map(math.isfinite, p.search)) and p.search[0] < p.search[1]):
+        yield f"parameter {p.name}: search is {p.search}; give two finite numbers in increasing order (characteristic units)."
+    if not p.starts:
+        yield f"parameter {p.name}: starts is empty; give a start value inside search."
+    for start in p.starts:
+        if not p.search[0] <= start <= p.search[1]:
+            yield f"parameter {p.name}: the start {start:g} lies outside search [{p.search[0]:g}, {p.search[1]:g}]."
+    if p.logarithmic and not p.search[0] > 0.0:
+        yield f"parameter {p.name} is searched over decades; search must begin above 0."
+
+
+def _dimension_faults(p: Parameter) -> Iterator[str]:
+    bases = {base for rig in _rigs() for base in rig.units} | {"drive"}
+    try:
+        unknown = [base for base in parse_dimension(p.dimension) if base not in bases]
+    except ValueError:
+        yield f"parameter {p.name}: the dimension '{p.dimension}' cannot be read; write for instance 'force x^-3'."
+        return
+    for base in unknown:
+        yield f"parameter {p.name}: dimension '{p.dimension}' has the unknown quantity {base}. Known: {', '.join(sorted(bases))}."
+
+
+def _equation_faults(effect: Effect) -> Iterator[str]:
+    changed = equations(effect)
+    fitting = _PLACES[effect.place]
+    if len(changed) != 1:
+        told = f"are {', '.join(changed)}" if changed else "is none"
+        yield f"it must change one part of the rig, but there {told}; at {effect.place.value} that is {' or '.join(fitting)}."
+        return
+    ((field, expression),) = changed.items()
+    if field not in fitting:
+        yield f"{field} does not belong to the place {effect.place.value}; there it is {' or '.join(fitting)}."
+    if effect.states and field not in _WITH_STATES:
+        yield f"{field} cannot have states; only {', '.join(_WITH_STATES)} can."
+    yield from _expression_faults(effect, field, expression, _MAY_READ[field])
+    for state in effect.states:
+        yield from _expression_faults(
+            effect, f"the rate of {state.symbol}", state.rate, _STATES_MAY_READ[field]
+        )
+        if state.limit is not None:
+            yield from _expression_faults(effect, f"the limit of {state.symbol}", state.limit, ())
+
+
+def _expression_faults(
+    effect: Effect, what: str, expression: sp.Expr, readable: Iterable[str]
+) -> Iterator[str]:
+    readable = tuple(readable)
+    signals = {getattr(canonical, name) for name in readable}
+    own = [p.name for p in effect.parameters]
+    states = {state.symbol for state in effect.states}
+    for symbol in sorted(expression.free_symbols, key=str):
+        if symbol in signals or symbol in states or symbol.name in own:
+            continue
+        if symbol.name in readable:
+            yield (
+                f"{what}: {symbol} is another symbol than the rig's; write "
+                f"'from rigsight.effects.symbols import {symbol}'."
+            )
+            continue
+        known = [*own, *map(str, states), *readable]
+        yield f"{what}: {symbol} is no parameter, state or signal here.{nearest(symbol.name, known)} Known: {', '.join(known)}."
+    for function in sorted(expression.atoms(Application), key=str):
+        if not isinstance(function, (*_KINKS, *_SMOOTH)):
+            yield (
+                f"{what}: {type(function).__name__} cannot be simulated; write kinks with Abs, sign or positive_part "
+                f"(rigsight.effects.symbols), and else use {', '.join(f.__name__ for f in _SMOOTH)}."
+            )
+
+
+def _composition_faults(effect: Effect) -> Iterator[str]:
+    for rig in (rig for rig in _rigs() if rig.offers(effect)):
+        try:
+            compose(rig, [effect])
+        except Exception as error:
+            # An expression may be wrong in ways that only its use shows; whatever it raises is the declaration's fault.
+            yield f"it cannot be put into {rig.name}: {type(error).__name__}: {error}"
+
+
+def _rigs() -> list[Rig]:
+    """Return the built-in rigs of one joint: what an effect does there, it does at each joint of larger ones."""
+    return [rig for rig in RIGS.values() if rig.has_one_motion]

@@ -1,0 +1,224 @@
+"""How do a user's own effects, from a Python file or an installed package, come to compete with the catalogue's?
+
+A file is code that the user chose to run: it is executed, and whatever it declares at its top level as an `Effect` is taken.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.metadata
+import textwrap
+import traceback
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from rigsight.discover.terms.monomials import known_terms
+from rigsight.effects import AT, CATALOGUE, Effect, placed
+from rigsight.errors import InputError, RigsightError, check_option
+from rigsight.records.formats.ordinary_file import file_size
+from rigsight.simulate.printing.text import text
+from rigsight.workflow.own.effect_declaration import declaration_faults, equations
+from rigsight.workflow.own.effect_promises import broken_promises
+from rigsight.workflow.progress import Listener, Stage, silent
+
+ENTRY_POINTS = "rigsight.effects"
+"""Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
+CHECKING = "Checking own effects"
+_LONGEST_EQUATION = 160
+_LARGEST_FILE = 1_000_000
+
+
+@dataclass(frozen=True)
+class OwnEffect:
+    """An effect that is not of the catalogue, with where it was declared, as messages call it."""
+
+    effect: Effect
+    declared: str
+
+
+def own_effects(
+    files: Iterable[str | Path] = (), *, check: bool = True, listener: Listener = silent
+) -> tuple[Effect, ...]:
+    """Return the effects of installed packages and of Python files.
+
+    Parameters
+    ----------
+    files
+        Python files that declare effects.
+    check
+        Simulate and fit each of them, to see that it keeps what the catalogue's effects promise; False where a model that
+        was already fitted is only to be run.
+    listener
+        Told of every checked effect.
+
+    Raises
+    ------
+    InputError
+        Naming file and line, if a file cannot be run, declares no effect or a name twice, or an effect breaks a promise.
+    """
+    found: list[OwnEffect] = []
+    taken = {effect.name: "the catalogue" for effect in known_terms().values()}
+    distinct = {Path(file).resolve(): Path(file) for file in files}.values()
+    for own in (*_installed(), *(own for path in distinct for own in _loaded(path))):
+        if any(own.effect is other.effect for other in found):
+            continue
+        faults = declaration_faults(own.effect)
+        if faults:
+            raise InputError(_message(own, faults))
+        if own.effect.name in taken:
+            raise InputError(
+                f"{own.declared}: the effect name '{own.effect.name}' is taken by {taken[own.effect.name]}; name it otherwise."
+            )
+        taken[own.effect.name] = own.declared
+        found.append(own)
+    if not found:
+        return ()
+    stage = Stage(CHECKING, len(found), listener)
+    for own in found:
+        _check_parents(own, taken)
+        if check:
+            broken = broken_promises(own.effect)
+            if broken:
+                raise InputError(_message(own, broken))
+            stage.finished(own.effect.name)
+    return tuple(own.effect for own in found)
+
+
+def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects of the catalogue and `own` with these names, all of them where none is named.
+
+    A name may say where the effect acts, ``coulomb_friction@shaft``; whether a rig has this place is not known here.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest and all known effects.
+    """
+    known = {effect.name: effect for effect in (*CATALOGUE, *own)}
+    found = []
+    for name in dict.fromkeys(names):
+        kind, at, place = name.partition(AT)
+        effect = known[check_option("Effect", kind, known)]
+        found.append(placed(effect, place) if at else effect)
+    return tuple(found) or tuple(known.values())
+
+
+def equation_text(effect: Effect) -> str:
+    """Return an effect's equation in one line of plain text, cut where it is long."""
+    told = {
+        "torque": "resisting torque = {}",
+        "spring": "spring torque = {}",
+        "deflection": "deflection of the spring = {}",
+        "drive": "drive = {}",
+        "delay": "drive = u(t - {})",
+        "lateral": "lateral rate = {}",
+        "measured": "measured = {}",
+        "measured_late": "measured = reading(t - {})",
+    }
+    lines = [told[field].format(text(expression, {})) for field, expression in equations(effect).items()]
+    for state in effect.states:
+        limit = "" if state.limit is None else f" within +-{text(state.limit, {})}"
+        lines.append(f"{state.symbol}' = {text(state.rate, {})}{limit}")
+    return textwrap.shorten(", ".join(lines).replace("*", " "), _LONGEST_EQUATION, placeholder=" ...")
+
+
+def _message(own: OwnEffect, faults: Sequence[str]) -> str:
+    start = f"{own.declared}: effect '{own.effect.name}': "
+    return "\n".join(f"{start}{fault}" for fault in faults[:5])
+
+
+def _check_parents(own: OwnEffect, taken: Iterable[str]) -> None:
+    for parent in own.effect.parents:
+        if parent not in taken:
+            raise InputError(
+                f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is no known effect."
+            )
+
+
+def _loaded(path: Path) -> list[OwnEffect]:
+    """Run a Python file and return the effects that it declares, in the order of declaration."""
+    source = _source(path)
+    try:
+        tree = ast.parse(source, filename=str(path))
+        code = compile(tree, str(path), "exec", dont_inherit=True)
+    except SyntaxError as error:
+        raise InputError(f"{path.name}, line {error.lineno}: is not valid Python: {error.msg}.") from None
+    except ValueError as error:
+        raise InputError(f"{path.name}: is not valid Python: {error}.") from None
+    except (RecursionError, MemoryError):
+        raise InputError(f"{path.name}: is nested deeper than Python reads.") from None
+    module = ModuleType(f"rigsight_own_effects_{path.stem}")
+    module.__file__ = str(path)
+    try:
+        exec(code, module.__dict__)
+    except (Exception, SystemExit) as error:
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
+        where = f"{path.name}, line {lines[-1]}" if lines else path.name
+        kind = "" if isinstance(error, RigsightError) else f"{type(error).__name__}: "
+        raise InputError(f"{where}: running the file failed: {kind}{error}") from None
+    lines_of = _assignments(tree)
+    declared = [
+        OwnEffect(value, f"{path.name}, line {lines_of[name]}" if name in lines_of else path.name)
+        for name, value in vars(module).items()
+        if isinstance(value, Effect) and not any(value is effect for effect in CATALOGUE)
+    ]
+    if not declared:
+        raise InputError(
+            f"{path.name}: declares no effect. Give it at least one: MY_EFFECT = Effect(name=..., ...) at the top level."
+        )
+    return declared
+
+
+def _source(path: Path) -> str:
+    if path.exists() and file_size(path, "the Python file with the effects") > _LARGEST_FILE:
+        raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB: it is no file of effects.")
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}).") from None
+    except FileNotFoundError:
+        raise InputError(
+            f"{path} does not exist; --effects names a Python file. One effect of the catalogue alone is tried with --effect."
+        ) from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _assignments(tree: ast.Module) -> dict[str, int]:
+    """Return the line in which each name of the top level is given its value last."""
+    lines = {}
+    for statement in tree.body:
+        targets: list[ast.expr] = []
+        if isinstance(statement, ast.Assign):
+            targets = statement.targets
+        elif isinstance(statement, ast.AnnAssign):
+            targets = [statement.target]
+        for target in targets:
+            for node in ast.walk(target):
+                if isinstance(node, ast.Name):
+                    lines[node.id] = statement.lineno
+    return lines
+
+
+def _installed() -> list[OwnEffect]:
+    """Return the effects of installed packages."""
+    found = []
+    for entry in importlib.metadata.entry_points(group=ENTRY_POINTS):
+        package = entry.dist.name if entry.dist is not None else "an installed package"
+        declared = f"{package} (entry point {entry.name})"
+        try:
+            loaded = entry.load()
+        except Exception as error:
+            raise InputError(
+                f"{declared}: cannot be loaded: {type(error).__name__}: {error}. Mend or uninstall it."
+            ) from None
+        effects = loaded if isinstance(loaded, tuple | list) else (loaded,)
+        for effect in effects:
+            if not isinstance(effect, Effect):
+                raise InputError(
+                    f"{declared}: gives a {type(effect).__name__}, not an Effect. Mend or uninstall it."
+                )
+            found.append(OwnEffect(effect, declared))
+    return found
