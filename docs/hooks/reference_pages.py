@@ -30,7 +30,7 @@ PACKAGES = (
 )
 """From what is measured to what is shown, as the rooms of the house lie above each other."""
 COMMANDS = (
-    "campaign",
+    "campaigns.campaign",
     "diagnose",
     "identify",
     "discover",
@@ -38,7 +38,7 @@ COMMANDS = (
     "simulate",
     "vary",
     "blind",
-    "model_file",
+    "files.model_file",
 )
 """Modules of `rigsight.workflow` that are public one by one: each command is a function of its own module."""
 

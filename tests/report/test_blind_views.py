@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from rigsight.blind import Outcome, WithheldError
-from rigsight.report import blind_views as views
+from rigsight.report.blind_bench import views
 
 from .blind_content import content_of
 

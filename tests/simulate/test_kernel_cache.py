@@ -16,7 +16,8 @@ import rigsight
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS
-from rigsight.simulate import compose, kernel_cache, simulate
+from rigsight.simulate import compose, simulate
+from rigsight.simulate.compiled import kernel_cache
 from rigsight.simulate.compiled.compiler import c_compilers, library
 from rigsight.simulate.compiled.kernel_source import kernel_source
 

@@ -19,11 +19,11 @@ import pytest
 from rigsight.blind import Outcome, Trial, n_trials, subject_of
 from rigsight.errors import InputError, MachineError, RigsightError
 from rigsight.records import Record
-from rigsight.workflow import blind, blind_trial
+from rigsight.workflow import blind
 from rigsight.workflow.blind import rescore, run_blind
 from rigsight.workflow.blind_bench.files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
 from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.trial import diagnose_trial
+from rigsight.workflow.blind_bench.trial import _environment, diagnose_trial
 from rigsight.workflow.campaigns.campaign import read_campaign
 
 SEED = 4711
@@ -290,4 +290,4 @@ def test_a_disk_without_room_for_results_says_so(bench: BenchFolder, monkeypatch
 
 def test_what_diagnosing_needs_is_all_that_it_gets(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIGSIGHT_SECRET", "backlash")
-    assert "RIGSIGHT_SECRET" not in blind_trial._environment()
+    assert "RIGSIGHT_SECRET" not in _environment()

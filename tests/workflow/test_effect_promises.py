@@ -9,7 +9,7 @@ import sympy as sp
 from rigsight.effects import Effect, Energy, GainTrend, Place, Signature
 from rigsight.effects.symbols import v
 from rigsight.parameters import Parameter
-from rigsight.workflow import effect_promises as promises
+from rigsight.workflow.own import effect_promises as promises
 
 DAMPING = Parameter(
     "c_1", "second damper", "force time x^-1", lower=0.0, null=0.0, starts=(0.3,), search=(0.0, 10.0)

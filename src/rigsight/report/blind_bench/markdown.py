@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from rigsight.report import blind_views as views
+from rigsight.report.blind_bench import views
 from rigsight.report.blind_bench.confusion import confusion, pair_rows
 
 _MOST_WRONG = 100

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from rigsight.report import blind_views as views
+from rigsight.report.blind_bench import views
 from rigsight.report.blind_bench.confusion import confusion, pair_rows
 from rigsight.report.blind_bench.figures import held_out_figure, reliability_figure
 from rigsight.report.render import environment
