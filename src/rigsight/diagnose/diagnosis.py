@@ -17,6 +17,7 @@ from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
 from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.remainder import remainder_of
 from rigsight.diagnose.result import (
     Candidate,
     Diagnosis,
@@ -185,6 +186,10 @@ def _assembled(
     where = tuple(rig.where(effect) for effect in chosen)
     if judgement.verdict == "unknown":
         where = _evidence(found)
+    left = None
+    if found.adequacy is not None:
+        lower_bound = any(floor.lower_bound for floor in floors)
+        left = remainder_of(linear, judgement.model, found.adequacy, lower_bound)
     return Diagnosis(
         title=task.title,
         rig=rig.name,
@@ -206,6 +211,8 @@ def _assembled(
         if is_effect
         else (),
         places=found.places,
+        adequate=None if found.adequacy is None else found.adequacy.adequate,
+        remainder=left,
         localization=localize(bench, traces, scored_on, before, linear, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.adequacy import Adequacy, adequacy
 from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
 from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candidates, fit_linear, refine
 from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
@@ -15,9 +16,11 @@ from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.candidates.one_law import told_apart
 from rigsight.diagnose.data.data_quality import data_quality, with_best_model
 from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.main_cause import main_cause
 from rigsight.diagnose.places.search import Search, search_places
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
+from rigsight.diagnose.second_cause import with_own_evidence
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing, leading_output
@@ -53,6 +56,8 @@ class Examination:
         Pairs that came near and do not compete, as many another law would come as near.
     places
         Where a push takes away how much of the gap; empty on a rig with one motion.
+    adequacy
+        Whether what the model of the verdict leaves goes with anything; None where that model could not be scored.
     """
 
     bench: Workbench
@@ -64,6 +69,7 @@ class Examination:
     quality: DataQuality
     imitations: tuple[Scored, ...] = ()
     places: tuple[SuspectedPlace, ...] = ()
+    adequacy: Adequacy | None = None
 
 
 def examine(
@@ -125,16 +131,29 @@ def examine(
         models = cut
     bench, before, linear = models.bench, models.before, models.linear
     pairs, imitations = told_apart(pairs, models.singles, allowed)
+    if not in_windows:
+        pairs = with_own_evidence(bench, models.singles, pairs)
 
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
+    checks = Checks(bench, rng)
     ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
             ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
-        judgement = judge(before.excess, linear, ranking.order[0], lower_bound, task.rig.is_driven)
+        best, tied = ranking.order[0], ranking.tied
+        judgement = judge(
+            before.excess,
+            linear,
+            best,
+            checks.is_adequate,
+            lambda: main_cause(task.rig, linear, best, tied, vector, rng),
+            lower_bound,
+        )
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     quality = with_best_model(models.quality, bench, judgement.model)
+    left = checks.of(judgement.model) if judgement.model.residuals else None
+    say("adequacy")
     return Examination(
         models.bench,
         models.windowing,
@@ -145,7 +164,27 @@ def examine(
         quality,
         tuple(imitations),
         models.search.places,
+        left,
     )
+
+
+class Checks:
+    """Whether what each model leaves is noise and disturbance, asked once of each."""
+
+    def __init__(self, bench: Workbench, rng: np.random.Generator) -> None:
+        self._bench = bench
+        self._rng = rng
+        self._known: dict[tuple[str, ...], Adequacy] = {}
+
+    def of(self, model: Scored) -> Adequacy:
+        """Return what a model's remainder goes with."""
+        if model.names not in self._known:
+            self._known[model.names] = adequacy(self._bench, model, self._rng)
+        return self._known[model.names]
+
+    def is_adequate(self, model: Scored) -> bool:
+        """Return True where nothing contradicts that it is noise and disturbance."""
+        return self.of(model).adequate
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.location.gap_parts import Localization
+from rigsight.diagnose.remainder import Remainder
 from rigsight.discover import MissingForce
 from rigsight.effects import kind_of
 
@@ -235,6 +236,10 @@ class Diagnosis:
         largest first; empty on a rig with one motion.
     missing_force
         What sparse regression makes of the force that is lacking, where no effect explains the gap.
+    adequate
+        Whether what the diagnosed simulation leaves is noise and disturbance; None where that could not be asked.
+    remainder
+        What it leaves above them; None as above.
     """
 
     title: str
@@ -259,6 +264,8 @@ class Diagnosis:
     effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     places: tuple[SuspectedPlace, ...] = ()
     missing_force: MissingForce | None = None
+    adequate: bool | None = None
+    remainder: Remainder | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -269,6 +276,8 @@ class Diagnosis:
             "verdict": self.verdict,
             "effects": list(map(kind_of, self.effects)),
             "where": list(self.where),
+            "adequate": self.adequate,
+            "remainder": None if self.remainder is None else self.remainder.to_json(),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
             "candidates": [_candidate(candidate) for candidate in self.candidates],
             "gap": {

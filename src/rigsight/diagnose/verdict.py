@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from rigsight.diagnose.main_cause import MainCause
 from rigsight.diagnose.result import Verdict
 from rigsight.diagnose.workbench import Scored
 
@@ -21,11 +23,7 @@ moves a rig with memory more than the resting rig shows, up to 1.44 of a gap of 
 1.2 of gaps below 5, from 4 of larger ones). A relative of an unknown cause may close 99 % of a large gap and still leaves more.
 """
 _HALF = 0.5
-"""Share of the re-identified gap that an effect of an element must close to be named its cause above a lower bound of the floor.
-
-An assumption, not a result: measured hysteresis never has exactly the form of its equation (the dampers it was first tried on
-leave three to four times their noise floor), but a relative of an unknown cause may close as much.
-"""
+"""Share of the re-identified gap that an effect must close to be named where it leaves more than the floor; an assumption."""
 
 
 @dataclass(frozen=True)
@@ -37,21 +35,18 @@ class Judgement:
     reason: str
 
 
-_NEARLY_ALL = 0.9
-"""Share of the gap of a driven rig that an effect must close to be named where it leaves more than that lower bound excuses.
-
-An assumption: colored noise may stand 30 times above white noise (a circuit whose cubic spring leaves so much closes 96 %),
-while relatives of an unknown cause closed 55 to 80 %.
-"""
-
-
 def most_left(gap: float) -> float:
     """Return what a named cause may leave, in units of a measured noise floor, of a gap in the same units."""
     return min(max(LEAST_LEFT, 1.0 + _LEFT_OF_GAP * (gap - 1.0)), MOST_LEFT)
 
 
 def judge(
-    before_excess: float, linear: Scored, best: Scored, lower_bound: bool = False, is_driven: bool = True
+    before_excess: float,
+    linear: Scored,
+    best: Scored,
+    is_adequate: Callable[[Scored], bool],
+    cause: Callable[[], MainCause],
+    lower_bound: bool = False,
 ) -> Judgement:
     """Return the verdict on the held-out errors, all in units of the noise floor.
 
@@ -63,11 +58,13 @@ def judge(
         The re-identified equations.
     best
         The best model with an effect.
+    is_adequate
+        Says whether what a model leaves goes with nothing, see `adequacy`.
+    cause
+        Says how much of the gap the best model takes, and what contradicts it.
     lower_bound
         True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
         may stand well above it, so that a modest rest which no model lowers is taken for noise.
-    is_driven
-        False for an element on a bench: where no mass smooths the force, no form of it is exact.
     """
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
     helps = best.excess * _WORTHWHILE < linear.excess
@@ -83,27 +80,45 @@ def judge(
             )
         return Judgement("none", linear, "The gap is too small against the noise floor to have a cause.")
     if not helps:
-        return Judgement("unknown", linear, "No effect of the catalogue lowers the held-out error.")
+        if not is_adequate(linear):
+            return Judgement("unknown", linear, "No effect of the catalogue lowers the held-out error.")
+        noisy = f"What the equations leave, {linear.excess:.3g} times the noise floor, goes with nothing: the floor is too low."
+        if retuned:
+            return Judgement("parameters", linear, f"{noisy} Better numbers explain the rest of the gap.")
+        return Judgement("none", linear, noisy)
     closed = (linear.excess - best.excess) / (linear.excess - 1.0)
-    nearest = f"The best candidate ({', '.join(best.names)}) closes {closed:.0%} of the re-identified gap"
     floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
     allowed = AT_LOWER_BOUND if lower_bound else most_left(linear.excess)
-    excused = lower_bound and (not is_driven or closed >= _NEARLY_ALL)
-    if best.excess > allowed and not excused:
+    nearest = f"{', '.join(best.names)} closes {closed:.0%} of the re-identified gap"
+    if best.excess <= AT_FLOOR:
+        return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
+    if best.excess <= allowed and closed >= _HALF:
+        return Judgement("effect", best, f"{nearest} and leaves {best.excess:.3g} times {floor}.")
+    if is_adequate(best):
+        return Judgement(
+            "effect",
+            best,
+            f"{nearest}; the {best.excess:.3g} times {floor} that it leaves go with nothing, so that they count as noise and "
+            "disturbance.",
+        )
+    taken = cause()
+    if taken.clear:
+        return Judgement(
+            "effect",
+            best,
+            f"{nearest}: the main cause, or its nearest relative at that place. It leaves {best.excess:.3g} times {floor}, which "
+            "still goes with something.",
+        )
+    if taken.contradicted_by:
+        others = "; ".join(", ".join(model.names) for model in taken.contradicted_by[:3])
         return Judgement(
             "unknown",
             best,
-            f"{nearest} but leaves {best.excess:.3g} times {floor}; a cause that is named must leave less than "
-            f"{allowed:.3g} times. A disturbance that shows only while the rig moves would look the same: repeat one record, and "
-            "what differs is disturbance.",
+            f"{nearest}, but others are as good and act elsewhere ({others}): they contradict each other.",
         )
-    if best.excess > at_floor and closed < _HALF:
-        return Judgement("unknown", best, f"{nearest}, which is less than half.")
-    if best.excess <= AT_FLOOR:
-        return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
     return Judgement(
-        "effect",
+        "unknown",
         best,
-        f"The effect closes {closed:.0%} of the re-identified gap but leaves {best.excess:.3g} times {floor}: "
-        f"something smaller is missing too, its form differs, or there is more noise than the floor tells.",
+        f"The best candidate, {', '.join(best.names)}, takes {taken.share:.0%} of the squared gap (at least "
+        f"{taken.at_least:.0%}, 95 %): a main cause must take the larger part.",
     )

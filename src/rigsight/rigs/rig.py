@@ -12,7 +12,7 @@ import sympy as sp
 from rigsight.effects.effect import Effect, Place
 from rigsight.parameters import Parameter
 from rigsight.rigs.evaluation import evaluated
-from rigsight.rigs.mechanism import Drive, Joint, Mechanism, RateState, Sensor
+from rigsight.rigs.mechanism import Coordinate, Drive, Joint, Mechanism, RateState, Sensor
 from rigsight.rigs.signal import Signal
 from rigsight.units import unit_text
 
@@ -209,10 +209,16 @@ class Rig:
 
     @cached_property
     def follower(self) -> Follower | None:
-        """The first-order state that follows the motion, if the rig has one."""
-        if not self.has_one_motion:
+        """The first-order state that follows the motion of a rig with one joint and drives nothing, if there is one."""
+        mechanism = self.mechanism
+        if not len(mechanism.coordinates) == len(mechanism.joints) == 1:
             return None
-        found = (_follower(state, self.motion) for state in self.mechanism.states)
+        read = {symbol for drive in mechanism.drives for symbol in (drive.signal + drive.force).free_symbols}
+        found = (
+            _follower(state, mechanism.coordinates[0])
+            for state in mechanism.states
+            if state.symbol not in read
+        )
         return next((follower for follower in found if follower is not None), None)
 
     @property
@@ -372,12 +378,12 @@ def joint_of(rig: Rig, effect: Effect) -> Joint:
     return next((joint for joint in joints if joint.name == effect.at), joints[0])
 
 
-def _follower(state: RateState, motion: Motion) -> Follower | None:
+def _follower(state: RateState, motion: Coordinate) -> Follower | None:
     """Return how a state follows the motion; None where its rate is not a sum of the two, each with a factor."""
-    gain, back = sp.diff(state.rate, motion.displacement), sp.diff(state.rate, state.symbol)
-    moving = {motion.displacement, motion.velocity, state.symbol}
+    gain, back = sp.diff(state.rate, motion.symbol), sp.diff(state.rate, state.symbol)
+    moving = {motion.symbol, motion.rate, state.symbol}
     if gain == 0 or back == 0 or (gain.free_symbols | back.free_symbols) & moving:
         return None
     creepage, feedback = sp.expand(state.rate / gain), -back / gain
-    displacement = sp.simplify((motion.displacement - creepage) / feedback)
-    return Follower(state.symbol, displacement, motion.displacement - displacement * feedback, gain, feedback)
+    displacement = sp.simplify((motion.symbol - creepage) / feedback)
+    return Follower(state.symbol, displacement, motion.symbol - displacement * feedback, gain, feedback)

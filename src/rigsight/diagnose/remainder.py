@@ -1,0 +1,77 @@
+"""What does a named cause leave, how much of the gap is that, and with what does it still go?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigsight.diagnose.adequacy import Adequacy
+from rigsight.diagnose.workbench import Scored
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the model of the verdict leaves above noise and disturbance.
+
+    Attributes
+    ----------
+    share
+        Of the squared gap of the re-identified equations; 0 where it goes with nothing and so counts as noise and disturbance.
+    where
+        Joint, drive or sensor at which it arises; empty where it goes with nothing, or with no place.
+    goes_with
+        Signal, time or record; empty where it goes with nothing.
+    p_value
+        Probability that noise and disturbance alone would agree as well with anything that was looked at.
+    """
+
+    share: float
+    where: tuple[str, ...]
+    goes_with: str
+    p_value: float
+
+    @property
+    def text(self) -> str:
+        """The same in one sentence."""
+        if not self.goes_with:
+            return (
+                "What is left goes with no motion, drive, reading, time or record that was looked at "
+                f"(p = {self.p_value:.2g}): it counts as noise and disturbance."
+            )
+        return (
+            f"What is left, {100.0 * self.share:.2g} % of the squared gap, still goes with {self.goes_with} "
+            f"(p = {self.p_value:.2g}): something smaller is missing too, or the equation has not quite the form of the rig's."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry ``remainder`` of ``diagnosis.json``."""
+        return {
+            "share": self.share,
+            "where": list(self.where),
+            "goes_with": self.goes_with or None,
+            "p_value": self.p_value,
+            "text": self.text,
+        }
+
+
+def remainder_of(linear: Scored, model: Scored, found: Adequacy, lower_bound: bool) -> Remainder:
+    """Return what a model leaves.
+
+    Parameters
+    ----------
+    linear
+        The re-identified equations.
+    model
+        The model of the verdict.
+    found
+        Whether what it leaves goes with anything.
+    lower_bound
+        True if the noise floor is only a lower bound: then only what surely goes with something counts as remainder.
+    """
+    if found.adequate:
+        return Remainder(0.0, (), "", found.p_value)
+    strongest = found.agreements[0]
+    above = strongest.share * model.excess**2 if lower_bound else max(model.excess**2 - 1.0, 0.0)
+    whole = linear.excess**2 if lower_bound else max(linear.excess**2 - 1.0, 1e-300)
+    where = (strongest.place,) if strongest.place else ()
+    return Remainder(min(1.0, above / whole), where, strongest.what, found.p_value)
