@@ -35,8 +35,8 @@ SIGNIFICANCE = 0.01
 _TURNS = 9999
 _STRETCHES = 16
 """Stretches of all records together whose signs are turned: as long as can be, so that neighbors hang together little, and so
-many that of their 32,768 turns enough are rarer than what decides. On 33 true models of the blind bench (seed 9) p-values were uniform
-with 16 and with 32 of them, and too small with 64 and more (`experiments/adequacy`)."""
+many that of their 32,768 turns enough are rarer than what decides. On 33 true models of the blind bench (seed 9) p-values were
+uniform with 16 and with 32 of them, and too small with 64 and more (`experiments/adequacy`)."""
 _KNOTS = (0.02, 0.15, 0.35, 0.5, 0.65, 0.85, 0.98)
 """Quantiles of a signal at which the corners of a piecewise linear function of it stand."""
 _PUSH = 1e-3

@@ -20,7 +20,7 @@ from rigsight.diagnose.main_cause import main_cause
 from rigsight.diagnose.places.search import Search, search_places
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
-from rigsight.diagnose.second_cause import with_own_evidence
+from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing, leading_output
@@ -114,12 +114,13 @@ def examine(
     pairs: list[Scored] = []
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
     cut, in_windows = None, False
+    forms = OtherForms(models.bench, lower_bound)
     if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
         cut = _cut(task, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
     if not in_windows:
-        pairs = _grown(models, effects, lower_bound, task.rig.is_driven, prepare)
+        pairs = _grown(models, effects, forms, lower_bound, task.rig.is_driven, prepare)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
         if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
@@ -132,7 +133,7 @@ def examine(
     bench, before, linear = models.bench, models.before, models.linear
     pairs, imitations = told_apart(pairs, models.singles, allowed)
     if not in_windows:
-        pairs = with_own_evidence(bench, models.singles, pairs)
+        pairs = forms.with_own_evidence(models.singles, pairs)
 
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
     checks = Checks(bench, rng)
@@ -242,6 +243,7 @@ def _singly(
 def _grown(
     models: _Singly,
     effects: Sequence[Effect],
+    forms: OtherForms,
     lower_bound: bool,
     is_driven: bool,
     prepare: Prepare | None,
@@ -254,7 +256,7 @@ def _grown(
     is_excused = lower_bound and min((m.excess for m in models.singles), default=np.inf) <= AT_LOWER_BOUND
     if is_excused and not is_driven:
         return []
-    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, prepare)
+    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, forms, prepare)
     return [pair for pair in pairs if not is_excused or pair.excess <= AT_FLOOR]
 
 

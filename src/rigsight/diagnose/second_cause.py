@@ -1,8 +1,8 @@
 """Has a second effect evidence of its own, or does it only soak up what the first one's inexact form leaves?
 
 No form is exact on a measured rig: a sign is rounded, a spring bends a little. What that leaves goes with the same signal as the
-effect itself, and many a second effect takes it up as well as a truer form of the first would. So the gain of a pair is held
-against that of any other law of the first effect's own signal at the first effect's place.
+effect itself, and many a second effect takes it up as well as a truer form of the first would. So what a pair gains is held
+against what any other law of the first effect's own signal, at the first effect's place, would gain.
 """
 
 from __future__ import annotations
@@ -10,47 +10,70 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigsight.diagnose.adequacy import law_columns
-from rigsight.diagnose.candidates.one_law import is_one_law
+from rigsight.diagnose.candidates.one_law import are_one_law, is_one_law
 from rigsight.diagnose.places.answers import Answers, orthonormal
 from rigsight.diagnose.workbench import Scored, Workbench
-
-Floats = NDArray[np.float64]
+from rigsight.effects import Effect
 
 _OTHER_FORM = 0.5
-"""Share of a pair's gain that another form of its first effect may take: from a half on, that form explains more than the second."""
+"""Share of a gain that another form of the first effect may take: from a half on, it explains more than the second effect."""
 
 
-def with_own_evidence(bench: Workbench, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
-    """Return the pairs whose second effect explains more than a truer form of the first would.
+class OtherForms:
+    """What other forms of single effects would explain of what these leave, asked once of each.
 
     Parameters
     ----------
     bench
         Records, scales and noise.
-    singles
-        Every effect alone, fitted and scored.
-    pairs
-        Fitted and scored, with the effect first that explains more by itself.
+    lower_bound
+        True if the noise floor is only a lower bound, so that nothing of a remainder can be put down to noise beforehand.
     """
-    alone = {model.names[0]: model for model in singles if model.residuals and np.isfinite(model.excess)}
-    forms: dict[str, tuple[Answers, Floats]] = {}
 
-    def stands(pair: Scored) -> bool:
-        single = alone.get(pair.names[0])
-        # Two effects that are one law are another form of each other; they are told apart by other means.
-        if single is None or not pair.residuals or is_one_law(pair):
-            return True
-        if pair.names[0] not in forms:
-            fit = bench.problem(single.fit.structure, bench.scoring).fit(single.fit.values, [])
-            answers = Answers(bench, bench.scoring, fit, single.effects, single.fit.free)
-            columns = law_columns(answers, single.effects[0])
-            forms[pair.names[0]] = answers, orthonormal(answers.without_free(columns))
-        answers, form = forms[pair.names[0]]
-        gained = single.excess**2 - pair.excess**2
-        by_form = float(np.sum((form.T @ answers.left) ** 2)) / answers.n_measured
-        return by_form < _OTHER_FORM * gained
+    def __init__(self, bench: Workbench, lower_bound: bool) -> None:
+        self._bench = bench
+        self._noise = 0.0 if lower_bound else 1.0
+        self._known: dict[str, float] = {}
 
-    return [pair for pair in pairs if stands(pair)]
+    def gain(self, single: Scored) -> float:
+        """Return by how much the mean square error of a single effect, in units of the noise floor, falls with another form."""
+        (name,) = single.names
+        if name not in self._known:
+            fit = self._bench.problem(single.fit.structure, self._bench.scoring).fit(single.fit.values, [])
+            answers = Answers(self._bench, self._bench.scoring, fit, single.effects, single.fit.free)
+            form = orthonormal(answers.without_free(law_columns(answers, single.effects[0])))
+            self._known[name] = float(np.sum((form.T @ answers.left) ** 2)) / answers.n_measured
+        return self._known[name]
+
+    def partners(self, single: Scored, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the effects that are worth trying beside a single one.
+
+        Where another form of it would take most of what it leaves, only those are that make one law with it.
+        """
+        above_noise = max(single.excess**2 - self._noise, 0.0)
+        if self.gain(single) < _OTHER_FORM * above_noise:
+            return list(effects)
+        return [e for e in effects if are_one_law((*single.effects, e), self._bench.rig)]
+
+    def with_own_evidence(self, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
+        """Return the pairs whose second effect explains more than another form of the first would.
+
+        Parameters
+        ----------
+        singles
+            Every effect alone, fitted and scored.
+        pairs
+            Fitted and scored, with the effect first that explains more by itself.
+        """
+        alone = {model.names[0]: model for model in singles if model.residuals and np.isfinite(model.excess)}
+
+        def stands(pair: Scored) -> bool:
+            single = alone.get(pair.names[0])
+            # Two effects that are one law are another form of each other; they are told apart by other means.
+            if single is None or not pair.residuals or is_one_law(pair):
+                return True
+            return self.gain(single) < _OTHER_FORM * (single.excess**2 - pair.excess**2)
+
+        return [pair for pair in pairs if stands(pair)]

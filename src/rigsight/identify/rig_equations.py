@@ -152,9 +152,10 @@ class RigEquations:
 
         Shape (n_coordinates, n_samples) each.
         """
-        rows = self._evaluated(self._along, z, u, p).reshape(-1, self.n_coordinates, z.shape[1])
         mechanism = self.rig.mechanism
         places = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
+        shape = (len(places), self.n_coordinates, z.shape[1])
+        rows = np.reshape(self._evaluated(self._along, z, u, p), shape)
         return dict(zip(places, rows, strict=True))
 
     def changes_of_equations(

@@ -20,6 +20,7 @@ import numpy as np
 from rigsight.diagnose.candidates.characterize import finished, followed, refine
 from rigsight.diagnose.candidates.first_look import Look, look_at, widened
 from rigsight.diagnose.places.search import search_places
+from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import Structure, carried_over
@@ -64,6 +65,7 @@ def grown(
     singles: Sequence[Scored],
     effects: Sequence[Effect],
     at_floor: float,
+    forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
     """Return pairs of effects that close at least half of what the best single leaves, fitted and scored.
@@ -78,6 +80,8 @@ def grown(
         Candidates for the second place.
     at_floor
         Held-out error in units of the noise floor at which nothing is left to explain.
+    forms
+        Says which effects are worth trying beside another.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
 
@@ -102,7 +106,7 @@ def grown(
     pairs: list[Scored] = []
     for parent in beam:
         if min((pair.excess for pair in pairs), default=np.inf) > _NOTHING_LEFT:
-            pairs += _grown_from(bench, parent, effects, pairs, usable, prepare)
+            pairs += _grown_from(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
         # What came second may be right and the first only its relative: another as good alone may do better in its place.
@@ -110,7 +114,7 @@ def grown(
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
                 instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
-                pairs += _grown_from(bench, second, instead, pairs, usable, prepare)
+                pairs += _grown_from(bench, second, forms.partners(second, instead), pairs, usable, prepare)
     for _ in range(MOST_EFFECTS):
         best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
         if best_pair is None or not _NOTHING_LEFT < best_pair.excess <= allowed:

@@ -14,6 +14,7 @@ import sympy as sp
 from rigsight.diagnose.workbench import Scored
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
+from rigsight.rigs import Rig
 
 _EXACT = 1.03
 """Held-out error in units of the noise floor up to which such a pair counts as exact: floors are known to a few percent.
@@ -53,10 +54,21 @@ def is_one_law(model: Scored) -> bool:
     model
         With any number of effects.
     """
-    at_one_place = len({effect.at for effect in model.effects}) == 1
-    return len(model.effects) > 1 and (
-        (at_one_place and _one_force(model.effects)) or _one_linear_system(model)
-    )
+    return are_one_law(model.effects, model.fit.structure.rig)
+
+
+def are_one_law(effects: Sequence[Effect], rig: Rig) -> bool:
+    """Return True for effects that are one law together on a rig.
+
+    Parameters
+    ----------
+    effects
+        Any number, each at its place.
+    rig
+        The rig.
+    """
+    at_one_place = len({effect.at for effect in effects}) == 1
+    return len(effects) > 1 and ((at_one_place and _one_force(effects)) or _one_linear_system(effects, rig))
 
 
 def _one_force(effects: Sequence[Effect]) -> bool:
@@ -68,12 +80,12 @@ def _one_force(effects: Sequence[Effect]) -> bool:
     )
 
 
-def _one_linear_system(model: Scored) -> bool:
+def _one_linear_system(effects: Sequence[Effect], rig: Rig) -> bool:
     """Return True for linear effects between the same signals: many another linear system has their frequency response."""
-    one_output = len(model.fit.structure.rig.outputs) == 1
+    one_output = len(rig.outputs) == 1
     return all(
         is_linear(effect) and effect.lateral is None and (one_output or effect.place is not Place.SENSOR)
-        for effect in model.effects
+        for effect in effects
     )
 
 

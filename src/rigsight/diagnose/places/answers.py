@@ -190,9 +190,8 @@ class Answers:
     def _of_states(self) -> list[Floats]:
         found = []
         for change, weights in zip(self._changes, self._weights, strict=True):
-            columns = (change[:, :, len(self.free) :] * weights[None, :, None]).reshape(
-                -1, len(self.structure.states)
-            )
+            by_state = change[:, :, len(self.free) :] * weights[None, :, None]
+            columns = by_state.reshape(change.shape[0] * change.shape[1], by_state.shape[2])
             found.append(orthonormal(columns))
         return found
 

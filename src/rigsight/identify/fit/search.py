@@ -106,6 +106,8 @@ def _settled(
     place, share, last, first = theta, 1.0, np.zeros(theta.size), float("inf")
     for _ in range(_MOST_STEPS):
         evaluation = _evaluated(problem, place)
+        if not np.isfinite(evaluation.cost) or not np.all(np.isfinite(evaluation.normal)):
+            return None
         first = min(first, evaluation.cost)
         step, length = _step(evaluation, bounds)
         if length <= _SETTLED * np.sqrt(variance):
