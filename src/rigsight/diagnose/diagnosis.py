@@ -118,7 +118,7 @@ def diagnose(
                 f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
                 "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
             )
-    notes += [*found.quality.notes, found.judgement.reason]
+    notes += [*found.quality.notes, found.judgement.reason, *found.doubts]
     if found.judgement.verdict == "unknown" and found.imitations:
         nearest = min(found.imitations, key=lambda pair: pair.excess)
         notes.append(

@@ -18,6 +18,7 @@ from rigsight.diagnose.data.data_quality import data_quality, with_best_model
 from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.main_cause import main_cause
 from rigsight.diagnose.places.search import Search, search_places
+from rigsight.diagnose.plausibility import doubts, plausible_first
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.second_cause import OtherForms
@@ -28,6 +29,7 @@ from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales, linear_start
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 
 _SIGNIFICANT = 3.0
@@ -58,6 +60,8 @@ class Examination:
         Where a push takes away how much of the gap; empty on a rig with one motion.
     adequacy
         Whether what the model of the verdict leaves goes with anything; None where that model could not be scored.
+    doubts
+        What is implausible about the numbers of the model of the verdict.
     """
 
     bench: Workbench
@@ -70,6 +74,7 @@ class Examination:
     imitations: tuple[Scored, ...] = ()
     places: tuple[SuspectedPlace, ...] = ()
     adequacy: Adequacy | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def examine(
@@ -141,6 +146,8 @@ def examine(
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
             ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
+        if ranking.order[0].excess > allowed:
+            ranking = plausible_first(ranking, linear, _places(task.rig, ranking))
         best, tied = ranking.order[0], ranking.tied
         judgement = judge(
             before.excess,
@@ -166,7 +173,12 @@ def examine(
         tuple(imitations),
         models.search.places,
         left,
+        tuple(doubt.text for doubt in doubts(judgement.model, linear)) if judgement.model.effects else (),
     )
+
+
+def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:
+    return {effect.name: rig.acts_at(effect) for model in ranking.order for effect in model.effects}
 
 
 class Checks:

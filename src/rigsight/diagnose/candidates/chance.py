@@ -27,6 +27,8 @@ _SMALLER = (1.0, 0.3)
 """Factors on the declared starts of an effect: too large a play sticks where a small one would not."""
 _GLIMPSED = 3
 """Every so many windows are read at a first glance."""
+_BY_CHANCE = 0.5
+"""Share of what a model leaves from which chance may be what it lacks: below, something else leaves most of it."""
 _GLIMPSE_EVALUATIONS = 10
 _MOST_STARTS = 2
 
@@ -51,7 +53,11 @@ def is_predictable(
     if not usable or usable[0].excess <= at_floor:
         return True
     near = [model for model in usable if model.excess <= _AS_NEAR * usable[0].excess][:_MOST_ASKED]
-    return all(growth_of_disturbances(bench, linear, model, rng) <= PREDICTABLE for model in near)
+    # What chance makes of a disturbance can be no more than a part of what is left, where much more is left.
+    return all(
+        growth_of_disturbances(bench, linear, model, rng) <= max(PREDICTABLE, _BY_CHANCE * model.excess)
+        for model in near
+    )
 
 
 def fitted_in_windows(bench: Workbench, linear: Scored, singles: Sequence[Scored]) -> list[Scored]:
