@@ -67,8 +67,8 @@ class Outcome:
     verdict, named, named_places
         Verdict, named effects, and the place of each; verdict "failed" where the diagnosis ended with an error.
     right
-        The verdict is the truth: the very effects, each at its place, or none, or parameters, or unknown for an effect from
-        outside.
+        The verdict is the truth: the very effects, each at its place, or none, or parameters; for an effect from outside
+        unknown, or a relative at its place that is said to leave a remainder.
     effect_right
         The same, wherever the diagnosis puts the effects.
     right_within_set
@@ -164,8 +164,11 @@ def outcome(
     truth, named = _at_places(key, by_place), _at_places(found, by_place)
     verdict = str(found["verdict"])
     expected = {"none": "none", "parameters": "parameters", "outside": "unknown"}.get(kind, "effect")
-    right = verdict == expected and (expected != "effect" or named == truth)
-    effect_right = verdict == expected and (expected != "effect" or _kinds(named) == _kinds(truth))
+    honest = kind == "outside" and _is_relative_at_its_place(key, found)
+    right = honest or (verdict == expected and (expected != "effect" or named == truth))
+    effect_right = honest or (
+        verdict == expected and (expected != "effect" or _kinds(named) == _kinds(truth))
+    )
     within = expected == "effect" and _is_among(truth, found["ambiguous_with"])
     candidates = {_at_places(c, by_place): float(c["probability"] or 0.0) for c in found["candidates"]}
     left = max(0.0, 1.0 - sum(candidates.values()))
@@ -238,6 +241,12 @@ def _is_among(truth: frozenset[tuple[str, str]], rivals: Sequence[Sequence[str]]
     plain = frozenset(name for name, _ in truth)
     named = frozenset(f"{name}{AT}{place}" for name, place in truth)
     return any(frozenset(rival) in (plain, named) for rival in rivals)
+
+
+def _is_relative_at_its_place(key: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
+    """Return True for a relative that is named at the true place and said to leave a remainder."""
+    named = found["verdict"] == "effect" and found.get("adequate") is False
+    return named and key["where"] is not None and frozenset(found["where"]) == frozenset(key["where"])
 
 
 def _looked_at(key: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:

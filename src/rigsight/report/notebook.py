@@ -18,6 +18,7 @@ from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
     basis_sentence,
+    remainder_sentence,
     verdict_name,
     verdict_sentence,
 )
@@ -43,6 +44,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     sentences = [
         verdict_sentence(diagnosis),
         "" if lacking is None else lacking.sentence,
+        remainder_sentence(diagnosis),
         ambiguity_sentence(diagnosis),
         *advice_sentences(diagnosis),
         basis_sentence(diagnosis),

@@ -21,6 +21,7 @@ from rigsight.report.wording import (
     effects_label,
     named_candidate,
     percent,
+    remainder_sentence,
     stages_told,
     verdict_name,
     verdict_sentence,
@@ -47,6 +48,8 @@ class Summary:
         diagnosis = self.diagnosis
         yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
         yield text(verdict_sentence(diagnosis))
+        if remainder_sentence(diagnosis):
+            yield text(remainder_sentence(diagnosis))
         if diagnosis.missing_force is not None:
             yield text(diagnosis.missing_force.sentence)
         if diagnosis.ambiguous_with:

@@ -67,6 +67,8 @@ def place_label(where: str) -> str:
 
 def verdict_name(diagnosis: Diagnosis) -> str:
     """Return the verdict in two words."""
+    if diagnosis.verdict == "effect" and diagnosis.adequate is False:
+        return "Main cause"
     return _VERDICT_NAMES[diagnosis.verdict]
 
 
@@ -175,6 +177,8 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
     left = times_floor(excess(diagnosis, "after"))
+    if diagnosis.adequate is False:
+        sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
         f"The gap is {sure} by {effects_label(diagnosis.effects)}{' ' if places else ''}{places}; "
         f"adding {it} {_shrinks(diagnosis, 'closes')}, down to {left}."
@@ -201,6 +205,12 @@ def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
     share = (before - after) / (before - 1.0)
     # A set that stays below half a percent would read "closes 0 %".
     return f"{closes} {percent(share)} of the gap" if share >= 0.005 else f"{closes} none of the gap"
+
+
+def remainder_sentence(diagnosis: Diagnosis) -> str:
+    """Return what a named cause leaves and with what that goes; empty where it leaves nothing to tell."""
+    left = diagnosis.remainder
+    return left.text if left is not None and diagnosis.verdict == "effect" and left.goes_with else ""
 
 
 def ambiguity_sentence(diagnosis: Diagnosis) -> str:
