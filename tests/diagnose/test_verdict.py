@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.verdict import AT_FLOOR, MOST_LEFT, Judgement, judge, most_left
+from rigsight.diagnose.main_cause import MainCause
+from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge, most_left
 
 ABOVE, BELOW = 1.001, 0.999
 
@@ -12,10 +13,24 @@ ABOVE, BELOW = 1.001, 0.999
 @pytest.fixture
 def verdict(scored):
     def of(
-        before: float, linear: float, best: float, lower_bound: bool = False, is_driven: bool = True
+        before: float,
+        linear: float,
+        best: float,
+        lower_bound: bool = False,
+        adequate: bool = False,
+        at_least: float = 0.0,
+        contradicted: bool = False,
     ) -> Judgement:
         model = scored(("cubic_stiffness",), excess=best)
-        return judge(before, scored((), excess=linear), model, lower_bound, is_driven)
+        rivals = (scored(("actuator_lag",), excess=best),) if contradicted else ()
+        return judge(
+            before,
+            scored((), excess=linear),
+            model,
+            lambda _: adequate,
+            lambda: MainCause(at_least, at_least, rivals),
+            lower_bound,
+        )
 
     return of
 
@@ -54,12 +69,29 @@ def test_an_effect_must_lower_the_error_by_a_tenth(verdict) -> None:
     assert verdict(5.0, 1.15, 1.15 / 1.1 * ABOVE).verdict == "unknown"
 
 
-def test_above_a_measured_floor_the_nearest_relative_is_not_the_cause(verdict) -> None:
-    assert verdict(100.0, 100.0, MOST_LEFT * BELOW).verdict == "effect"
-    found = verdict(100.0, 100.0, MOST_LEFT * ABOVE)
+def test_what_goes_with_nothing_is_noise_whatever_the_floor_says(verdict) -> None:
+    assert verdict(100.0, 100.0, 5.0, adequate=True).verdict == "effect"
+    assert verdict(100.0, 50.0, 50.0, adequate=True).verdict == "parameters"
+    assert verdict(50.0, 50.0, 50.0, adequate=True).verdict == "none"
+
+
+def test_a_main_cause_is_named_with_what_it_leaves(verdict) -> None:
+    found = verdict(100.0, 100.0, 30.0, at_least=0.51)
+    assert found.verdict == "effect"
+    assert "main cause" in found.reason
+    assert "30 times the noise floor" in found.reason
+
+
+def test_what_takes_less_than_the_larger_part_is_not_the_main_cause(verdict) -> None:
+    found = verdict(100.0, 100.0, 75.0, at_least=0.49)
     assert found.verdict == "unknown"
     assert "cubic_stiffness" in found.reason
-    assert "1.6 times the noise floor" in found.reason
+
+
+def test_models_that_are_as_good_and_act_elsewhere_contradict_it(verdict) -> None:
+    found = verdict(100.0, 100.0, 30.0, at_least=0.9, contradicted=True)
+    assert found.verdict == "unknown"
+    assert "actuator_lag" in found.reason
 
 
 @pytest.mark.parametrize(
@@ -72,25 +104,12 @@ def test_of_a_larger_gap_a_cause_may_leave_more(verdict, gap: float, allowed: fl
     assert verdict(gap, gap, allowed * ABOVE).verdict == "unknown"
 
 
-def test_above_a_lower_bound_the_effect_of_an_element_must_close_half_of_the_gap(verdict) -> None:
-    """From 11 to the floor at 1 are ten: closing five leaves six."""
-    assert verdict(11.0, 11.0, 6.0 * BELOW, lower_bound=True, is_driven=False).verdict == "effect"
-    found = verdict(11.0, 11.0, 6.0 * ABOVE, lower_bound=True, is_driven=False)
-    assert found.verdict == "unknown"
-    assert "cubic_stiffness" in found.reason
-
-
-def test_what_moves_a_mass_far_above_a_lower_bound_is_no_noise(verdict) -> None:
+def test_above_a_lower_bound_an_effect_may_leave_more(verdict) -> None:
     assert verdict(12.0, 12.0, 3.0 * BELOW, lower_bound=True).verdict == "effect"
-    found = verdict(12.0, 12.0, 3.0 * ABOVE, lower_bound=True)
-    assert found.verdict == "unknown"
+    found = verdict(12.0, 12.0, 3.0 * ABOVE, lower_bound=True, at_least=0.9)
+    assert found.verdict == "effect"
     assert "the lower bound of the noise floor" in found.reason
-
-
-def test_far_above_a_lower_bound_nearly_all_of_the_gap_must_be_closed(verdict) -> None:
-    """From 101 to the floor at 1 are a hundred: closing ninety leaves eleven."""
-    assert verdict(101.0, 101.0, 11.0 * BELOW, lower_bound=True).verdict == "effect"
-    assert verdict(101.0, 101.0, 11.0 * ABOVE, lower_bound=True).verdict == "unknown"
+    assert verdict(12.0, 12.0, 3.0 * ABOVE, lower_bound=True).verdict == "unknown"
 
 
 def test_an_effect_that_reaches_the_floor_is_named_whatever_the_gap_was(verdict) -> None:

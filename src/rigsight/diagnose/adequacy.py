@@ -33,10 +33,13 @@ Floats = NDArray[np.float64]
 SIGNIFICANCE = 0.01
 """p-value below which a model is not adequate: one adequate model of a hundred is refused."""
 _TURNS = 9999
-_STRETCHES = 16
+_STRETCHES = 32
 """Stretches of all records together whose signs are turned: as long as can be, so that neighbors hang together little, and so
-many that of their 32,768 turns enough are rarer than what decides. On 33 true models of the blind bench (seed 9) p-values were
-uniform with 16 and with 32 of them, and too small with 64 and more (`experiments/adequacy`)."""
+many that a number which differs in one record shows. On 33 true models of the blind bench (seed 9) p-values were uniform with 16
+and with 32 of them, and too small with 64 and more (`experiments/adequacy`)."""
+_LEAST_SPREAD = 0.25
+"""Share of the stretches over which a remainder must be spread, as their number that would hold its power evenly. Noise is spread
+over nearly all; what stands in a few of them agrees with anything there by one turn in two, so that no p-value can tell."""
 _KNOTS = (0.02, 0.15, 0.35, 0.5, 0.65, 0.85, 0.98)
 """Quantiles of a signal at which the corners of a piecewise linear function of it stand."""
 _PUSH = 1e-3
@@ -76,15 +79,32 @@ class Adequacy:
         Probability that noise and disturbance alone agree as well with anything that was looked at.
     agreements
         With what it goes, the largest share first.
+    is_spread
+        False where it stands in a few stretches of the records, as noise does not.
     """
 
     p_value: float
     agreements: tuple[Agreement, ...]
+    is_spread: bool = True
 
     @property
     def adequate(self) -> bool:
         """True where nothing contradicts that noise and disturbance are all that is left."""
-        return self.p_value >= SIGNIFICANCE
+        return self.is_spread and self.p_value >= SIGNIFICANCE
+
+    @property
+    def goes_with(self) -> str:
+        """With what the largest part of it goes; empty where it is adequate."""
+        if self.adequate:
+            return ""
+        if self.p_value >= SIGNIFICANCE:
+            return "a few stretches of the records"
+        return self.agreements[0].what
+
+    @property
+    def place(self) -> str:
+        """Joint, drive or sensor of what it goes with; empty where that has none."""
+        return "" if self.p_value >= SIGNIFICANCE else self.agreements[0].place
 
 
 def adequacy(bench: Workbench, model: Scored, rng: np.random.Generator) -> Adequacy:
@@ -116,10 +136,13 @@ def adequacy(bench: Workbench, model: Scored, rng: np.random.Generator) -> Adequ
         reached = float(np.sum(np.sum(along, axis=0) ** 2))
         beyond = max(0.0, reached - float(np.mean(turned))) / power
         found.append((Agreement(what, place, _p_value(reached, turned), beyond), turned, reached))
+    powers = np.array([float(seen[part] @ seen[part]) / (part.stop - part.start) for part in stretches])
+    spread = float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= _LEAST_SPREAD * len(stretches)
     if not found:
-        return Adequacy(1.0, ())
+        return Adequacy(1.0, (), spread)
     ordered = tuple(sorted((agreement for agreement, _, _ in found), key=lambda a: -a.share))
-    return Adequacy(_smallest([turned for _, turned, _ in found], [r for _, _, r in found]), ordered)
+    p_value = _smallest([turned for _, turned, _ in found], [reached for _, _, reached in found])
+    return Adequacy(p_value, ordered, spread)
 
 
 def _p_value(reached: float, turned: Floats) -> float:

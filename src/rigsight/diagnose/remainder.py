@@ -70,8 +70,8 @@ def remainder_of(linear: Scored, model: Scored, found: Adequacy, lower_bound: bo
     """
     if found.adequate:
         return Remainder(0.0, (), "", found.p_value)
-    strongest = found.agreements[0]
-    above = strongest.share * model.excess**2 if lower_bound else max(model.excess**2 - 1.0, 0.0)
+    share = found.agreements[0].share if found.agreements else 1.0
+    above = share * model.excess**2 if lower_bound else max(model.excess**2 - 1.0, 0.0)
     whole = linear.excess**2 if lower_bound else max(linear.excess**2 - 1.0, 1e-300)
-    where = (strongest.place,) if strongest.place else ()
-    return Remainder(min(1.0, above / whole), where, strongest.what, found.p_value)
+    where = (found.place,) if found.place else ()
+    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value)

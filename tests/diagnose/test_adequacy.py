@@ -1,0 +1,159 @@
+"""What a model leaves goes with nothing where it is right, and with the right thing where it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from rigsight.diagnose.adequacy import Adequacy, adequacy
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.second_cause import OtherForms
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Effect, effect_named, placed
+from rigsight.identify import characteristic_scales
+from rigsight.records.record import Record
+from rigsight.rigs import AXIS, RIGS
+from rigsight.simulate import compose, simulate
+
+DT, NOISE = 0.01, 2e-5
+VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+
+
+def axis_bench(
+    effects: tuple[Effect, ...] = (),
+    values: dict[str, float] | None = None,
+    seed: int = 0,
+    disturbance: float = 0.0,
+    last: dict[str, float] | None = None,
+) -> Workbench:
+    """Return records of one mass, moved by multisines; `last` are other numbers of the last record."""
+    rng = np.random.default_rng(seed)
+    structure, t = compose(AXIS, effects), DT * np.arange(2400)
+    records = []
+    for i, amplitude in enumerate((0.5, 1.0, 0.7, 0.8)):
+        u = amplitude * sum(
+            np.cos((2.0 + 1.1 * n) * t + phase) for n, phase in enumerate(rng.uniform(0.0, 6.28, 25))
+        )
+        push = disturbance * lfilter([0.05], [1.0, -0.95], rng.standard_normal(t.size))
+        own = {**VALUES, **(values or {}), **((last or {}) if i == 3 else {})}
+        shown = simulate(structure, own, Record(f"r{i}", DT, {"u": u + push}, {}))
+        x = shown["x"] + NOISE * rng.standard_normal(t.size)
+        records.append(
+            Record(f"r{i}", DT, {"u": u, "x": x}, {}, role="validation" if i > 1 else "estimation")
+        )
+    fitted, scoring = tuple(records[:2]), tuple(records[2:])
+    scales = characteristic_scales(AXIS, fitted, VALUES)
+    return Workbench(AXIS, fitted, scoring, fitted, scales, {"x": NOISE}, frozenset({"force_off"}), VALUES)
+
+
+def fitted(bench: Workbench, effects: tuple[Effect, ...], values: dict[str, float]) -> Scored:
+    structure = bench.composed(effects)
+    fit = bench.problem(structure, bench.estimation)
+    return bench.score(effects, fit.fit({**VALUES, **values}, bench.free_parameters(structure)))
+
+
+def asked(bench: Workbench, model: Scored) -> Adequacy:
+    return adequacy(bench, model, np.random.default_rng(1))
+
+
+def test_white_noise_and_a_disturbance_go_with_nothing() -> None:
+    p_values = []
+    for seed in range(6):
+        bench = axis_bench(seed=seed, disturbance=0.05 if seed % 2 else 0.0)
+        p_values.append(asked(bench, fit_linear(bench, VALUES)).p_value)
+    assert min(p_values) > 0.01
+    assert max(p_values) > 0.3
+    assert 0.1 < np.mean(p_values) < 0.9
+
+
+HIDDEN = [
+    ("cubic_stiffness", {"k_3": 4e3}, "position of dynamics"),
+    ("coulomb_friction", {"T_c": 0.05}, "velocity of dynamics"),
+    ("quadratic_damping", {"c_2": 1.0}, "velocity of dynamics"),
+    ("input_saturation", {"u_max": 3.0}, "signal of actuator"),
+]
+
+
+@pytest.mark.parametrize(("name", "values", "what"), HIDDEN, ids=[name for name, _, _ in HIDDEN])
+def test_a_missing_effect_is_what_the_remainder_goes_with(
+    name: str, values: dict[str, float], what: str
+) -> None:
+    effects = (effect_named(name),)
+    bench = axis_bench(effects, values)
+    without = asked(bench, fit_linear(bench, VALUES))
+    assert not without.adequate
+    assert without.agreements[0].what == what
+    assert asked(bench, fitted(bench, effects, values)).adequate
+
+
+def test_a_number_that_differs_in_one_record_is_told() -> None:
+    bench = axis_bench(last={"d": 2.0})
+    found = asked(bench, fit_linear(bench, VALUES))
+    assert not found.adequate
+    assert found.agreements[0].what == "record: d"
+
+
+def test_the_joint_is_told(train: Any) -> None:
+    rig = RIGS["drive_train"]
+    records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 1e-3})
+    estimation = tuple(r for r in records if r.role == "estimation")
+    scoring = tuple(r for r in records if r.role == "validation")
+    scales = characteristic_scales(rig, estimation, train.values)
+    noise = {signal.name: train.noise for signal in rig.outputs}
+    bench = Workbench(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
+    found = asked(bench, fit_linear(bench, train.values))
+    assert not found.adequate
+    assert found.agreements[0].what == "velocity of load_bearing"
+    assert found.agreements[0].place == "load_bearing"
+
+
+def test_what_stands_in_a_few_stretches_is_no_noise() -> None:
+    bench = axis_bench()
+    record = bench.scoring[0]
+    x = record["x"].copy()
+    x[1000:1040] += 30.0 * NOISE
+    struck = replace(bench, scoring=(record.with_signals(x=x), *bench.scoring[1:]))
+    found = asked(struck, fit_linear(struck, VALUES))
+    assert not found.adequate
+    assert not found.is_spread
+
+
+def test_a_rounded_sign_is_another_form_and_no_second_effect() -> None:
+    """tanh(v / 0.05) in the place of sign(v): what Coulomb friction leaves goes with the velocity."""
+    import sympy as sp
+
+    from rigsight.effects import symbols as canonical
+
+    coulomb = effect_named("coulomb_friction")
+    T_c = sp.Symbol("T_c", real=True)
+    rounded = Effect(
+        name="rounded_friction",
+        summary="friction whose sign is rounded",
+        place=coulomb.place,
+        parameters=tuple(p for p in coulomb.parameters if p.name == "T_c"),
+        energy=coulomb.energy,
+        torque=T_c * sp.tanh(canonical.v / 0.05),
+        signature=coulomb.signature,
+    )
+    bench = axis_bench((rounded,), {"T_c": 0.2})
+    single = fitted(bench, (coulomb,), {"T_c": 0.2})
+    assert single.excess > 1.5
+    partners = OtherForms(bench, lower_bound=False).partners(
+        single, [effect_named("flexible_mode"), effect_named("quadratic_damping")]
+    )
+    assert [effect.name for effect in partners] == ["quadratic_damping"]
+
+
+def test_a_true_second_effect_is_worth_trying() -> None:
+    effects = (effect_named("coulomb_friction"), effect_named("cubic_stiffness"))
+    values = {"T_c": 0.05, "k_3": 1e3}
+    bench = axis_bench(effects, values)
+    single = fitted(bench, effects[:1], values)
+    forms = OtherForms(bench, lower_bound=False)
+    assert forms.partners(single, effects[1:]) == [effects[1]]
+    pair = fitted(bench, effects, values)
+    assert forms.with_own_evidence([single], [pair]) == [pair]
