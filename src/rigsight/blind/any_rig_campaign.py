@@ -225,9 +225,12 @@ def _doublets(
     amplitudes: Mapping[str, float], band: tuple[float, float], rng: np.random.Generator
 ) -> dict[str, Waveform]:
     """Return a doublet for each input, one after the other, each as long as a slow period."""
-    length = min(2.0 * math.pi / band[0] / 2.0, DURATION / 8.0)
+    # It jumps just before a sample of the records, for plant and record alike: in between no hold of a record shows it.
+    length = DT * round(min(2.0 * math.pi / band[0] / 2.0, DURATION / 8.0) / DT)
     return {
-        name: Doublet(amplitude, DT * round((1.0 + rng.uniform(0.5, 1.5) * (1 + i) * length) / DT), length)
+        name: Doublet(
+            amplitude, DT * (round((1.0 + rng.uniform(0.5, 1.5) * (1 + i) * length) / DT) - 0.1), length
+        )
         for i, (name, amplitude) in enumerate(amplitudes.items())
     }
 
