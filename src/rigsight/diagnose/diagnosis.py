@@ -173,7 +173,9 @@ def _assembled(
         )
         for name in measured
     }
-    share = probability_in_catalogue(judgement, ranking, linear.excess)
+    share = probability_in_catalogue(
+        judgement, ranking, linear.excess, found.adequacy is not None and found.adequacy.adequate
+    )
     explained = judgement.verdict in ("none", "parameters")
     without_effect = _candidate(bench, linear, _WITHOUT_EFFECT if explained else 0.0)
     with_effect = [

@@ -15,10 +15,10 @@ from rigsight.diagnose.verdict import AT_FLOOR, Judgement, most_left
 
 _ONE_LAW = 0.5
 """Most that is given to two effects that are one law together: another form of that law would look the same."""
-_ABOVE_THE_BOUND = 0.5
-"""Most that is given to a cause that leaves more of a lower bound of the floor than a cause may leave of a measured one.
+_WITH_A_REMAINDER = 0.5
+"""Most that is given to a cause that leaves more than a cause may, and what it leaves is no noise; also above a lower bound.
 
-An assumption: that the rest is noise and that the form is wrong are taken to be as likely.
+An assumption: that something smaller is missing too and that a relative stands for the cause are taken to be as likely.
 """
 _MOST = 0.99
 _ODDS_OUTSIDE_ONE = 0.25
@@ -28,10 +28,12 @@ _ODDS_OUTSIDE_TWO = 1.0
 _TRIES = 3
 """Unlike partners that had a chance each to fill by accident what the first effect leaves; an assumption, no count."""
 _AT_MOST_UNKNOWN = 0.3
-"""Most that is given to all candidates together where the best leaves more than a cause may."""
+"""Given to all candidates together where none takes the larger part of the gap or they contradict each other; an assumption."""
 
 
-def probability_in_catalogue(judgement: Judgement, ranking: Ranking, gap: float) -> float:
+def probability_in_catalogue(
+    judgement: Judgement, ranking: Ranking, gap: float, adequate: bool = False
+) -> float:
     """Return the probability that the cause is among the candidates, from what the chosen one leaves of what it was to explain.
 
     A relative of the true cause is taken to leave any share of the gap's amplitude as likely as any other. So did the best
@@ -46,27 +48,33 @@ def probability_in_catalogue(judgement: Judgement, ranking: Ranking, gap: float)
         All candidates.
     gap
         What the rig's own equations leave, re-identified, in units of the noise floor.
+    adequate
+        True where what the model of the verdict leaves counts as noise and disturbance, whatever the floor says.
     """
     if judgement.verdict in ("none", "parameters"):
         return 0.0  # the equations without an effect explain the records
     if not ranking.order or not math.isfinite(ranking.order[0].excess):
         return 0.0
-    above = max(ranking.order[0].excess - AT_FLOOR, 0.0)
     if judgement.verdict == "unknown":
-        return _AT_MOST_UNKNOWN / (1.0 + above)
+        return _AT_MOST_UNKNOWN
     model = judgement.model
-    chance = _chance_of_a_relative(model.excess, gap)
+    # What is left of an adequate model is the noise, and everything is measured in units of it.
+    floor = max(model.excess, 1.0) if adequate else 1.0
+    gap /= floor
+    left = model.excess / floor
+    above = max(left - AT_FLOOR, 0.0)
+    chance = _chance_of_a_relative(left, gap)
     odds = _ODDS_OUTSIDE_ONE
     if len(model.effects) > 1:
-        single = min((m.excess for m in ranking.order if len(m.effects) == 1), default=gap)
-        chance = 1.0 - (1.0 - _chance_of_a_relative(model.excess, single)) ** _TRIES
+        single = min((m.excess / floor for m in ranking.order if len(m.effects) == 1), default=gap)
+        chance = 1.0 - (1.0 - _chance_of_a_relative(left, single)) ** _TRIES
         odds = _ODDS_OUTSIDE_TWO
     # Above the floor something is left that is not the cause's, if its form is right at all: one half far above.
     form = 0.5 + (_MOST - 0.5) / (1.0 + above)
     share = form / (1.0 + odds * chance)
     if is_one_law(model):
         share = min(share, _ONE_LAW)
-    return min(share, _ABOVE_THE_BOUND) if model.excess > most_left(gap) else share
+    return min(share, _WITH_A_REMAINDER) if left > most_left(gap) else share
 
 
 def _chance_of_a_relative(left: float, gap: float) -> float:
