@@ -34,5 +34,5 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     found = [scored(PAIR, excess=pair)]
     monkeypatch.setattr(examination, "grown", lambda *_: found)
     models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)])
-    kept = examination._grown(models, [], lower_bound, is_driven, None)
+    kept = examination._grown(models, [], None, lower_bound, is_driven, None)
     assert kept == (found if competes else [])

@@ -44,6 +44,7 @@ STATED = {
     "verdict.LEAST_LEFT": (1.15, "at least 1.15"),
     "verdict.MOST_LEFT": (1.6, "at most 1.6"),
     "adequacy.SIGNIFICANCE": (0.01, "from p = 0.01 on"),
+    "adequacy.AGAINST_A_FLOOR": (0.1, "from 0.1 on where it leaves more than 1.6 of a measured floor"),
     "adequacy._STRETCHES": (32, "(32 stretches)"),
     "adequacy._LEAST_SPREAD": (0.25, "less than a quarter of the stretches"),
     "main_cause._LARGER_PART": (0.5, "the larger part (half)"),

@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 
 SIGNIFICANCE = 0.01
 """p-value below which a model is not adequate: one adequate model of a hundred is refused."""
+AGAINST_A_FLOOR = 0.1
+"""The same for a model that leaves more than a measured floor allows: that floor speaks against it already."""
 _TURNS = 9999
 _STRETCHES = 32
 """Stretches of all records together whose signs are turned: as long as can be, so that neighbors hang together little, and so
@@ -81,33 +83,38 @@ class Adequacy:
         With what it goes, the largest share first.
     is_spread
         False where it stands in a few stretches of the records, as noise does not.
+    significance
+        p-value below which it is not adequate.
     """
 
     p_value: float
     agreements: tuple[Agreement, ...]
     is_spread: bool = True
+    significance: float = SIGNIFICANCE
 
     @property
     def adequate(self) -> bool:
         """True where nothing contradicts that noise and disturbance are all that is left."""
-        return self.is_spread and self.p_value >= SIGNIFICANCE
+        return self.is_spread and self.p_value >= self.significance
 
     @property
     def goes_with(self) -> str:
         """With what the largest part of it goes; empty where it is adequate."""
         if self.adequate:
             return ""
-        if self.p_value >= SIGNIFICANCE:
+        if self.p_value >= self.significance:
             return "a few stretches of the records"
         return self.agreements[0].what
 
     @property
     def place(self) -> str:
         """Joint, drive or sensor of what it goes with; empty where that has none."""
-        return "" if self.p_value >= SIGNIFICANCE else self.agreements[0].place
+        return "" if self.p_value >= self.significance else self.agreements[0].place
 
 
-def adequacy(bench: Workbench, model: Scored, rng: np.random.Generator) -> Adequacy:
+def adequacy(
+    bench: Workbench, model: Scored, rng: np.random.Generator, significance: float = SIGNIFICANCE
+) -> Adequacy:
     """Say whether what a model leaves of the records that score it goes with anything.
 
     Parameters
@@ -118,6 +125,8 @@ def adequacy(bench: Workbench, model: Scored, rng: np.random.Generator) -> Adequ
         Fitted and scored.
     rng
         Source of the turned signs.
+    significance
+        p-value below which it is not adequate.
     """
     fit = bench.problem(model.fit.structure, bench.scoring).fit(model.fit.values, [])
     answers = Answers(bench, bench.scoring, fit, model.effects, model.fit.free)
@@ -139,10 +148,10 @@ def adequacy(bench: Workbench, model: Scored, rng: np.random.Generator) -> Adequ
     powers = np.array([float(seen[part] @ seen[part]) / (part.stop - part.start) for part in stretches])
     spread = float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= _LEAST_SPREAD * len(stretches)
     if not found:
-        return Adequacy(1.0, (), spread)
+        return Adequacy(1.0, (), spread, significance)
     ordered = tuple(sorted((agreement for agreement, _, _ in found), key=lambda a: -a.share))
     p_value = _smallest([turned for _, turned, _ in found], [reached for _, _, reached in found])
-    return Adequacy(p_value, ordered, spread)
+    return Adequacy(p_value, ordered, spread, significance)
 
 
 def _p_value(reached: float, turned: Floats) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.adequacy import Adequacy, adequacy
+from rigsight.diagnose.adequacy import AGAINST_A_FLOOR, SIGNIFICANCE, Adequacy, adequacy
 from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
 from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candidates, fit_linear, refine
 from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
@@ -23,7 +23,7 @@ from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, Judgement, judge, most_left
+from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, MOST_LEFT, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing, leading_output
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.effects import Effect
@@ -141,7 +141,7 @@ def examine(
         pairs = forms.with_own_evidence(models.singles, pairs)
 
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    checks = Checks(bench, rng)
+    checks = Checks(bench, rng, np.inf if lower_bound else MOST_LEFT)
     ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
@@ -184,15 +184,17 @@ def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:
 class Checks:
     """Whether what each model leaves is noise and disturbance, asked once of each."""
 
-    def __init__(self, bench: Workbench, rng: np.random.Generator) -> None:
+    def __init__(self, bench: Workbench, rng: np.random.Generator, allowed: float) -> None:
         self._bench = bench
+        self._allowed = allowed
         self._rng = rng
         self._known: dict[tuple[str, ...], Adequacy] = {}
 
     def of(self, model: Scored) -> Adequacy:
         """Return what a model's remainder goes with."""
         if model.names not in self._known:
-            self._known[model.names] = adequacy(self._bench, model, self._rng)
+            significance = SIGNIFICANCE if model.excess <= self._allowed else AGAINST_A_FLOOR
+            self._known[model.names] = adequacy(self._bench, model, self._rng, significance)
         return self._known[model.names]
 
     def is_adequate(self, model: Scored) -> bool:
