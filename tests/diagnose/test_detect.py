@@ -185,3 +185,44 @@ def test_each_output_has_its_own_floor_and_one_never_measured_has_none() -> None
     yaw = Record(name="yaw", dt=DT, signals={n: noisy[n] for n in ("u", "psi")}, units={})
     (only,) = noise_floors(RUNNING_GEAR, [yaw])
     assert only.output == "psi"
+
+
+@pytest.mark.parametrize("share", [5e-4, 2e-3, 5e-3])
+def test_repeats_are_found_where_the_input_is_measured_with_noise(share: float) -> None:
+    rng = np.random.default_rng(3)
+    true = np.tile(multisine(1000, rng), 4)
+    u = true + share * np.std(true) * rng.standard_normal(true.size)
+    floor = floor_of(axis_record(u, driven(true) + SIGMA * rng.standard_normal(u.size)))
+    assert "repeated" in floor.method
+    assert floor.std == pytest.approx(SIGMA, rel=0.1)
+
+
+def test_inputs_of_a_slightly_other_amplitude_are_no_repeats() -> None:
+    rng = np.random.default_rng(4)
+    u = multisine(2000, rng)
+    records = [axis_record(a * u, driven(a * u) + SIGMA * rng.standard_normal(u.size)) for a in (1.0, 1.006)]
+    assert "repeated" not in floor_of(*records).method
+
+
+def test_rest_is_found_where_the_input_is_measured_with_noise() -> None:
+    rng = np.random.default_rng(5)
+    true = np.concatenate([np.zeros(400), linear_sweep(DT * np.arange(2000), 3.0, 3.0, 50.0)])
+    u = true + 2e-3 * rng.standard_normal(true.size)
+    floor = floor_of(axis_record(u, driven(true) + SIGMA * rng.standard_normal(u.size)))
+    assert "rests" in floor.method
+    assert floor.std == pytest.approx(SIGMA, rel=0.2)
+
+
+def test_a_floor_from_rest_has_an_interval_that_holds_the_truth() -> None:
+    rng = np.random.default_rng(6)
+    u = np.concatenate([np.zeros(600), linear_sweep(DT * np.arange(2000), 3.0, 3.0, 50.0)])
+    low, high = floor_of(axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size))).interval
+    assert 0.7 * SIGMA < low < SIGMA < high < 1.3 * SIGMA
+
+
+def test_of_a_lower_bound_nobody_knows_the_upper_limit() -> None:
+    rng = np.random.default_rng(6)
+    u = multisine(4000, rng)
+    floor = floor_of(axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size)))
+    assert floor.lower_bound
+    assert floor.interval == (floor.std, np.inf)

@@ -11,7 +11,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = " ".join((ROOT / "docs/verdict.md").read_text(encoding="utf-8").split())
 STATED = {
-    "detect._SAME_INPUT": (1e-3, "inputs equal within 0.1 % of their size"),
     "detect._MIN_QUIET": (100, "at least 100 samples"),
     "detect._TOP_OF_SPECTRUM": (0.85, "above 85 % of the lines"),
     "diagnosis._REFUTES": (0.7, "less than 0.7 of a floor"),

@@ -15,13 +15,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.location.block_means import block_means
 from rigsight.diagnose.result import NoiseFloor, Stretches
-from rigsight.records.periods import repeated_period
+from rigsight.records.periods import differ_by_noise, repeated_period, roughness
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
-_SAME_INPUT = 1e-3
 _QUIET_INPUT = 1e-3
+_QUIET_NOISE = 0.01
+"""Largest noise of an input at rest, relative to its span."""
+_WITHIN = 5.0
+"""Standard deviations of its noise within which the steps of a resting input stay."""
 _MIN_QUIET = 100
 _TOP_OF_SPECTRUM = 0.85
 _FREE_MODES = 6
@@ -52,6 +56,7 @@ def noise_floors(
         holding = [record for record in records if signal.name in record]
         if holding:
             std, method, stretches = _noise_floor(rig, signal.name, holding, drifts, at_rest)
+            lower_bound = method == _WHITE_ONLY or (not rig.is_driven and method == AT_REST)
             spread = max(float(np.std(record[signal.name])) for record in holding)
             size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
             floors.append(
@@ -60,11 +65,23 @@ def noise_floors(
                     signal.unit,
                     max(std, _SMALLEST * size),
                     method,
-                    lower_bound=method == _WHITE_ONLY or (not rig.is_driven and method == AT_REST),
+                    lower_bound=lower_bound,
+                    interval=_interval(std, stretches, lower_bound),
                     stretches=stretches,
                 )
             )
     return tuple(floors)
+
+
+def _interval(std: float, stretches: Stretches, lower_bound: bool) -> tuple[float, float]:
+    """Return 95 % limits of a standard deviation: those of blocks of the pieces of noise that it was estimated from."""
+    if lower_bound or not stretches:
+        return std, np.inf
+    squares = block_means([samples**2 for samples, _ in stretches])
+    degrees = squares.size
+    spread = float(np.std(squares) / np.mean(squares)) / np.sqrt(degrees) if degrees > 1 else np.inf
+    low, high = np.maximum(1.0 - 1.96 * spread, 0.0), 1.0 + 1.96 * spread
+    return float(std * np.sqrt(low)), float(std * np.sqrt(high))
 
 
 def _noise_floor(
@@ -82,7 +99,7 @@ def _noise_floor(
     top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
     if not rig.is_driven:
         # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
-        top = min(top, float(np.median([_roughness(record[output]) for record in records])))
+        top = min(top, float(np.median([roughness(record[output]) for record in records])))
     quiet = [q for record in records if at_rest for q in _quiet_stretches(record, sources, output)]
     if quiet:
         deviations = [float(np.std(stretch)) for stretch, _ in quiet]
@@ -120,7 +137,7 @@ def _repeated(
             other_input, other_output, other_settled, _ = segments[j]
             if other_input.shape != first_input.shape or j in used:
                 continue
-            if np.all(np.max(np.abs(other_input - first_input), axis=0) <= _SAME_INPUT * size):
+            if all(map(differ_by_noise, other_input.T, first_input.T, size)):
                 group.append(other_output)
                 settled = settled and other_settled
                 used.add(j)
@@ -157,12 +174,20 @@ def _quiet_stretches(
     """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
     samples = inputs_of(record, sources)
     span = np.ptp(samples, axis=0)
-    still = np.all(np.abs(np.diff(samples, axis=0)) <= _QUIET_INPUT * span, axis=1)
+    # A measured input is never quite still: its own noise is no motion, as long as it is small.
+    noise = np.array(
+        [min(roughness(column), _QUIET_NOISE * s) for column, s in zip(samples.T, span, strict=True)]
+    )
+    allowed = np.maximum(_QUIET_INPUT * span, _WITHIN * noise)
+    still = np.all(np.abs(np.diff(samples, axis=0)) <= allowed, axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = []
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         moved = np.ptp(samples[start : stop + 1], axis=0)
-        if np.any(moved > _QUIET_INPUT * span) or stop - start < _MIN_QUIET:
+        if (
+            np.any(moved > np.maximum(_QUIET_INPUT * span, 2.0 * _WITHIN * noise))
+            or stop - start < _MIN_QUIET
+        ):
             continue
         settled = record[output][start + (stop - start) // 2 if start > 0 else start : stop]
         if settled.size < _MIN_QUIET // 2:
@@ -204,12 +229,3 @@ def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
     power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2
     top = power[int(_TOP_OF_SPECTRUM * power.size) :]
     return float(np.sqrt(np.median(top) / np.log(2.0) / np.sum(window**2)))
-
-
-def _roughness(samples: NDArray[np.float64]) -> float:
-    """Return the standard deviation of white noise with the median size of third differences, which rare jumps leave alone."""
-    differences = np.diff(samples, 3)
-    if differences.size == 0:
-        return float("inf")
-    # The variance of a third difference is 1 + 9 + 9 + 1 = 20 times that of the noise; 1.4826 is for the median of a normal.
-    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(20.0))

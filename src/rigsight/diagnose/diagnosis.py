@@ -189,6 +189,8 @@ def _assembled(
     if judgement.verdict == "unknown":
         where = _evidence(found)
     left = None
+    if found.adequacy is not None and found.adequacy.adequate:
+        floors = [_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors]
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
         left = remainder_of(linear, judgement.model, found.adequacy, lower_bound)
@@ -220,6 +222,13 @@ def _assembled(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
     )
+
+
+def _up_to(floor: NoiseFloor, left: NDArray[np.float64]) -> NoiseFloor:
+    """Return a lower bound with the upper limit that an adequate model's remainder gives it; another floor as it is."""
+    if not floor.lower_bound:
+        return floor
+    return replace(floor, interval=(floor.interval[0], max(float(np.std(left)), floor.std)))
 
 
 def _evidence(found: Examination) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -148,7 +149,8 @@ Stretches = tuple[tuple[NDArray[np.float64], float], ...]
 class NoiseFloor:
     """Standard deviation of what no model can explain in an output, and how it was found.
 
-    ``lower_bound`` says that only part of the noise was seen: colored noise and disturbances may stand above it. ``stretches``
+    ``lower_bound`` says that only part of the noise was seen: colored noise and disturbances may stand above it. ``interval``
+    are its 95 % limits; the upper one of a lower bound is what an adequate model leaves, infinite without one. ``stretches``
     are pieces of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise.
     """
 
@@ -157,6 +159,7 @@ class NoiseFloor:
     std: float
     method: str
     lower_bound: bool = False
+    interval: tuple[float, float] = (0.0, math.inf)
     stretches: Stretches = field(default=(), compare=False, repr=False)
 
 
@@ -297,6 +300,7 @@ class Diagnosis:
                     "unit": floor.unit,
                     "method": floor.method,
                     "lower_bound": floor.lower_bound,
+                    "interval": [_number(limit) for limit in floor.interval],
                 }
                 for floor in self.noise_floors
             },

@@ -10,10 +10,12 @@ _SAME = 1e-3
 """Largest difference between two periods of one signal, relative to its standard deviation."""
 _ALIKE = 0.01
 """Largest RMS difference of two signals that count as the same, relative to the standard deviation: both may be measured."""
+_ROUGH = 0.5
+"""Share of a difference that must be as rough as white noise: a slightly other amplitude or time is smooth."""
 
 
 def repeated_period(samples: NDArray[np.float64]) -> int | None:
-    """Return the period of an exactly repeated signal of shape (n_samples,) in samples, None if it does not repeat."""
+    """Return the period of a signal of shape (n_samples,) in samples that repeats but for noise; None if it does not."""
     centered = samples - np.mean(samples)
     n = centered.size
     size = float(np.std(centered))
@@ -25,9 +27,41 @@ def repeated_period(samples: NDArray[np.float64]) -> int | None:
     normalized = correlation / overlap / size**2
     peaks = np.flatnonzero(normalized > 0.99)
     for lag in peaks[peaks > 30]:
-        if np.max(np.abs(samples[lag:] - samples[:-lag])) <= _SAME * size:
+        if differ_by_noise(samples[lag:], samples[:-lag], size):
             return int(lag)
     return None
+
+
+def differ_by_noise(first: NDArray[np.float64], second: NDArray[np.float64], size: float) -> bool:
+    """Return True if two signals of shape (n_samples,) are the same, or measured with small white noise on each.
+
+    Parameters
+    ----------
+    first, second
+        The signals.
+    size
+        Standard deviation of either.
+    """
+    difference = first - second
+    if float(np.max(np.abs(difference), initial=0.0)) <= _SAME * size:
+        return True
+    rms = float(np.sqrt(np.mean(difference**2)))
+    return rms <= _ALIKE * size and roughness(difference) >= _ROUGH * rms
+
+
+def roughness(samples: NDArray[np.float64]) -> float:
+    """Return the standard deviation of white noise with the median size of third differences, which rare jumps leave alone.
+
+    Parameters
+    ----------
+    samples
+        Shape (n_samples,); infinite for fewer than four.
+    """
+    differences = np.diff(samples, 3)
+    if differences.size == 0:
+        return float("inf")
+    # The variance of a third difference is 1 + 9 + 9 + 1 = 20 times that of the noise; 1.4826 is for the median of a normal.
+    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(20.0))
 
 
 def same_signal(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
