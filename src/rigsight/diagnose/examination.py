@@ -225,7 +225,7 @@ def _singly(
     prepare: Prepare | None,
     memory: FitMemory | None,
 ) -> _Singly:
-    bench = _bench(task, noise, windowing, memory, IdleThreads(n_jobs))
+    bench = workbench_of(task, noise, windowing, memory, IdleThreads(n_jobs))
     linear = fit_linear(bench, bench.start)
     if not linear.residuals:
         raise SimulationError(
@@ -278,7 +278,7 @@ def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
     """Return the models in windows of a few cycles."""
     output = leading_output(task.rig, task.records)
     windowing = Windowing.by_cycles(output, noise[output])
-    bench = _bench(task, noise, windowing, models.bench.memory, models.bench.threads)
+    bench = workbench_of(task, noise, windowing, models.bench.memory, models.bench.threads)
     linear = fit_linear(bench, models.linear.fit.values)
     singles = fitted_in_windows(bench, linear, models.singles)
     before = _before(task, bench, linear) if linear.residuals else models.before
@@ -291,13 +291,26 @@ def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
     return bool(cut.linear.residuals) and best <= at_floor < cut.linear.excess
 
 
-def _bench(
+def workbench_of(
     task: Task,
     noise: Mapping[str, float],
     windowing: Windowing,
     memory: FitMemory | None,
     threads: IdleThreads,
 ) -> Workbench:
+    """Return what candidates of a task are fitted and scored with.
+
+    Parameters
+    ----------
+    task
+        Records and the simulation in question.
+    noise
+        Noise floor of each output.
+    windowing
+        How to cut records.
+    memory, threads
+        As of `Workbench`.
+    """
     start = _start(task)
     fitted = windowing.cut(task.estimation)
     return Workbench(
