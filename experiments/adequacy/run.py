@@ -93,7 +93,7 @@ def told(rows: list[Row]) -> str:
             "|---|---|",
             below,
             "",
-            f"Of {len(large)} gaps of {LARGE:g} noise floors and more, the equations without the effect were refused in {refused}.",
+            f"Of {len(large)} gaps of {LARGE:g} noise floors and more, equations without the effect were refused in {refused}.",
             "",
             "| trial | hidden | gap | p, true model | p, without it | goes with |",
             "|---|---|---|---|---|---|",

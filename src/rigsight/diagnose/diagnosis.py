@@ -232,10 +232,15 @@ def _up_to(floor: NoiseFloor, left: NDArray[np.float64]) -> NoiseFloor:
 
 
 def _evidence(found: Examination) -> tuple[str, ...]:
-    """Return the places to which a gap without a cause is traced: where a push takes most of it away, else the best effect's."""
+    """Return the places to which a gap without a cause is traced.
+
+    Where a push takes most of it away; on a rig with one motion that with whose signals it goes, else the best effect's.
+    """
     if found.places:
         return tuple(place.name for place in found.places if place.looked_at and place.share > 0.0)
     rig = found.bench.rig
+    if found.gap_at:
+        return ("sensor" if found.gap_at in {signal.name for signal in rig.outputs} else found.gap_at,)
     return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
 
 

@@ -62,6 +62,8 @@ class Examination:
         Whether what the model of the verdict leaves goes with anything; None where that model could not be scored.
     doubts
         What is implausible about the numbers of the model of the verdict.
+    gap_at
+        For an unknown cause the joint, drive or sensor with whose signals the gap goes most; empty where none is known.
     """
 
     bench: Workbench
@@ -75,6 +77,7 @@ class Examination:
     places: tuple[SuspectedPlace, ...] = ()
     adequacy: Adequacy | None = None
     doubts: tuple[str, ...] = ()
+    gap_at: str = ""
 
 
 def examine(
@@ -174,6 +177,7 @@ def examine(
         models.search.places,
         left,
         tuple(doubt.text for doubt in doubts(judgement.model, linear)) if judgement.model.effects else (),
+        checks.of(linear).place if judgement.verdict == "unknown" else "",
     )
 
 
