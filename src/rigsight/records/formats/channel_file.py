@@ -134,7 +134,7 @@ def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
     """Return the reader of a format; only its own library is imported."""
     if kind in PACKAGES:
         return contextlib.contextmanager(partial(open_isolated, kind))
-    reader = getattr(import_module(f"rigsight.records.read_{kind}"), f"open_{kind}")
+    reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
     return contextlib.contextmanager(reader)
 
 

@@ -39,7 +39,7 @@ def main(kind: str, path: Path) -> None:
 
         # Who asked ends what runs in circles; if it was killed, nobody does.
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
-    reader = getattr(import_module(f"rigsight.records.read_{kind}"), f"open_{kind}")
+    reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
     try:
         # Before the limit: what libraries set aside for their threads is no matter of the file.
         import_module(PACKAGES[kind])
