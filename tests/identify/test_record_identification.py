@@ -7,7 +7,7 @@ import pytest
 
 from rigsight.effects import effect_named
 from rigsight.excitation import log_sweep, step
-from rigsight.identify.record_identification import Wishes, identify_record, input_peak
+from rigsight.identify.record_identification import Wishes, identify_record, measured_amplitude
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
@@ -30,9 +30,11 @@ def test_the_amplitude_is_that_of_the_sweep_also_if_it_begins_slowly() -> None:
     t = DT * np.arange(6000)
     sweep = measured(log_sweep(t, 0.5, 0.05, 60.0), "sweep")
     assert abs(np.median(sweep["u"])) > 0.02
-    assert input_peak(sweep, RUNNING_GEAR) == pytest.approx(0.5, rel=0.01)
+    assert measured_amplitude(sweep, RUNNING_GEAR)[0] == pytest.approx(0.5, rel=0.01)
     for start in (5.0, 25.0):
-        assert input_peak(measured(step(t, 0.6, start), "step"), RUNNING_GEAR) == pytest.approx(0.6)
+        assert measured_amplitude(measured(step(t, 0.6, start), "step"), RUNNING_GEAR)[0] == pytest.approx(
+            0.6
+        )
 
 
 def test_offsets_of_a_sweep_are_known_far_better_than_its_motion_is_large() -> None:

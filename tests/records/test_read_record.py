@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,10 +80,25 @@ def test_still_second_output_is_left_out_and_said(write_csv: WriteCsv) -> None:
     assert "y never changes" in record.notes[0]
 
 
-@pytest.mark.parametrize(("column", "told"), [(1, "input u is constant"), (2, "output psi never changes")])
-def test_still_signals_cannot_be_fitted(write_csv: WriteCsv, column: int, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        read_record(write_csv(change=replaced(column, "0.5")), INPUTS, OUTPUTS)
+def test_a_still_output_cannot_be_fitted(write_csv: WriteCsv) -> None:
+    with pytest.raises(InputError, match="output psi never changes"):
+        read_record(write_csv(change=replaced(2, "0.5")), INPUTS, OUTPUTS)
+
+
+def test_a_still_input_is_a_free_motion_and_said(write_csv: WriteCsv) -> None:
+    record = read_record(write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS)
+    assert set(record["u"]) == {0.5}
+    assert "column 'u': no input changes (u = 0.5)" in record.notes[-1]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"kind": "sweep"}, {"amplitude": 0.5}, {"moving_inputs": ("u",)}],
+    ids=["kind", "amplitude", "element"],
+)
+def test_a_still_input_that_is_said_to_move_is_refused(write_csv: WriteCsv, options: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"no input changes \(u = 0\.5\).* Check the column"):
+        read_record(write_csv(change=replaced(1, "0.5")), INPUTS, OUTPUTS, **options)
 
 
 def test_free_decay_may_be_scored(write_csv: WriteCsv) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
-from rigsight.records import Record
+from rigsight.records import Record, Role
 from rigsight.workflow.campaigns.campaign import read_campaign
 from rigsight.workflow.campaigns.in_memory import make_campaign, make_model
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig
@@ -88,7 +88,7 @@ def test_without_validation_records_that_is_noted() -> None:
         ({"records": [record(), record()]}, r"several are called 'sweep'"),
         ({"records": [record(signals={"v": np.ones(9)})]}, r"has no signal 'u'.*It has: v"),
         (
-            {"records": [record(signals={"u": np.ones(9), "x": np.arange(9.0)})]},
+            {"records": [record(signals={"u": np.ones(9), "x": np.arange(9.0)}, kind="sweep")]},
             r"input u never changes \(1\)",
         ),
         (
@@ -121,9 +121,16 @@ def test_every_rig_takes_its_own_signals(
         make_campaign(rig, [record(signals={signals[0]: moving})], constants=constants)
 
 
-def test_a_constant_input_may_only_be_scored() -> None:
-    still = record("still", signals={"u": np.ones(9), "x": np.arange(9.0)}, role="validation")
+@pytest.mark.parametrize("role", ["estimation", "validation"])
+def test_a_constant_input_is_a_free_motion(role: Role) -> None:
+    still = record("still", signals={"u": np.ones(9), "x": np.arange(9.0)}, role=role)
     assert len(make_campaign("axis", [record(), still]).records) == 2
+
+
+def test_a_prescribed_motion_must_move() -> None:
+    still = record("still", signals={"x": np.ones(9), "force": np.arange(9.0)})
+    with pytest.raises(InputError, match=r"input x never changes \(1\)"):
+        make_campaign("element", [still])
 
 
 def test_a_model_of_numbers_is_the_one_of_a_file(write_model: Callable[..., Path]) -> None:

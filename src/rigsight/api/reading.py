@@ -93,7 +93,7 @@ def read_record(
         require_outputs=require_outputs,
         required_outputs=found.required_outputs,
         absent_inputs=found.absent_inputs,
-        still_inputs=not found.has_one_motion,
+        moving_inputs=found.moving_inputs,
         name=name,
         role=role,
         kind=kind,

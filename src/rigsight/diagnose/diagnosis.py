@@ -93,6 +93,8 @@ def diagnose(
         notes.append(
             "There is no validation record: errors are those of the records that were fitted, and too good."
         )
+    if task.open_factor is not None:
+        notes.append(task.open_factor.sentence)
     floors = noise_floors(task.rig, task.records, drifts=task.drifts)
     say("noise floor")
 

@@ -25,7 +25,7 @@ from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, MOST_LEFT, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing, leading_output
-from rigsight.diagnose.workbench import Scored, Workbench, liveliest
+from rigsight.diagnose.workbench import Scored, Workbench, liveliest, until_rest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitMemory, IdleThreads, characteristic_scales, linear_start
@@ -317,10 +317,12 @@ def workbench_of(
     """
     start = _start(task)
     fitted = windowing.cut(task.estimation)
+    output = leading_output(task.rig, task.estimation)
+    moving = until_rest(fitted, [signal.name for signal in task.rig.inputs], output)
     return Workbench(
         rig=task.rig,
         estimation=fitted,
-        look=liveliest(fitted, leading_output(task.rig, task.estimation)),
+        look=liveliest(moving, output),
         scoring=windowing.cut(task.validation or task.estimation),
         scales=characteristic_scales(task.rig, task.estimation, start),
         noise=noise,
@@ -334,6 +336,8 @@ def workbench_of(
 
 def _start(task: Task) -> dict[str, float]:
     held = {} if task.absent_spring is None else {task.absent_spring: 0.0}
+    if task.open_factor is not None:
+        held[task.open_factor.held] = task.open_factor.value
     start = {**task.constants, **linear_start(task.rig, task.estimation, task.constants, held)}
     # Numbers fitted without the effects that the simulation has are farther off than those it came with.
     return {**start, **task.given} if task.modelled else start
@@ -342,6 +346,8 @@ def _start(task: Task) -> dict[str, float]:
 def _held(task: Task) -> frozenset[str]:
     """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
     held = set() if task.absent_spring is None else {task.absent_spring}
+    if task.open_factor is not None:
+        held.add(task.open_factor.held)
     if not task.rig.has_one_motion:
         return frozenset(held)
     unmeasured = [

@@ -8,6 +8,7 @@ from functools import cached_property
 
 from rigsight.diagnose.drift import can_drift
 from rigsight.effects import Effect
+from rigsight.identify import OpenFactor, open_factor
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -57,6 +58,11 @@ class Task:
         stiffness = self.rig.motion.stiffness
         name = str(getattr(stiffness, "name", ""))
         return name if self.given.get(name) == 0.0 else None
+
+    @cached_property
+    def open_factor(self) -> OpenFactor | None:
+        """What the records that are fitted tell up to a common factor only: those of a free motion."""
+        return open_factor(self.rig, self.estimation, self.constants, self.given)
 
     @cached_property
     def drifts(self) -> bool:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.windows import cut
-from rigsight.effects import Effect
+from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
@@ -25,6 +26,9 @@ An assumption: half to two periods did worse on play of a few widths, nothing el
 """
 _MOST_PIECES = 40
 """In all, for each degree of freedom: every piece has initial states of its own, and the fit's equations grow with them."""
+_DIED_AWAY = 0.99
+"""Share of the squared steps of an output after which a free motion is smaller than a tenth of what it was."""
+_FEWEST_IN_MOTION = 100
 _ROUGH_ACCURACY = 1e-3
 _ROUGH_EVALUATIONS = 8
 
@@ -104,6 +108,12 @@ class Workbench:
     memory: FitMemory | None = None
     threads: IdleThreads = field(default_factory=IdleThreads)
 
+    @cached_property
+    def driven(self) -> tuple[Record, ...]:
+        """The records to fit in which an input moves; in the others the rig moves freely."""
+        names = [signal.name for signal in self.rig.inputs]
+        return tuple(r for r in self.estimation if any(not is_constant(r[name]) for name in names))
+
     @property
     def period(self) -> float:
         """Natural period of the rig, or the typical one of its motion [s]."""
@@ -168,8 +178,11 @@ class Workbench:
         return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
 
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
-        """Return the effects that make sense on this rig, each at each place; without a spring none that changes it."""
-        offered = candidates_on(self.rig, effects, self.modelled)
+        """Return the effects that make sense on this rig and in these records, each at each place.
+
+        Without a spring none that changes it, where an input rests none at a drive that is told nothing else.
+        """
+        offered = [e for e in candidates_on(self.rig, effects, self.modelled) if self._can_show(e)]
         if not self.rig.has_one_motion:
             return offered
         return [
@@ -179,6 +192,17 @@ class Workbench:
             and (effect.lateral is None or not self.rig.downstream_parameters <= self.held)
             and (self._has_spring or (effect.spring is None and effect.deflection is None))
         ]
+
+    def _can_show(self, effect: Effect) -> bool:
+        if effect.place is not Place.ACTUATOR or not self.rig.inputs:
+            return True
+        place = self.rig.acts_at(effect)
+        drive = next(drive for drive in self.rig.mechanism.drives if drive.name == place)
+        told = {str(symbol) for symbol in drive.signal.free_symbols}
+        if not told <= {signal.name for signal in self.rig.inputs}:
+            return True
+        records = (*self.estimation, *self.scoring)
+        return any(not is_constant(record[name]) for record in records for name in told)
 
     def score(self, effects: tuple[Effect, ...], fit: FitResult, roughly: bool = False) -> Scored:
         """Simulate the scoring records with a fitted model; only their initial states are estimated.
@@ -197,6 +221,22 @@ class Workbench:
 def _sees_position(effect: Effect) -> bool:
     expressions = [e for e in (effect.torque, effect.deflection) if e is not None]
     return any(canonical.x in expression.free_symbols for expression in expressions)
+
+
+def until_rest(records: Sequence[Record], inputs: Sequence[str], output: str) -> tuple[Record, ...]:
+    """Return the records, those of a free motion only until it has died away.
+
+    Where friction catches a mass its place jumps with the numbers of a model: a fit that begins with the rest that follows, which
+    may be long, stays where it begins.
+    """
+    cut_off = []
+    for record in records:
+        stop = record.n_samples
+        if all(is_constant(record[name]) for name in inputs):
+            energy = np.cumsum(np.diff(record[output]) ** 2)
+            stop = max(_FEWEST_IN_MOTION, int(np.searchsorted(energy, _DIED_AWAY * energy[-1])) + 1)
+        cut_off.append(record.slice(0, min(stop, record.n_samples)))
+    return tuple(cut_off)
 
 
 def liveliest(records: Sequence[Record], output: str, n_samples: int = 8000) -> tuple[Record, ...]:

@@ -23,8 +23,10 @@ from rigsight.discover.task import Task
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate, candidates, offered_effects
 from rigsight.discover.weak_form import Rows
+from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
@@ -129,13 +131,13 @@ def discover(
 
 def _linear_values(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
     known = {"k": 0.0} if task.no_spring else {}
-    return {**task.constants, **linear_start(task.rig, estimation, task.constants, known)}
+    return {**task.constants, **linear_start(task.rig, estimation, task.constants, {**known, **task.held})}
 
 
 def _held(task: Task) -> frozenset[str]:
     """Return what no fit moves while terms are chosen: what the motion knows nothing of, and one of two rests."""
     motion = task.rig.motion
-    held = set(task.rig.downstream_parameters)
+    held = {*task.rig.downstream_parameters, *task.held}
     if task.rig.is_driven:
         # A linear spring cannot tell a constant force from a shifted rest position.
         rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
@@ -160,6 +162,8 @@ def _library(
     threads: IdleThreads,
 ) -> list[Candidate]:
     effects = offered_effects(task.rig, not task.no_spring)
+    if all(is_constant(motion.u) for motion in motions):
+        effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
     found = candidates(effects, motions, rows, projected, scales, task.rig.is_driven, threads)
     return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 

@@ -18,7 +18,7 @@ from rigsight.discover.own_regression import own_regression, rows_of
 from rigsight.discover.regression import Projected, alike, inclusion_probabilities
 from rigsight.discover.terms.library import candidates, plain_terms
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, evaluated
 
 _TAKEN = 0.5
 _SAME_COLUMN = 0.995
@@ -132,9 +132,9 @@ def missing_force(
     force = 1.0
     if rig.is_driven:
         # The drive's force is known: per unit of acceleration it gives the inertia that goes with these terms.
-        gain = rig.motion.drive_gain
+        gain = evaluated(rig.motion.drive_gain, values)
         drive, *_ = projected.solved(columns[:, taken])[0]
-        force = float(gain.subs({s: values[s.name] for s in gain.free_symbols})) / drive
+        force = gain / drive if gain * drive > 0.0 else evaluated(rig.motion.inertia, values)
     terms = []
     for i, coefficient in zip(taken, coefficients, strict=True):
         (parameter,) = library[i].effect.parameters

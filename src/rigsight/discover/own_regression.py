@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rigsight.discover.motion import Motion
 from rigsight.discover.regression import Projected
 from rigsight.discover.weak_form import Rows
+from rigsight.records.plausibility import is_constant
 from rigsight.rigs import Rig
 
 _WINDOW = 0.75
@@ -39,6 +40,7 @@ def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: R
         How signals become rows.
     """
     order = 2 if rig.is_driven else 0
+    rests = all(is_constant(motion.u) for motion in motions)
     blocks, targets = [], []
     for motion in motions:
         velocity, displacement = rows.velocity(motion), rows.of(motion.x)
@@ -47,7 +49,8 @@ def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: R
             blocks.append(np.column_stack([velocity, displacement, one]))
             targets.append(rows.of(motion.measured))
             continue
-        drive = rows.of(motion.u)
+        # A constant drive is part of the constant term; its column stays, so that the others keep their places.
+        drive = np.zeros_like(one) if rests else rows.of(motion.u)
         own = (drive, -velocity, one) if no_spring else (drive, -velocity, -displacement, one)
         blocks.append(np.column_stack(own))
         targets.append(rows.acceleration(motion))

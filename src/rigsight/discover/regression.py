@@ -49,7 +49,8 @@ class Projected:
 
     @cached_property
     def _directions(self) -> NDArray[np.float64]:
-        return np.linalg.qr(self.base / np.linalg.norm(self.base, axis=0))[0]
+        size = np.linalg.norm(self.base, axis=0)
+        return np.linalg.qr(self.base[:, size > 0.0] / size[size > 0.0])[0]
 
     @cached_property
     def rest(self) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -27,6 +27,8 @@ class Task:
         Noise floor of each output.
     no_spring
         True for an axis that has none.
+    held
+        Parameters that keep a value: of those that a free motion tells up to a common factor one.
     """
 
     title: str
@@ -35,3 +37,4 @@ class Task:
     records: tuple[Record, ...]
     noise: Mapping[str, float]
     no_spring: bool = False
+    held: Mapping[str, float] = field(default_factory=dict)

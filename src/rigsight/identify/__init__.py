@@ -5,6 +5,8 @@ from rigsight.identify.fit.fit_result import FitResult as FitResult
 from rigsight.identify.fit.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
 from rigsight.identify.fit.grey_box import GreyBoxFit as GreyBoxFit
 from rigsight.identify.fit.idle_threads import IdleThreads as IdleThreads
+from rigsight.identify.free_motion import OpenFactor as OpenFactor
+from rigsight.identify.free_motion import open_factor as open_factor
 from rigsight.identify.hysteresis import Calibration as Calibration
 from rigsight.identify.hysteresis import DerivedQuantities as DerivedQuantities
 from rigsight.identify.hysteresis import LoopArea as LoopArea
@@ -48,6 +50,7 @@ __all__ = [
     "JointFit",
     "KindFit",
     "LoopArea",
+    "OpenFactor",
     "PhysicalEstimates",
     "RecordResidual",
     "SpectralRatio",
@@ -69,5 +72,6 @@ __all__ = [
     "linear_start",
     "loop_area",
     "offsets",
+    "open_factor",
     "yaw_parameters",
 ]

@@ -53,7 +53,7 @@ class RecordIdentification:
     record
         The record.
     amplitude
-        Amplitude of its input; as given, else measured.
+        Amplitude of its input; as given, else measured. Of a free motion that of its output.
     paths
         The motion first, then what it drives.
     offsets
@@ -66,6 +66,8 @@ class RecordIdentification:
         What the user must know, a sentence each.
     own
         Parameters of a fit of this record alone, over time; None where they follow from `paths`, or where it failed.
+    moved
+        The output that its amplitude is of, where nothing drives it.
     """
 
     record: Record
@@ -76,6 +78,7 @@ class RecordIdentification:
     resonance: float | None = None
     warnings: tuple[str, ...] = ()
     own: PhysicalEstimates | None = None
+    moved: str = ""
 
     @property
     def is_identified(self) -> bool:
@@ -84,8 +87,8 @@ class RecordIdentification:
 
     @property
     def source(self) -> str:
-        """The input that its amplitude is of; empty for a rig without inputs."""
-        return self.paths[0].source if self.paths else ""
+        """The signal that its amplitude is of: an input, or the output that moves freely."""
+        return self.paths[0].source if self.paths else self.moved
 
     @property
     def motion(self) -> PathIdentification:

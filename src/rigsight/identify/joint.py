@@ -196,11 +196,8 @@ def _check_kinds(records: Sequence[Record], kinds: Sequence[str]) -> None:
 
 
 def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
-    if not structure.rig.has_one_motion:
-        # What decays moves without an input; what does not move at all was left out by the reader.
-        return
-    source = structure.rig.inputs[0].name
-    for record in records:
+    # What decays moves without an input; what does not move at all was left out by the reader.
+    for record, source in ((record, name) for record in records for name in structure.rig.moving_inputs):
         if np.ptp(record[source]) <= 1e-12 * np.max(np.abs(record[source])):
             raise InputError(
                 f"Record '{record.name}': '{source}' never moves, so this {record.kind} tells nothing. Leave the record out."

@@ -14,6 +14,7 @@ from rigsight.identify.information import Information
 from rigsight.identify.rig_equations import equations_of
 from rigsight.identify.transfer.record_response import Method
 from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
@@ -63,7 +64,7 @@ class LinearView:
     modes
         Its poles by their size, with what the records say of them.
     measured
-        Frequency responses of these records together; None for a rig without inputs.
+        Frequency responses of these records together; None where no input moves.
     model
         By (source, response) the linearized response at the measured frequencies with its standard error, shape (n,) each.
     """
@@ -91,7 +92,7 @@ class LinearView:
 def measured_responses(
     records: Sequence[Record], rig: Rig, method: Method, resolution: float | None
 ) -> ResponsesOfInputs | None:
-    """Return the frequency responses of all sensors to all inputs, None for a rig without inputs.
+    """Return the frequency responses of all sensors to all inputs, None where no input moves.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def measured_responses(
     resolution
         Width of a local band [rad/s]; None takes what each record gives.
     """
-    if not rig.inputs:
+    if all(is_constant(record[signal.name]) for record in records for signal in rig.inputs):
         return None
     return responses_of_inputs(
         records,

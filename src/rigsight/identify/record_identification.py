@@ -26,6 +26,7 @@ from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
 from rigsight.identify.transfer.transfer_step import fit_step
 from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold, Record
 from rigsight.rigs import Rig, evaluated
 
@@ -84,7 +85,7 @@ def identify_record(
     InputError
         If the record is too short for the resolution wished for. Whatever else a record cannot tell is told in the result.
     """
-    amplitude = record.amplitude if record.amplitude is not None else input_peak(record, rig)
+    amplitude = record.amplitude if record.amplitude is not None else measured_amplitude(record, rig)[0]
     if not rig.is_driven:
         return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, wishes),))
     forward = _driven_forward(record, constants.get("gain", 1.0))
@@ -104,11 +105,19 @@ def identify_record(
     )
 
 
-def input_peak(record: Record, rig: Rig) -> float:
-    """Return the height of a step, or half the range of another input, in its unit; of several inputs the first that moves."""
-    spanned = next((range_ for s in rig.inputs if (range_ := float(np.ptp(record[s.name]))) > 0.0), 0.0)
+def measured_amplitude(record: Record, rig: Rig) -> tuple[float, str]:
+    """Return the amplitude of a record in the unit of a signal, and that signal.
+
+    That is the height of a step, or half the range of another input, of several inputs the first that moves; of a free motion
+    half the range of the first output that was recorded.
+    """
+    inputs = [signal.name for signal in rig.inputs]
+    outputs = [signal.name for signal in rig.outputs if signal.name in record]
+    moving = [name for name in inputs if not is_constant(record[name])]
+    name = (moving or outputs or inputs)[0]
     # Not the deviation from mean or median: a sweep that begins slowly has both off zero.
-    return spanned if record.kind == "step" else 0.5 * spanned
+    spanned = float(np.ptp(record[name]))
+    return (spanned if moving and record.kind == "step" else 0.5 * spanned), name
 
 
 def _driven_forward(record: Record, gain: float) -> Record:

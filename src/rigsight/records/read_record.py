@@ -50,7 +50,7 @@ def read_record(
     required_outputs: Collection[str] | None = None,
     absent_inputs: Collection[str] = (),
     constant_inputs: Mapping[str, float] | None = None,
-    still_inputs: bool = False,
+    moving_inputs: Collection[str] = (),
     name: str | None = None,
     role: Role = "estimation",
     kind: Kind = "operation",
@@ -82,8 +82,8 @@ def read_record(
         Names of the inputs that are 0 where the file holds no input at all: a free motion.
     constant_inputs
         Input that the file does not hold -> its value throughout [SI].
-    still_inputs
-        Whether inputs that never change teach anything: on a rig that moves by itself.
+    moving_inputs
+        Names of the inputs without whose motion nothing can be learned: a motion that is prescribed.
     name
         How results call the record, by default the file's name without its ending.
     role, kind, amplitude, hold
@@ -119,9 +119,9 @@ def read_record(
     dialect = _Dialect(separator, decimal, header, comment)
     table = _table(path, {TIME: time, **wanted}, spare, dialect, dt, time_is_mapped=TIME in columns)
     absent = [signal.name for signal in recorded if signal.name not in table.values]
+    may_rest = kind == "operation" and amplitude is None
     if absent:
-        is_free = len(absent) == len(inputs) and kind == "operation" and amplitude is None
-        _check_absent(path, absent, table, is_free=is_free)
+        _check_absent(path, absent, table, is_free=len(absent) == len(inputs) and may_rest)
     if require_outputs and outputs and not any(signal.name in table.values for signal in outputs):
         listed = ", ".join(signal.name for signal in outputs)
         raise InputError(
@@ -141,8 +141,10 @@ def read_record(
     _refuse_what_nobody_measures(path, raw, table)
     found: list[str] = []
     if require_outputs:
-        must_move = [] if still_inputs or role != "estimation" else [signal.name for signal in recorded]
-        raw, found = _moving(path, raw, table, must_move, needed, outputs)
+        raw, found = _moving(path, raw, table, needed, outputs)
+        if role == "estimation":
+            must_move = moving_inputs if may_rest else [signal.name for signal in recorded]
+            found += _rest_notes(path, raw, table, recorded, must_move)
     found += _clipping_notes(path, raw, table)
     found += _alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
@@ -298,20 +300,11 @@ def _moving(
     path: Path,
     raw: dict[str, NDArray[np.float64]],
     table: Columns,
-    must_move: Sequence[str],
     needed: Collection[str],
     outputs: Sequence[NamedSignal],
 ) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
     """Return the signals that can be used, with notes on those that cannot."""
     constant = {signal for signal, samples in raw.items() if is_constant(samples)}
-    for signal in must_move:
-        if signal in constant or signal not in raw:
-            where = f"{path.name}, column '{table.labels[signal]}'" if signal in raw else path.name
-            value = raw[signal][0] if signal in raw else 0.0
-            raise InputError(
-                f"{where}: the input {signal} is constant ({value:g}), so nothing is excited and nothing can be identified. "
-                'Check the column, give the record role = "validation", or leave it out.'
-            )
     measured = [output.name for output in outputs if output.name in raw]
     for signal in measured:
         if signal in constant and (signal in needed or constant.issuperset(measured)):
@@ -322,6 +315,31 @@ def _moving(
     still = sorted(constant.intersection(measured))
     notes = [f"{path.name}: {signal} never changes and is taken as not measured." for signal in still]
     return {signal: samples for signal, samples in raw.items() if signal not in still}, notes
+
+
+def _rest_notes(
+    path: Path,
+    raw: Mapping[str, NDArray[np.float64]],
+    table: Columns,
+    recorded: Sequence[NamedSignal],
+    must_move: Collection[str],
+) -> list[str]:
+    """Tell of recorded inputs none of which changes: the rig moves freely, or a column is the wrong one."""
+    held = [signal.name for signal in recorded if signal.name in raw]
+    if not held or not all(is_constant(raw[signal]) for signal in held):
+        return []
+    values = ", ".join(f"{signal} = {raw[signal][0]:g}" for signal in held)
+    listed = ", ".join(f"'{table.labels[signal]}'" for signal in held)
+    where = f"{path.name}, column{'s' if len(held) > 1 else ''} {listed}"
+    if set(held) & set(must_move):
+        raise InputError(
+            f"{where}: no input changes ({values}), so nothing is excited and nothing can be identified. Check the column. "
+            'Of a rig that moves freely write kind = "operation" without an amplitude; a record that is only scored has '
+            'role = "validation".'
+        )
+    return [
+        f"{where}: no input changes ({values}); taken as a free motion. Check the column if the rig was driven."
+    ]
 
 
 def _clipping_notes(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> list[str]:

@@ -147,6 +147,11 @@ class Rig:
         """The numbers that are accepted in the place of one of `parameters`."""
         return tuple(alternative.parameter for alternative in self.alternatives)
 
+    @property
+    def moving_inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that move in every record that is fitted: of one element the motion that is prescribed to it."""
+        return () if self.is_driven or not self.has_one_motion else (self.inputs[0].name,)
+
     def in_own_parameters(
         self, given: Mapping[str, float], constants: Mapping[str, float]
     ) -> dict[str, float]:

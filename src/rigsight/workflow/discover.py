@@ -123,6 +123,8 @@ def discover_campaign(
     with threadpool_limits(limits=1, user_api="blas"):
         found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
+        factor = campaign.open_factor
+        notes = notes if factor is None else (factor.sentence, *notes)
         found = replace(found, warnings=(*found.warnings, *notes))
         if not one_by_one:
             return found
@@ -142,6 +144,7 @@ def discovery_task(campaign: Campaign) -> Task:
     length = window_length(campaign.rig, campaign.estimation) if no_spring else None
     floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
     noise = {floor.output: floor.std for floor in floors}
+    factor = campaign.open_factor
     return Task(
         title=campaign.title,
         rig=campaign.rig,
@@ -149,6 +152,7 @@ def discovery_task(campaign: Campaign) -> Task:
         records=cut(campaign.records, length),
         noise=noise,
         no_spring=no_spring,
+        held={} if factor is None else {factor.held: factor.value},
     )
 
 

@@ -90,7 +90,7 @@ def run_simulate(
         require_outputs=estimated,
         required_outputs=rig.required_outputs,
         absent_inputs=rig.absent_inputs,
-        still_inputs=not rig.has_one_motion,
+        moving_inputs=rig.moving_inputs,
         hold=read.hold,
         constants=own,
     )

@@ -75,8 +75,8 @@ def fit_candidates(
         Called with the name of each candidate that is done.
     """
     regression = None
-    if bench.rig.has_one_motion and bench.rig.is_driven:
-        regression = EffectRegression(bench.rig, bench.estimation, linear.fit.values, bench.scales)
+    if bench.rig.has_one_motion and bench.rig.is_driven and bench.driven:
+        regression = EffectRegression(bench.rig, bench.driven, linear.fit.values, bench.scales)
     looks = _looks(bench, linear, bench.offered(effects), regression)
     wide = {look.newest: look for look in widened(bench, looks)}
     lowest = min((look.cost for look in wide.values()), default=float("inf"))

@@ -12,6 +12,7 @@ from rigsight.diagnose.data.finding import AmplitudeDependence
 from rigsight.diagnose.windows import leading_output
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -44,7 +45,12 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
             "Only the frequency responses of a rig with one input are compared between amplitudes.",
         )
     source, response = rig.inputs[0].name, leading_output(rig, records)
-    records = [record for record in records if response in record]
+    records = [record for record in records if response in record and not is_constant(record[source])]
+    if not records:
+        return AmplitudeDependence(
+            "cannot tell",
+            "Nothing drives the rig in the sound records, so that they have no frequency response.",
+        )
     pair = _extremes(records, source)
     if pair is None:
         return AmplitudeDependence(

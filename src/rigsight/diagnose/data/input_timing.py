@@ -134,10 +134,11 @@ def input_timing(
 
     Returns
     -------
-    None where the motion is prescribed, the records' holds differ, or the model cannot be fitted to the stretches.
+    None where the motion is prescribed, no input moves, the records' holds differ, or the model cannot be fitted to the
+    stretches.
     """
     given = {record.hold for record in bench.look}
-    if not bench.rig.is_driven or not bench.rig.inputs or len(given) != 1:
+    if not bench.rig.is_driven or not bench.driven or len(given) != 1:
         return None
     (declared,) = given
     as_given = _excess(bench, base, bench.look)

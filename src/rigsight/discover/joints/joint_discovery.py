@@ -137,13 +137,14 @@ class _Polisher:
 
     def __init__(self, task: Task, threads: IdleThreads) -> None:
         self.rig, self.noise, self._threads = task.rig, task.noise, threads
+        self._free = {p.name for p in task.rig.parameters if p.fitted} - set(task.held)
         self.estimation, self.held_out, self.how = split(task)
-        self.start = {**task.constants, **linear_start(task.rig, self.estimation, task.constants, {})}
+        self.start = {**task.constants, **linear_start(task.rig, self.estimation, task.constants, task.held)}
         self._scales = characteristic_scales(task.rig, self.estimation, self.start)
 
     def polished(self, terms: Sequence[LawTerm], values: Mapping[str, float]) -> _Polished:
         structure = compose(self.rig, [term.effect for term in terms])
-        start, free = dict(values), {p.name for p in self.rig.parameters if p.fitted}
+        start, free = dict(values), set(self._free)
         for term in terms:
             for parameter in term.effect.parameters:
                 name = structure.parameter_name(term.effect, parameter.name)

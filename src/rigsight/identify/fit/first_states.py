@@ -12,8 +12,9 @@ from scipy.optimize import least_squares
 from rigsight.effects import Place
 from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.typical_size import size_of_signal
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
-from rigsight.rigs import evaluated
+from rigsight.rigs import Rig, evaluated
 from rigsight.simulate import Structure
 from rigsight.units import parse_dimension
 
@@ -80,6 +81,11 @@ def state_at_rest(structure: Structure, record: Record, guess: Floats, values: M
         if name in record and i > 1:
             state[i] = float(np.mean(record[name][:count]))
     return state
+
+
+def moves_freely(rig: Rig, record: Record) -> bool:
+    """Return True for a record of a rig with masses in which no input changes."""
+    return rig.is_driven and all(is_constant(record[signal.name]) for signal in rig.inputs)
 
 
 def rig_state(
@@ -156,8 +162,9 @@ def _of_one_motion(structure: Structure, record: Record) -> Floats:
     count = min(_FIRST_SAMPLES, record.n_samples)
     time = np.arange(count) * record.dt
     displacement = record[structure.rig.outputs[0].name][:count]
-    slope, level = np.polyfit(time, displacement, 1)
-    state[0], state[1] = level, slope
+    # A motion that nothing drives begins with its largest force: its path is bent.
+    degree = 2 if moves_freely(structure.rig, record) and count > 2 else 1
+    state[1], state[0] = np.polyfit(time, displacement, degree)[-2:]
     for i, (name, dimension) in enumerate(
         zip(structure.state_names, structure.state_dimensions, strict=True)
     ):

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.identify.fit.first_states import first_state, state_at_rest
+from rigsight.identify.fit.first_states import first_state, moves_freely, state_at_rest
 from rigsight.identify.fit.fit_data import FitData, RecordData, weighted
 from rigsight.simulate import parameter_vector, simulate_sets
 
@@ -39,7 +39,7 @@ _LOST = 2.0
 def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     """Return each record's initial state; of several for states with a range, and of moving and resting, the best.
 
-    On a rig of more than one motion it is fitted to the beginning of the record.
+    On a rig of more than one motion, and in a free motion, it is fitted to the beginning of the record.
 
     Parameters
     ----------
@@ -56,9 +56,15 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     p = parameter_vector(data.structure, values)
     if np.any(data.limited):
         return [_placed(data, *pair, p, values) for pair in zip(data.records, guesses, strict=True)]
-    if data.structure.rig.has_one_motion:
-        return guesses
-    return data.of_each_record(lambda i: settled_state(data, data.records[i], p, guesses[i]))
+
+    def settled(index: int) -> Floats:
+        record = data.records[index]
+        # Where an input drives one mass, what it begins with is soon forgotten; a free motion has nothing else.
+        if data.structure.rig.has_one_motion and not moves_freely(data.structure.rig, record.record):
+            return guesses[index]
+        return settled_state(data, record, p, guesses[index])
+
+    return data.of_each_record(settled)
 
 
 def _placed(

@@ -1,8 +1,8 @@
 """Linear parameters straight from the spectra of the records, as start values of a grey-box fit.
 
-Of a rig of one motion; others start as `any_rig_start` says. Iterated linear least squares on the equation of motion in the
-frequency domain, weighted by the inverse of the current denominator so that the equation error approaches the output error; a
-polynomial per record takes up the transients. It has no local minimum, and needs no simulation.
+Of a rig of one motion that is driven; others start as `any_rig_start` says. Iterated linear least squares on the equation of
+motion in the frequency domain, weighted by the inverse of the current denominator so that the equation error approaches the
+output error; a polynomial per record takes up the transients. It has no local minimum, and needs no simulation.
 
 References
 ----------
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rigsight.errors import InputError
 from rigsight.identify.start.any_rig_start import any_rig_start
 from rigsight.identify.start.equation_error import solve_in_frequency, spectra_of
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Follower, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -55,6 +56,11 @@ def linear_start(
     """
     if not rig.has_one_motion:
         return any_rig_start(rig, records, constants, known)
+    driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
+    if rig.is_driven and not driven:
+        # A free decay is nothing but its ends, and this start takes those for what is to be left out.
+        return any_rig_start(rig, records, constants, {**_one_offset(rig), **known})
+    records = driven
     found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)
     if rig.follower is not None:
         found |= _followed(rig, rig.follower, records, constants, found)
@@ -64,6 +70,11 @@ def linear_start(
         for name, value in found.items()
     }
     return {**clipped, **known}
+
+
+def _one_offset(rig: Rig) -> dict[str, float]:
+    """Return no constant force where a rest position says the same."""
+    return dict.fromkeys(map(str, rig.motion.bias.free_symbols), 0.0) if rig.motion.rest.free_symbols else {}
 
 
 def _driven(

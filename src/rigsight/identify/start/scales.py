@@ -8,6 +8,7 @@ import numpy as np
 
 from rigsight.identify.start.place_scales import scales_at_places
 from rigsight.identify.typical_size import typical_size
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -49,7 +50,8 @@ def characteristic_scales(
 
 def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> dict[str, float]:
     displacement = typical_size([record[rig.outputs[0].name] for record in records])
-    drive_input = typical_size([record[rig.inputs[0].name] for record in records])
+    drives = [record[rig.inputs[0].name] for record in records]
+    drive_input, is_driven = typical_size(drives), not all(map(is_constant, drives))
     motion = rig.motion
     gain, stiffness, inertia = (
         evaluated(part, values) for part in (motion.drive_gain, motion.stiffness, motion.inertia)
@@ -63,7 +65,8 @@ def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, flo
     return {
         "x": displacement,
         "input": drive_input,
-        "drive": abs(gain) * drive_input,
+        # Where nothing drives, what the spring does is the size of every force.
+        "drive": abs(gain) * drive_input if is_driven else float(spring),
         "force": float(spring),
         "time": float(1.0 / omega),
         "length": length,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
+from rigsight.identify import OpenFactor, open_factor
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.workflow.campaigns.campaign_file import (
@@ -83,6 +85,12 @@ class Campaign:
     def estimation(self) -> tuple[Record, ...]:
         """Records that may be fitted."""
         return tuple(record for record in self.records if record.role == "estimation")
+
+    @cached_property
+    def open_factor(self) -> OpenFactor | None:
+        """What the records that may be fitted tell up to a common factor only: those of a free motion."""
+        given = self.rig.in_own_parameters(self.parameters, self.constants)
+        return open_factor(self.rig, self.estimation, self.constants, given)
 
     @property
     def validation(self) -> tuple[Record, ...]:

@@ -176,22 +176,26 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
     Raises
     ------
     InputError
-        If it lacks a signal that every record of the rig has, one of them never changes, or it has constants of another rig.
+        If it lacks a signal that every record of the rig has, one of them never changes that must, or it has constants of another
+        rig.
     """
     outputs = rig.required_outputs or tuple(s.name for s in rig.outputs if s.name in record)
     if not outputs:
         listed = ", ".join(signal.name for signal in rig.outputs)
         raise InputError(f"Record '{record.name}' has none of the outputs {listed}; give one at least.")
     inputs = [signal.name for signal in rig.inputs]
-    # A rig of one motion is only known as far as its input moves it.
-    must_move = {name: "input" for name in inputs if rig.has_one_motion and record.role == "estimation"}
+    may_rest = record.kind == "operation" and record.amplitude is None
+    must_move = {name: "input" for name in rig.moving_inputs if record.role == "estimation"}
+    if record.role == "estimation" and not may_rest and all(is_constant(record[name]) for name in inputs):
+        must_move |= dict.fromkeys(inputs, "input")
     if rig.required_outputs or all(is_constant(record[name]) for name in outputs):
         must_move |= dict.fromkeys(outputs, "output")
     for name in (*inputs, *outputs):
         if is_constant(record[name]) and name in must_move:
             raise InputError(
                 f"Record '{record.name}': the {must_move[name]} {name} never changes ({record[name][0]:g}), so nothing can "
-                "be learned from it. Check the signal, or leave the record out."
+                "be learned from it. Check the signal, or leave the record out; a record of a rig that moves freely has the kind "
+                '"operation" and no amplitude.'
             )
     checked_numbers(f"{called}: record '{record.name}'", "constants", rig, rig.constants, record.constants)
     units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}

@@ -103,7 +103,7 @@ def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, f
             required_outputs=rig.required_outputs,
             absent_inputs=rig.absent_inputs,
             constant_inputs=record.inputs,
-            still_inputs=not rig.has_one_motion,
+            moving_inputs=rig.moving_inputs,
             name=record.name,
             role=record.role,
             kind=record.kind,

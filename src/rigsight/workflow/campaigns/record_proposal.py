@@ -93,7 +93,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
         if samples.size > 1 and np.isfinite(samples).all():
             kind = guess_kind(samples)
             amplitude = guess_amplitude(_in_si(samples, driven), kind)
-    remark = "" if driven is None else f"guessed from {driven.signal}; check: "
+    remark = "" if driven is None or driven.channel is None else f"guessed from {driven.signal}; check: "
     lines = [f'kind = "{kind}"  # {remark}sweep, step, multisine or operation']
     if driven is not None and amplitude:
         unit = f" [{driven.si}]" if has_si(driven.si) else ""
@@ -148,6 +148,7 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     """Return the lines of the columns table, and the number of blanks in them."""
     lines, blanks = [], 0
     needed = _needed(guess)
+    left = _left(guess, channels)
     for one in (guess.time, *guess.signals):
         if one.channel is not None:
             lines += _column(one)
@@ -155,12 +156,21 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
             listed = ", ".join(quoted(name) for name in one.candidates[:_LISTED])
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {listed}")
             blanks += 1
+        elif one.signal in guess.rig.absent_inputs and not left:
+            lines.append(
+                f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0, as nothing drives the rig"
+            )
         elif one.signal in needed:
-            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{_left(guess, channels)}")
+            free = (
+                "; or remove this line: then nothing drove the rig"
+                if one.signal in guess.rig.absent_inputs
+                else ""
+            )
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{left or 'no channel is left'}{free}")
             blanks += 1
         elif one.signal in telling(guess.rig):
             lines.append(
-                f"# {one.signal} =    # {_unit_of(one)}{_left(guess, channels)}; or not recorded here"
+                f"# {one.signal} =    # {_unit_of(one)}{left or 'no channel is left'}; or not recorded here"
             )
     return lines, blanks
 
@@ -176,10 +186,10 @@ def _needed(guess: FileGuess) -> set[str]:
 
 
 def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
-    """Return which channels are no signal yet."""
+    """Return which channels are no signal yet; empty where all are."""
     taken = {one.channel.name for one in (guess.time, *guess.signals) if one.channel is not None}
     free = [quoted(channel.name) for channel in channels if channel.name not in taken]
-    return f"one of: {', '.join(free[:_LISTED])}" if free else "no channel is left"
+    return f"one of: {', '.join(free[:_LISTED])}" if free else ""
 
 
 def _coarse_step(time: Channel) -> float | None:

@@ -11,7 +11,13 @@ from threadpoolctl import threadpool_limits
 
 from rigsight.diagnose.windows import cut, window_length
 from rigsight.errors import SimulationError, check_option
-from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales, linear_start
+from rigsight.identify import (
+    FitResult,
+    GreyBoxFit,
+    OpenFactor,
+    characteristic_scales,
+    linear_start,
+)
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.helpful_sensors import helpful_sensors
 from rigsight.identify.identifiability import identifiability, relative_errors
@@ -23,7 +29,7 @@ from rigsight.identify.identification import (
 )
 from rigsight.identify.information import Information, information
 from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
-from rigsight.identify.record_identification import Wishes, input_peak
+from rigsight.identify.record_identification import Wishes, measured_amplitude
 from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
@@ -33,7 +39,7 @@ from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaigns.campaign import Campaign
-from rigsight.workflow.identification.joint import fit_any_rig_jointly, parent
+from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
 from rigsight.workflow.identification.warnings import any_rig_warnings, beyond_identified_amplitudes
 from rigsight.workflow.kernels import prepare_kernels
 from rigsight.workflow.progress import Listener, Stage
@@ -49,11 +55,18 @@ _GROWTHS = 3.0
 def has_transfer_forms(campaign: Campaign) -> bool:
     """Return True for the built-in rigs of one motion, whose transfer functions are fitted record by record.
 
-    A rig of the same shape from a file has names of its own; and records of different constants have no such form together.
+    A rig of the same shape from a file has names of its own; records of different constants have no such form together, and one
+    in which nothing drives the rig has none.
     """
     rig = campaign.rig
-    built_in = rig.name in RIGS and RIGS[rig.name].mechanism == rig.mechanism
-    return built_in and rig.has_one_motion and not any(r.constants for r in campaign.records)
+    if not _is_built_in(rig) or any(record.constants for record in campaign.records):
+        return False
+    return not any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
+
+
+def _is_built_in(rig: Rig) -> bool:
+    """Return True for a built-in rig of one motion."""
+    return rig.has_one_motion and rig.name in RIGS and RIGS[rig.name].mechanism == rig.mechanism
 
 
 def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: Listener) -> Identification:
@@ -86,10 +99,12 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
         for record in parallel(delayed(_record)(record, rig, wishes) for record in records):
             found.append(record)
             stage.finished(record.record.name)
-        start, length = _begin(campaign, structure, records)
-        joint = fit_any_rig_jointly(campaign, structure, found, start, length)
+        factor = campaign.open_factor
+        held = _held(campaign, records, factor)
+        start, length = _begin(campaign, structure, records, held)
+        joint = fit_any_rig_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
-        known, joint = _with_errors(joint, structure, cut(records, length))
+        known, joint = _with_errors(joint, structure, cut(records, length), factor)
         found = [_with_own(record, joint, rig) for record in found]
         stage.finished("what is identifiable")
         views = tuple(_views(structure, joint.fit.fit.values, records, wishes, known))
@@ -113,8 +128,9 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
         joint=joint,
         model=Model.of(structure, joint.fit.fit.values, records[0].hold).to_json(),
         warnings=(
+            *([] if factor is None else [factor.sentence]),
             *any_rig_warnings(campaign, views, joint),
-            *(beyond_identified_amplitudes(campaign, joint) if len(rig.inputs) == 1 else ()),
+            *(beyond_identified_amplitudes(campaign, joint) if len(rig.inputs) <= 1 else ()),
         ),
         views=views,
         identifiability=told,
@@ -138,16 +154,27 @@ def _record(record: Record, rig: Rig, wishes: Wishes) -> RecordIdentification:
         for response in rig.outputs
         if measured is not None and response.name in record and not is_constant(record[source.name])
     ]
-    amplitude = record.amplitude if record.amplitude is not None else input_peak(record, rig)
-    return RecordIdentification(record, amplitude, tuple(paths))
+    measured_size, moved = measured_amplitude(record, rig)
+    amplitude = record.amplitude if record.amplitude is not None else measured_size
+    return RecordIdentification(record, amplitude, tuple(paths), moved="" if paths else moved)
+
+
+def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | None) -> dict[str, float]:
+    """Return parameters that these records say nothing about, and of those that they tell up to a common factor one."""
+    rig = campaign.rig
+    held = {}
+    if _is_built_in(rig):
+        no_spring = rig.is_driven and campaign.parameters.get(str(rig.motion.stiffness)) == 0.0
+        held = held_parameters(campaign, records, no_spring)
+    return held if factor is None else {**held, factor.held: factor.value}
 
 
 def _begin(
-    campaign: Campaign, structure: Structure, records: Sequence[Record]
+    campaign: Campaign, structure: Structure, records: Sequence[Record], held: Mapping[str, float]
 ) -> tuple[dict[str, float], float | None]:
     """Return start values, and the length of windows if the rig runs away from where it was [s]."""
     rig, constants = campaign.rig, campaign.constants
-    starts = [linear_start(rig, records, constants, {})]
+    starts = [linear_start(rig, records, constants, held)]
     given = rig.in_own_parameters(campaign.parameters, constants)
     if all(p.name in given for p in rig.parameters):
         starts.append({p.name: given[p.name] for p in rig.parameters})
@@ -199,7 +226,7 @@ def _drifts_in_sight(linear: Linearization, records: Sequence[Record]) -> bool:
 
 
 def _with_errors(
-    joint: JointIdentification, structure: Structure, windows: Sequence[Record]
+    joint: JointIdentification, structure: Structure, windows: Sequence[Record], factor: OpenFactor | None
 ) -> tuple[Information | None, JointIdentification]:
     """Return what the records say of the parameters, and the fits with errors that are infinite where that is nothing."""
     fit = joint.fit
@@ -221,12 +248,25 @@ def _with_errors(
             covariance=covariance,
         )
 
-    known, together = corrected(fit.fit, windows)
+    # Fits of single records hold the same number: to one another they can be compared.
+    whole = fit.fit if factor is None else _with_unknown(fit.fit, factor.held)
+    known, together = corrected(whole, windows)
     kinds = tuple(
         replace(kind, fit=corrected(kind.fit, [w for w in windows if parent(w) == kind.kind])[1])
         for kind in fit.kinds
     )
-    return known, replace(joint, fit=replace(fit, fit=together, kinds=kinds))
+    return known, replace(joint, fit=replace(fit, fit=together, kinds=kinds), names=together.free)
+
+
+def _with_unknown(result: FitResult, name: str) -> FitResult:
+    """Return a fit as if a parameter that was held had been fitted and not been found."""
+    free = tuple(n for n in result.structure.names if n in (*result.free, name))
+    place = [free.index(n) for n in result.free]
+    covariance = np.zeros((len(free), len(free)))
+    covariance[np.ix_(place, place)] = result.covariance
+    covariance[free.index(name), free.index(name)] = np.inf
+    errors = {**result.standard_errors, name: float("inf")}
+    return replace(result, free=free, covariance=covariance, standard_errors={n: errors[n] for n in free})
 
 
 def _with_own(found: RecordIdentification, joint: JointIdentification, rig: Rig) -> RecordIdentification:

@@ -13,7 +13,7 @@ from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
 from rigsight.identify.joint import JointFit
-from rigsight.identify.record_identification import input_peak
+from rigsight.identify.record_identification import measured_amplitude
 from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record
@@ -59,7 +59,7 @@ def identify_jointly(
     structure = compose(campaign.rig)
     length = window_length(campaign.rig, records) if no_spring else None
     windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
-    known = _known(campaign, records, no_spring)
+    known = held_parameters(campaign, records, no_spring)
     fit = fit_jointly(
         structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=parent
     )
@@ -102,6 +102,7 @@ def fit_any_rig_jointly(
     structure: Structure,
     found: Sequence[RecordIdentification],
     start: Mapping[str, float],
+    known: Mapping[str, float],
     length: float | None,
 ) -> JointIdentification:
     """Fit one set of all parameters to all estimation records of a rig of any shape, and one to each alone; score every record.
@@ -116,11 +117,13 @@ def fit_any_rig_jointly(
         What each estimation record shows by itself.
     start
         Start value of every parameter.
+    known
+        Parameters that keep their value.
     length
         Of windows into which records are cut [s]; None leaves them whole.
     """
     windows = cut([r.record for r in found], length)
-    fit = fit_jointly(structure, windows, campaign.constants, start=start, group_of=parent)
+    fit = fit_jointly(structure, windows, campaign.constants, known, start, group_of=parent)
     amplitudes = {r.record.name: r.amplitude for r in found}
     scores = (
         *_estimation_scores(fit, windows, amplitudes),
@@ -170,8 +173,18 @@ def parent(record: Record) -> str:
     return record.name.split(WINDOW)[0]
 
 
-def _known(campaign: Campaign, records: Sequence[Record], no_spring: bool) -> dict[str, float]:
-    """Return what these records say nothing about: a spring that is not there, outputs that were not measured."""
+def held_parameters(campaign: Campaign, records: Sequence[Record], no_spring: bool) -> dict[str, float]:
+    """Return what these records say nothing about: a spring that is not there, outputs that were not measured.
+
+    Parameters
+    ----------
+    campaign
+        Of a built-in rig of one motion.
+    records
+        Those that are fitted.
+    no_spring
+        True for an axis without a spring.
+    """
     rig = campaign.rig
     known: dict[str, float] = {}
     names = {parameter.name for parameter in rig.parameters}
@@ -229,7 +242,9 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
     free_run = GreyBoxFit(fit.fit.structure, windows, scales, noise).fit(fit.fit.values, ())
     measured_in_fit = [s.name for s in campaign.rig.outputs if s.name in fit.noise]
     scored = _columns(free_run.residuals, windows, [s.name for s in campaign.rig.outputs])
-    amplitude = record.amplitude if record.amplitude is not None else input_peak(record, campaign.rig)
+    amplitude = (
+        record.amplitude if record.amplitude is not None else measured_amplitude(record, campaign.rig)[0]
+    )
     return RecordScore(
         record.name, "validation", amplitude, {n: v for n, v in scored.items() if n in measured_in_fit}, {}
     )

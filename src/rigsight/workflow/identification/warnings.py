@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from rigsight.identify.identification import JointIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
-from rigsight.identify.record_identification import MISFIT, input_peak
+from rigsight.identify.record_identification import MISFIT, measured_amplitude
 from rigsight.identify.transfer.record_response import driven_band
 from rigsight.records import Record
 from rigsight.rigs import evaluated
@@ -163,25 +163,29 @@ def _not_the_whole(found: Sequence[RecordIdentification]) -> list[str]:
 
 
 def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification) -> list[str]:
-    """Say which validation records are driven at an amplitude that no fitted record had."""
+    """Say which validation records have an amplitude that no fitted record of the same signal had."""
     fitted = [r for r in campaign.estimation if r.name not in joint.left_out]
-    compared = [*fitted, *campaign.validation]
-    given = all(record.amplitude is not None for record in compared)
+    given = all(record.amplitude is not None for record in (*fitted, *campaign.validation))
+    units = {signal.name: signal.unit for signal in (*campaign.rig.inputs, *campaign.rig.outputs)}
 
-    def amplitude(record: Record) -> float:
-        own = record.amplitude if given else None
-        return own if own is not None else input_peak(record, campaign.rig)
+    def amplitude(record: Record) -> tuple[float, str]:
+        measured, name = measured_amplitude(record, campaign.rig)
+        return record.amplitude if given and record.amplitude is not None else measured, name
 
-    low, high = min(map(amplitude, fitted)), max(map(amplitude, fitted))
-    unit = campaign.rig.inputs[0].unit
-    span = (
-        f"{low:.3g} {unit}"
-        if math.isclose(low, high, rel_tol=_TOLERANCE)
-        else f"{low:.3g} to {high:.3g} {unit}"
-    )
-    return [
-        f"Validation record '{record.name}' has an amplitude of {amplitude(record):.3g} {unit}, outside what was "
-        f"identified ({span}): its score tells how far the model reaches, not how well it was identified."
-        for record in campaign.validation
-        if not (1.0 - _TOLERANCE) * low <= amplitude(record) <= (1.0 + _TOLERANCE) * high
-    ]
+    identified: dict[str, list[float]] = {}
+    for size, name in map(amplitude, fitted):
+        identified.setdefault(name, []).append(size)
+    told = []
+    for record in campaign.validation:
+        size, name = amplitude(record)
+        unit = units[name]
+        low, high = min(identified.get(name, [size])), max(identified.get(name, [size]))
+        if (1.0 - _TOLERANCE) * low <= size <= (1.0 + _TOLERANCE) * high:
+            continue
+        one = math.isclose(low, high, rel_tol=_TOLERANCE)
+        span = f"{low:.3g} {unit}" if one else f"{low:.3g} to {high:.3g} {unit}"
+        told.append(
+            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, outside what was identified ({span}): its "
+            "score tells how far the model reaches, not how well it was identified."
+        )
+    return told
