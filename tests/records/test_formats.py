@@ -377,7 +377,7 @@ def test_too_many_samples_are_refused_before_they_are_read(
 ) -> None:
     write(tmp_path / "run", rows(), {})
     for module in ("channel", "matlab_elements"):
-        monkeypatch.setattr(f"rigsight.records.{module}.MOST_SAMPLES", 100)
+        monkeypatch.setattr(f"rigsight.records.formats.{module}.MOST_SAMPLES", 100)
     with pytest.raises(InputError, match=r"run.*120 .*more than the 100 that are read"):
         read(tmp_path / "run")
 

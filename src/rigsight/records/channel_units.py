@@ -119,6 +119,15 @@ def is_a(unit: str, si: str) -> bool:
     return True
 
 
+def is_unit(text: str) -> bool:
+    """Return True if a text is a unit, of whatever."""
+    try:
+        _ratio(text, text)
+    except UnknownUnitError:
+        return False
+    return True
+
+
 def si_mapping(
     file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None
 ) -> tuple[ColumnMapping, tuple[str, ...]]:

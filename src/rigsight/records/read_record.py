@@ -60,7 +60,7 @@ def read_record(
     resample: float | None = None,
     separator: str | None = None,
     decimal: str | None = None,
-    header: bool | None = None,
+    header: bool | int | None = None,
     comment: str | None = None,
     constants: Mapping[str, float] | None = None,
 ) -> Record:
@@ -183,7 +183,7 @@ class _Dialect:
 
     separator: str | None
     decimal: str | None
-    header: bool | None
+    header: bool | int | None
     comment: str | None
 
 

@@ -12,6 +12,7 @@ COMMENT_SIGNS = ("#", "%", "//")
 # Earlier wins a tie: a comma may also be a decimal sign, and white space surrounds other separators.
 SEPARATORS = (";", "\t", "|", ",", " ")
 LINES_LOOKED_AT = 60
+"""At the beginning of a text, where its names stand, and as many at its end, where numbers do."""
 SIGNS_LOOKED_AT = 400_000
 
 
@@ -79,28 +80,49 @@ def sniff(lines: Sequence[str], separator: str | None, decimal: str | None) -> D
     separator, decimal
         What is already known, else None.
     """
-    signs = list(accumulate(map(len, lines[:LINES_LOOKED_AT])))
-    sample = lines[: max(sum(count <= SIGNS_LOOKED_AT for count in signs), 2)]
+    sample = _whole_up_to(lines[:LINES_LOOKED_AT])
+    last = _whole_up_to(lines[: -LINES_LOOKED_AT - 1 : -1])[::-1] if len(lines) > LINES_LOOKED_AT else sample
     candidates = [
         Dialect(candidate, sign)
         for candidate in (SEPARATORS if separator is None else (separator,))
         for sign in ((".", ",") if decimal is None else (decimal,))
         if candidate != sign
     ]
-    return max(candidates, key=lambda dialect: _plausibility(dialect, sample, alone=separator is not None))
+    return max(
+        candidates, key=lambda dialect: _plausibility(dialect, sample, last, alone=separator is not None)
+    )
 
 
-def _plausibility(dialect: Dialect, lines: Sequence[str], alone: bool) -> tuple[bool, float, bool]:
+def _whole_up_to(lines: Sequence[str]) -> Sequence[str]:
+    """Return the first lines, two at least, that are not too long together."""
+    signs = accumulate(map(len, lines))
+    return lines[: max(sum(count <= SIGNS_LOOKED_AT for count in signs), 2)]
+
+
+def _plausibility(
+    dialect: Dialect, first: Sequence[str], last: Sequence[str], alone: bool
+) -> tuple[bool, float, bool]:
     """Return what makes a dialect plausible, most telling first; tuples compare in that order.
 
-    A header as wide as the rows, then the share of cells that are numbers, then that there are columns at all.
+    A line above the numbers as wide as the rows, then the share of cells that are numbers, then that there are columns at all.
     """
-    rows = [dialect.cells(line) for line in lines]
+    rows = [dialect.cells(line) for line in last]
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
     if width < 2 and not alone:
         return False, 0.0, False
     numbers = sum(dialect.number(cell) is not None for row in rows if len(row) == width for cell in row)
-    return len(rows[0]) == width, numbers / sum(len(row) for row in rows), True
+    return _begins_in_columns(dialect, first, width), numbers / sum(len(row) for row in rows), True
+
+
+def _begins_in_columns(dialect: Dialect, lines: Sequence[str], width: int) -> bool:
+    """Return True if the first row of numbers, or else the first line, has a line of the same width above it, or nothing."""
+    above = None
+    for line in lines:
+        cells = dialect.cells(line)
+        if len(cells) == width and 2 * sum(not dialect.is_text(cell) for cell in cells) > width:
+            return above is None or above == width
+        above = len(cells)
+    return len(dialect.cells(lines[0])) == width
 
 
 def looks_like_names(dialect: Dialect, cells: Sequence[str]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from rigsight.errors import InputError, nearest
 from rigsight.records.column_mapping import ColumnMapping, Columns
 from rigsight.records.formats.channel import check_count, printable
 from rigsight.records.formats.dialect import Dialect, is_comment, looks_like_names, sniff
+from rigsight.records.formats.table_head import LAST_LINES, MOST_HEAD, UnclearHeadError, find_head
 from rigsight.records.formats.text_file import read_text
 
 
@@ -51,7 +52,7 @@ def read_csv(
     optional: Sequence[str] = (),
     separator: str | None = None,
     decimal: str | None = None,
-    header: bool | None = None,
+    header: bool | int | None = None,
     comment: str | None = None,
 ) -> Columns:
     """Read the columns that `columns` asks for; others may hold anything.
@@ -65,7 +66,8 @@ def read_csv(
     optional
         Signals that may be missing.
     separator, decimal, header, comment
-        The file's dialect; what is None is found out.
+        The file's dialect: the separator, the decimal sign, whether there is a line of names or its number from 1, the sign of
+        comments. What is None is found out.
 
     Raises
     ------
@@ -87,7 +89,8 @@ def read_csv(
         raise InputError(
             f"{path.name} is empty (nothing but blank or comment lines): a header and rows of numbers are needed."
         )
-    layout = find_layout(path, lines, kept, separator, decimal, header, comment)
+    wanted = {mapping.name for mapping in columns.values() if isinstance(mapping.name, str)}
+    layout = find_layout(path, lines, kept, separator, decimal, header, comment, wanted)
     found = {
         signal: position
         for signal, mapping in columns.items()
@@ -125,32 +128,59 @@ def find_layout(
     kept: Sequence[int],
     separator: str | None,
     decimal: str | None,
-    header: bool | None,
+    header: bool | int | None,
     comment: str | None,
+    wanted: Collection[str] = (),
 ) -> Layout:
-    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out."""
-    dialect = sniff([lines[number - 1] for number in kept[:100]], separator, decimal)
-    first = [printable(cell) for cell in dialect.cells(lines[kept[0] - 1])]
+    """Return the layout of a text of which the lines numbered `kept` are no comments; what is None is found out.
+
+    Parameters
+    ----------
+    path
+        For messages.
+    lines
+        All lines.
+    kept
+        Numbers, from 1, of those that are neither blank nor comments.
+    separator, decimal, header, comment
+        As of `read_csv`.
+    wanted
+        Names that are asked for.
+
+    Raises
+    ------
+    InputError
+        If there are too many columns, or nobody can say which line holds their names.
+    """
+    looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
+    last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
+    dialect = sniff([*looked_at, *last], separator, decimal)
+    try:
+        head = find_head(dialect, [*looked_at, *last], wanted, header, lambda i: kept[i])
+    except UnclearHeadError as error:
+        raise InputError(f"{path.name}: {error}") from None
+    first_row = kept[min(head.first_row, len(kept) - 1)]
+    widest = lines[(first_row if head.names is None else kept[head.names]) - 1]
+    first = [printable(cell) for cell in dialect.cells(widest)]
     check_count(path.name, len(first))
-    if header is None:
-        header = looks_like_names(dialect, first)
-    if not header:
-        names = _names_in_comment(lines, kept[0], dialect, len(first), comment)
+    notes = []
+    if head.n_passed > 0:
+        notes.append(
+            f"{path.name}: {head.n_passed} line{'s' if head.n_passed > 1 else ''} above the "
+            f"{'numbers' if head.names is None else f'names in line {kept[head.names]}'} are no part of the table and were "
+            "passed over."
+        )
+    if head.names is None:
+        names = _names_in_comment(lines, first_row, dialect, len(first), comment)
         numbers = tuple(str(i + 1) for i in range(len(first)))
-        return Layout(dialect, names or numbers, 0, bool(names), ())
-    notes: tuple[str, ...] = ()
+        return Layout(dialect, names or numbers, head.first_row, bool(names), tuple(notes))
     units: tuple[str, ...] = ()
-    n_above = 1
-    if len(kept) > 1:
-        second = [printable(cell) for cell in dialect.cells(lines[kept[1] - 1])]
-        if any(second) and all(dialect.is_text(cell) for cell in second):
-            n_above = 2
-            units = tuple(second)
-            listed = ", ".join(second)
-            notes = (
-                f"{path.name}, line {kept[1]}: taken as a row of units ({listed}); values are not converted by it.",
-            )
-    return Layout(dialect, tuple(first), n_above, True, notes, units)
+    if head.units is not None:
+        units = tuple(printable(cell) for cell in dialect.cells(lines[kept[head.units] - 1]))
+        notes.append(
+            f"{path.name}, line {kept[head.units]}: taken as a row of units ({', '.join(units)}); values are not converted by it."
+        )
+    return Layout(dialect, tuple(first), head.first_row, True, tuple(notes), units)
 
 
 def _names_in_comment(

@@ -64,7 +64,7 @@ class RecordTable(FileTable):
     columns: dict[str, str | int | ColumnTable] = {}
     separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None
-    header: bool | None = None
+    header: bool | Annotated[int, Field(ge=1)] | None = None
     comment: Annotated[str, Field(min_length=1)] | None = None
     constants: dict[str, Number] = {}
     inputs: dict[str, Number] = {}
@@ -201,6 +201,8 @@ def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dic
         return f"{path.name}: records: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
     if location[-1] == "decimal":
         return f'{path.name}: {key}: must be "." or ",", got {shown(got)}.'
+    if location[-1] == "header":
+        return f"{path.name}: {key}: must be true, false, or the number of the line that holds the names, got {shown(got)}."
     if location[-1] == "separator":
         return f"{path.name}: {key}: must be one character, got {shown(got)}; a blank stands for any white space."
     if "columns" in location[:-1]:
@@ -217,6 +219,8 @@ def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]
     here: Any = data
     for i, part in enumerate(location):
         if "columns" in kept and i >= kept.index("columns") + 2 and part in ("str", "int", "ColumnTable"):
+            continue
+        if kept and kept[-1] == "header":
             continue
         kept.append(part)
         try:

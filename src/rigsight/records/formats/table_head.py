@@ -1,0 +1,256 @@
+"""Where do names, units and numbers stand in a text, and what above them is neither?
+
+Loggers write what they know about the test above the table: its number, the date, the operator, in any number of cells. The
+rows of numbers are what all else is told by: the last lines of a file are some of them, and what stands right above the first
+one are units or names.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from rigsight.records.channel_names import closeness
+from rigsight.records.channel_units import is_unit
+from rigsight.records.formats.dialect import Dialect, looks_like_names
+
+LAST_LINES = 60
+"""Lines at the end from which the shape of a row is read: more of them are rows of numbers than anything else."""
+MOST_HEAD = 1000
+"""Lines among which the first row of numbers is looked for."""
+_NAMES_BELOW = 20
+"""Lines in which no names follow upon a row of numbers: what a logger counts above the table is no row of it."""
+_CLEAR = 2.0
+"""Closeness from which a cell names time."""
+_TIME = "t"
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands above the rows of numbers; lines are counted from 0.
+
+    Attributes
+    ----------
+    names, units
+        Lines of the names and of the units, None where there are none.
+    first_row
+        First line of the rows of numbers.
+    """
+
+    names: int | None
+    units: int | None
+    first_row: int
+
+    @property
+    def n_passed(self) -> int:
+        """Number of lines above that are neither names nor units."""
+        return self.first_row - (self.names is not None) - (self.units is not None)
+
+
+class UnclearHeadError(ValueError):
+    """Nobody can say which line holds the names; the text says what stands there and what to write."""
+
+
+@dataclass(frozen=True)
+class RowShape:
+    """What rows of numbers look like.
+
+    Attributes
+    ----------
+    dialect
+        How cells and numbers are written.
+    width
+        Number of cells.
+    numeric
+        Columns that hold numbers.
+    """
+
+    dialect: Dialect
+    width: int
+    numeric: tuple[int, ...]
+
+    @classmethod
+    def of(cls, dialect: Dialect, lines: Sequence[str]) -> RowShape:
+        """Return the shape of the last lines of a text."""
+        rows = [dialect.cells(line) for line in lines[-LAST_LINES:]]
+        width = Counter(len(row) for row in rows).most_common(1)[0][0]
+        rows = [row for row in rows if len(row) == width]
+        numeric = [
+            j for j in range(width) if 2 * sum(not dialect.is_text(row[j]) for row in rows) > len(rows)
+        ]
+        return cls(dialect, width, tuple(numeric))
+
+    def is_row(self, cells: Sequence[str]) -> bool:
+        """Return True for a sound row of numbers."""
+        return len(cells) == self.width and not any(self.dialect.is_text(cells[j]) for j in self.numeric)
+
+    def is_broken_row(self, cells: Sequence[str]) -> bool:
+        """Return True for a row that has lost a cell or a number and is one all the same."""
+        filled = [cell for cell in cells if cell]
+        return 2 * sum(not self.dialect.is_text(cell) for cell in filled) > len(filled)
+
+    def is_words(self, cells: Sequence[str]) -> bool:
+        """Return True for a row of words under which numbers may stand."""
+        return len(cells) == self.width and any(cells) and looks_like_names(self.dialect, cells)
+
+    def first_rows(self, lines: Sequence[str]) -> list[int]:
+        """Return where rows of numbers begin: once in a sound text, again below words among them; empty where there are none."""
+        found: list[int] = []
+        in_rows = False
+        for i, line in enumerate(lines[:MOST_HEAD]):
+            cells = self.dialect.cells(line)
+            if self.is_row(cells):
+                if not in_rows:
+                    found.append(i)
+                in_rows = True
+                if i - found[-1] >= _NAMES_BELOW:
+                    break
+            elif self.is_words(cells):
+                in_rows = False
+        return [self._with_broken_rows(lines, i) for i in found] if self.numeric else []
+
+    def _with_broken_rows(self, lines: Sequence[str], first: int) -> int:
+        while first > 0 and self.is_broken_row(self.dialect.cells(lines[first - 1])):
+            first -= 1
+        return first
+
+
+def find_head(
+    dialect: Dialect,
+    lines: Sequence[str],
+    wanted: Collection[str],
+    header: bool | int | None,
+    number_of: Callable[[int], int],
+) -> Head:
+    """Return what stands above the rows of numbers of a text.
+
+    Parameters
+    ----------
+    dialect
+        How cells and numbers are written.
+    lines
+        Lines that are neither blank nor comments, at least one.
+    wanted
+        Names that are asked for: the line that holds them holds the names.
+    header
+        Whether there are names, or in which line they stand, counted from 1 in the file; None where nobody said so.
+    number_of
+        Number in the file of a line.
+
+    Raises
+    ------
+    UnclearHeadError
+        If nobody can say which line holds the names.
+    """
+    if isinstance(header, int) and not isinstance(header, bool):
+        return _told(dialect, lines, header, number_of)
+    shape = RowShape.of(dialect, lines)
+    rows = shape.first_rows(lines)
+    if not rows:
+        # Nothing below is a row of numbers; what is wrong there is told once the names are known.
+        named = looks_like_names(dialect, dialect.cells(lines[0])) if header is None else header
+        return _below(dialect, lines, 0) if named else Head(None, None, 0)
+    first = rows[0] if len(rows) == 1 else _first_of(shape, lines, rows, wanted, number_of)
+    if header is False:
+        return Head(None, None, first)
+    block = _words_above(shape, lines, first)
+    if not block:
+        return _without_words(shape, lines, first, header, number_of)
+    names = _names_in(dialect, lines, block, wanted)
+    if first - names > 2:
+        raise UnclearHeadError(
+            f"lines {number_of(names)} to {number_of(first - 1)} all stand above the first row of numbers; one line may hold "
+            f"names and the next one units. If the names stand in line {number_of(names)}, delete the lines between units and "
+            "numbers, else write header = LINE."
+        )
+    return Head(names, names + 1 if names + 1 < first else None, first)
+
+
+def _told(dialect: Dialect, lines: Sequence[str], header: int, number_of: Callable[[int], int]) -> Head:
+    numbers = [number_of(i) for i in range(min(len(lines), MOST_HEAD))]
+    if header not in numbers:
+        raise UnclearHeadError(f"header = {header}: that line is blank, a comment, or not there.")
+    return _below(dialect, lines, numbers.index(header))
+
+
+def _below(dialect: Dialect, lines: Sequence[str], names: int) -> Head:
+    """Return the head whose names are known; a line of nothing but text below them holds units."""
+    units = names + 1
+    if units < len(lines):
+        cells = dialect.cells(lines[units])
+        if any(cells) and all(dialect.is_text(cell) for cell in cells):
+            return Head(names, units, units + 1)
+    return Head(names, None, units)
+
+
+def _without_words(
+    shape: RowShape, lines: Sequence[str], first: int, header: bool | None, number_of: Callable[[int], int]
+) -> Head:
+    """Return the head of numbers above which no names stand."""
+    if header:
+        return _below(shape.dialect, lines, max(first - 1, 0))
+    if first == 0 or number_of(first) > number_of(first - 1) + 1:
+        return Head(None, None, first)
+    above = shape.dialect.cells(lines[first - 1])
+    if len(above) == len(shape.dialect.cells(lines[first])) and looks_like_names(shape.dialect, above):
+        # They fit the first rows; that others have another width is told by the line where that begins.
+        return Head(first - 1, None, first)
+    count = len(above)
+    raise UnclearHeadError(
+        f"line {number_of(first - 1)} has {count} column{'s' if count > 1 else ''}, the rows of numbers below it have "
+        f"{shape.width}, so it holds no names for them. Give each column a name there, or write header = false to count the "
+        "columns."
+    )
+
+
+def _words_above(shape: RowShape, lines: Sequence[str], first: int) -> range:
+    """Return the lines of words right above a row."""
+    block = first
+    while block > 0 and shape.is_words(shape.dialect.cells(lines[block - 1])):
+        block -= 1
+    return range(block, first)
+
+
+def _first_of(
+    shape: RowShape,
+    lines: Sequence[str],
+    rows: Sequence[int],
+    wanted: Collection[str],
+    number_of: Callable[[int], int],
+) -> int:
+    """Return where the rows begin that have the names above them which are asked for, or a time."""
+    words = {i: [shape.dialect.cells(lines[j]) for j in _words_above(shape, lines, i)] for i in rows}
+    held = [i for i in rows if any(set(cells) & set(wanted) for cells in words[i])]
+    timed = [i for i in rows if any(_names_time(cell) for cells in words[i] for cell in cells)]
+    for found in (held, timed):
+        if len(found) == 1:
+            return found[0]
+    places = " and ".join(str(number_of(i)) for i in rows[:3])
+    raise UnclearHeadError(
+        f"rows of numbers begin in lines {places}, with words between them. Cut the record where the logger began anew; if what "
+        "stands above is no part of it, write header = LINE with the line that holds the names."
+    )
+
+
+def _names_time(cell: str) -> bool:
+    return closeness(cell, _TIME) >= _CLEAR
+
+
+def _names_in(dialect: Dialect, lines: Sequence[str], block: range, wanted: Collection[str]) -> int:
+    """Return which of several lines of words holds the names: what is asked for, a time, or what has units below it."""
+    rows = {i: dialect.cells(lines[i]) for i in block}
+    held = {i: len(set(cells) & set(wanted)) for i, cells in rows.items()}
+    most = [i for i in block if held[i] == max(held.values())]
+    if max(held.values()) > 0 and len(most) == 1:
+        return most[0]
+    timed = [i for i in block if any(map(_names_time, rows[i]))]
+    if len(timed) == 1:
+        return timed[0]
+    last = block[-1]
+    return last - 1 if len(block) > 1 and _are_units(rows[last]) else last
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    bare = [cell.strip("[]() ") for cell in cells if cell not in ("", "-", "1")]
+    return 2 * sum(is_unit(cell) for cell in bare) >= len(bare)
