@@ -3,22 +3,44 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import get_args
 
 import pytest
 
 from rigsight.blind.outside import LIKE_THE_CATALOGUE, OUTSIDE, UNLIKE_THE_CATALOGUE
-from rigsight.blind.subjects import NOISES, TIERS, hidden_effects, n_trials, subject_of
-from rigsight.effects import CATALOGUE
+from rigsight.blind.subjects import (
+    ELSEWHERE,
+    NOISES,
+    OF_JOINTS,
+    TIERS,
+    CatalogueDesign,
+    hidden_effects,
+    n_trials,
+    subject_of,
+)
+from rigsight.diagnose import candidates_on
+from rigsight.effects import CATALOGUE, kind_of
 from rigsight.errors import InputError
+from rigsight.rigs import RIGS
 
 
-@pytest.mark.parametrize("design", ["small", "standard"])
-def test_none_is_missed(design: str) -> None:
+@pytest.mark.parametrize("design", get_args(CatalogueDesign))
+def test_none_is_missed(design: CatalogueDesign) -> None:
     subjects = [subject_of(design, 3, trial) for trial in range(n_trials(design))]
     cells = Counter((s.effects, s.tier, s.noise) for s in subjects if s.kind == "single")
-    assert cells == Counter(((e.name,), tier, noise) for e in CATALOGUE for tier in TIERS for noise in NOISES)
+    drawn = {name for names, _, _ in cells for name in names}
+    known = {e.name for e in CATALOGUE} - ELSEWHERE
+    assert drawn == (OF_JOINTS if design == "joints" else known - OF_JOINTS)
+    assert cells == Counter(((name,), tier, noise) for name in drawn for tier in TIERS for noise in NOISES)
     assert {s.effects[0] for s in subjects if s.kind == "outside"} == {e.name for e in OUTSIDE}
-    assert {"none", "parameters", "pair"} <= {s.kind for s in subjects}
+    assert {"none", "parameters"} <= {s.kind for s in subjects}
+    assert ("pair" in {s.kind for s in subjects}) == (design != "joints")
+
+
+def test_what_no_axis_and_no_gear_tells_apart_is_drawn_on_larger_rigs() -> None:
+    train = {kind_of(effect.name) for effect in candidates_on(RIGS["drive_train"], CATALOGUE)}
+    assert OF_JOINTS.isdisjoint(ELSEWHERE)
+    assert ELSEWHERE & {effect.name for effect in CATALOGUE} <= train
 
 
 def test_another_pass_and_another_seed_are_other_orders_of_the_same_cells() -> None:

@@ -159,3 +159,13 @@ def test_with_one_output_a_late_drive_is_named_before_a_late_sensor(scored, whit
     assert found.order[0] is late_drive
     assert found.tied == (late_sensor,)
     assert found.probabilities[0] == pytest.approx(0.75, abs=0.02)
+
+
+def test_a_mean_force_of_friction_stands_before_a_constant_force_that_nobody_knew(scored, white) -> None:
+    """Both are the same equation; that the second competes at all says that even friction needs such a force."""
+    beside_a_force = scored(("coulomb_friction",), white, n_free=5)
+    of_its_own = scored(("directional_friction",), white, n_free=5)
+    ranking = ranked(beside_a_force, of_its_own)
+    assert ranking.order[0] is of_its_own
+    assert ranking.tied == (beside_a_force,)
+    assert ranking.probabilities[0] == pytest.approx(0.75, abs=0.01)

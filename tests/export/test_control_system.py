@@ -5,11 +5,15 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
+import sympy as sp
 
-from rigsight.effects import kind_of
+from rigsight.effects import CATALOGUE, kind_of
 from rigsight.export import export_model
 
-REFUSED = {"coulomb_friction", "stribeck_friction", "input_delay", "sensor_delay"}
+REFUSED = {e.name for e in CATALOGUE if e.torque is not None and e.torque.has(sp.sign)} | {
+    "input_delay",
+    "sensor_delay",
+}
 SMOOTH, KINKED = 1e-6, 1e-4
 """A solver that knows no events crosses kinks with the error of its step."""
 

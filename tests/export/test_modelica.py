@@ -6,14 +6,15 @@ import re
 
 import numpy as np
 import pytest
+import sympy as sp
 
-from rigsight.effects import kind_of
+from rigsight.effects import CATALOGUE, kind_of
 from rigsight.export import export_model
 from rigsight.records import Record
 from rigsight.simulate import simulate
 
 DT = 1e-3
-REFUSED = {"coulomb_friction", "stribeck_friction"}
+REFUSED = {e.name for e in CATALOGUE if e.torque is not None and e.torque.has(sp.sign)}
 
 
 def text_of(case) -> str:

@@ -10,7 +10,7 @@ from rigsight.effects import CATALOGUE
 from rigsight.errors import InputError
 from rigsight.export import TARGETS, export_model
 
-STICKS = {"coulomb_friction", "stribeck_friction"}
+STICKS = {"coulomb_friction", "stribeck_friction", "directional_friction", "load_dependent_friction"}
 LATE = {"input_delay", "sensor_delay"}
 REFUSED = {"control": STICKS | LATE, "modelica": STICKS}
 

@@ -12,7 +12,7 @@ import sympy as sp
 
 from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import CATALOGUE, Effect, effect_named, placed
-from rigsight.effects.symbols import v, x
+from rigsight.effects.symbols import load, v, x
 from rigsight.report.equations import equation_groups, equations_of, known_effects
 from rigsight.report.wording import effect_label, sentence_case
 from rigsight.rigs import RIGS
@@ -47,7 +47,8 @@ def test_every_effect_has_equations_on_every_rig_that_offers_it(diagnosis: Diagn
             _, (title, equations) = found.items()
             assert title == sentence_case(effect_label(effect.name))
             own_rates = {state.rate for state in effect.states} & {state.symbol for state in effect.states}
-            assert len(equations) == 1 + len(effect.states) - len(own_rates), effect.name
+            shown = 1 + len(effect.states) - len(own_rates) + effect.reads(load)
+            assert len(equations) == shown, effect.name
 
 
 def test_a_state_that_is_the_rate_of_another_is_shown_with_a_dot(diagnosis: Diagnosis) -> None:

@@ -10,8 +10,8 @@ from rigsight.blind.any_rig_trial import draw_placed_trial
 from rigsight.blind.draw import Trial
 from rigsight.errors import check_option
 
-Design = Literal["small", "standard", "rigs"]
-"""Two with the whole catalogue on the running gear or an axis, one with effects at all places of every built-in rig."""
+Design = Literal["small", "standard", "joints", "rigs"]
+"""Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every built-in rig."""
 
 
 def n_trials(design: Design) -> int:

@@ -29,9 +29,10 @@ def blind(
         ),
     ] = None,
     design: Annotated[
-        Literal["small", "standard", "rigs"],
+        Literal["small", "standard", "joints", "rigs"],
         typer.Option(
-            help="Which list of cells is drawn from; rigs has every built-in rig with effects at all its places."
+            help="Which list of cells is drawn from; joints has the effects of servo and robot joints, rigs every built-in rig "
+            "with effects at all its places."
         ),
     ] = "standard",
     seed: Seed = 0,

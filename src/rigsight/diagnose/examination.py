@@ -328,6 +328,7 @@ def workbench_of(
         noise=noise,
         held=_held(task),
         start=start,
+        given=task.given,
         modelled=task.modelled,
         memory=memory,
         threads=threads,
@@ -407,7 +408,8 @@ def _with_offset_rivals(
         return ranking
     rivals = []
     for effect in effects:
-        if effect.signature.even_harmonics and bench.rig.offers(effect) and effect not in best.effects:
+        is_even = effect.signature.even_harmonics and not effect.holds_constant_force
+        if is_even and bench.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
     return rank([*ranking.order, *rivals], noise, rng, gap)

@@ -91,7 +91,10 @@ def rank(
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])
     prior = _PRIOR_PER_EFFECT ** np.array(
-        [len(m.effects) + _likened(m, usable) + _late_drive_in_disguise(m) for m in usable]
+        [
+            len(m.effects) + _likened(m, usable) + _late_drive_in_disguise(m) + _beside_a_new_force(m, usable)
+            for m in usable
+        ]
     )
     # In each resample the models with the fewest numbers within the tolerance of the best share the win: a little of it by their
     # prior odds alone, most goes to those with the fewest effects of them that are lowest.
@@ -134,6 +137,22 @@ def _likened(model: Scored, others: Sequence[Scored]) -> bool:
         other.n_free == model.n_free
         and len(other.effects) == len(model.effects)
         and any(set(effect.parents) & (set(other.names) - set(model.names)) for effect in model.effects)
+        and not _beside_a_new_force(other, [model])
+        for other in others
+    )
+
+
+def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
+    """Return True if a model stands beside a constant force that nobody knew of, where another explains that force too.
+
+    Those whose mean force nothing asks for are no rivals, see `with_a_mean_that_is_needed`.
+    """
+    return any(
+        other.n_free == model.n_free
+        and len(other.effects) == len(model.effects)
+        and any(
+            effect.holds_constant_force and set(effect.parents) & set(model.names) for effect in other.effects
+        )
         for other in others
     )
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.candidates.constant_force import known_constant_forces
 from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.windows import cut
 from rigsight.effects import Effect, Place
@@ -86,6 +87,8 @@ class Workbench:
         Noise floor of each output.
     held
         Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
+    given
+        Numbers of the rig that the simulation in question came with.
     start
         Values before any fit, of the given simulation or a regression: fits without the effect may bend them beyond use.
     modelled
@@ -104,6 +107,7 @@ class Workbench:
     noise: Mapping[str, float]
     held: frozenset[str]
     start: Mapping[str, float] = field(default_factory=dict)
+    given: Mapping[str, float] = field(default_factory=dict)
     modelled: tuple[Effect, ...] = ()
     memory: FitMemory | None = None
     threads: IdleThreads = field(default_factory=IdleThreads)
@@ -156,7 +160,19 @@ class Workbench:
                 name = structure.parameter_name(effect, parameter.name)
                 if parameter.fitted and name not in fixed:
                     names.add(name)
+        names -= self.constant_forces_beside(structure.effects).keys()
         return [name for name in structure.names if name in names]
+
+    def constant_forces_beside(self, effects: Iterable[Effect]) -> dict[str, float]:
+        """Return the values at which constant forces are held beside effects with a mean force of their own."""
+        held: dict[str, float] = {}
+        for effect in effects:
+            held |= self._known_constant_forces(effect) or {}
+        return held
+
+    def _known_constant_forces(self, effect: Effect) -> dict[str, float] | None:
+        has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self._has_spring
+        return known_constant_forces(self.rig, effect, self.given, has_spring)
 
     def releasable_parameters(self, structure: Structure) -> list[str]:
         """Return what a fit may move once it has settled: a constant force that a bent spring tells from its rest position.
@@ -180,9 +196,14 @@ class Workbench:
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return the effects that make sense on this rig and in these records, each at each place.
 
-        Without a spring none that changes it, where an input rests none at a drive that is told nothing else.
+        Without a spring that is none that changes it; where an input rests none at a drive that is told nothing else; beside a
+        constant force that nobody knows none with a mean force.
         """
-        offered = [e for e in candidates_on(self.rig, effects, self.modelled) if self._can_show(e)]
+        offered = [
+            effect
+            for effect in candidates_on(self.rig, effects, self.modelled)
+            if self._can_show(effect) and self._known_constant_forces(effect) is not None
+        ]
         if not self.rig.has_one_motion:
             return offered
         return [

@@ -10,6 +10,7 @@ from rigsight.effects.conicity_variation import CONICITY_VARIATION
 from rigsight.effects.coulomb_friction import COULOMB_FRICTION
 from rigsight.effects.creep_saturation import CREEP_SATURATION
 from rigsight.effects.cubic_stiffness import CUBIC_STIFFNESS
+from rigsight.effects.directional_friction import DIRECTIONAL_FRICTION
 from rigsight.effects.effect import Effect
 from rigsight.effects.end_stop import END_STOP
 from rigsight.effects.flexible_mode import FLEXIBLE_MODE
@@ -19,6 +20,7 @@ from rigsight.effects.input_dead_zone import INPUT_DEAD_ZONE
 from rigsight.effects.input_delay import INPUT_DELAY
 from rigsight.effects.input_saturation import INPUT_SATURATION
 from rigsight.effects.iwan_hysteresis import IWAN_HYSTERESIS
+from rigsight.effects.load_dependent_friction import LOAD_DEPENDENT_FRICTION
 from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
 from rigsight.effects.placed import AT, placed
 from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPING
@@ -33,6 +35,8 @@ CATALOGUE: tuple[Effect, ...] = (
     IWAN_HYSTERESIS,
     COULOMB_FRICTION,
     STRIBECK_FRICTION,
+    DIRECTIONAL_FRICTION,
+    LOAD_DEPENDENT_FRICTION,
     QUADRATIC_DAMPING,
     POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,

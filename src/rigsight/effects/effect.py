@@ -159,6 +159,9 @@ class Effect:
         memory, because records determine those apart.
     pulsation
         Parameter that is the angular frequency of what pulsates by itself; a fit starts at the line that the records show.
+    wave_number
+        Parameter that is the wave number of what comes back with the position; a fit starts at the line over the position that
+        the records show.
     searched_as
         Parameters that a fit moves as sum and difference.
     starts
@@ -189,6 +192,7 @@ class Effect:
     states: tuple[State, ...] = ()
     elastic_share: str | None = None
     pulsation: str | None = None
+    wave_number: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()
     starts: tuple[Start, ...] = ()
     special_cases: dict[str, float] = field(default_factory=dict)
@@ -202,13 +206,29 @@ class Effect:
         return tuple(dict.fromkeys(parent for parent in others if parent is not None))
 
     @property
+    def holds_constant_force(self) -> bool:
+        """True for a force with a mean that goes with the direction: no record tells the mean from a constant force."""
+        lopsided = self.torque is not None and self.signature.even_harmonics
+        return lopsided and not (self.reads(symbols.x) or self.reads(symbols.position))
+
+    @property
     def reads_inertia(self) -> bool:
         """True if its equations hold the inertia that moves with its joint; that of a large arm is a long expression."""
+        return self.reads(symbols.m)
+
+    def reads(self, signal: sp.Symbol) -> bool:
+        """Return True if its equations hold a signal.
+
+        Parameters
+        ----------
+        signal
+            One of `rigsight.effects.symbols`.
+        """
         equations = (
             self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.measured_late,
             *(part for state in self.states for part in (state.rate, state.limit)),
         )  # fmt: skip
-        return any(part is not None and symbols.m in part.free_symbols for part in equations)
+        return any(part is not None and signal in part.free_symbols for part in equations)
 
     def null_values(self) -> dict[str, float]:
         """Return the parameter values at which the effect vanishes."""

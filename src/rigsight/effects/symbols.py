@@ -13,7 +13,13 @@ import sympy as sp
 x = sp.Symbol("x", real=True)
 """Displacement from the rest position (psi - psi_off on the running gear)."""
 v = sp.Symbol("v", real=True)
-"""Velocity, the time derivative of `x`."""
+"""Velocity, the time derivative of `x`; at a drive that of the motion along which it acts."""
+position = sp.Symbol("position", real=True)
+"""Where a joint is, from the origin of its own motion; `x` is that less the rest position of its spring."""
+acceleration = sp.Symbol("acceleration", real=True)
+"""Time derivative of `v`, of a prescribed motion."""
+load = sp.Symbol("load", real=True)
+"""What a joint carries: the force of the drives along it less what its spring, weight and neighbors push along it."""
 u = sp.Symbol("u", real=True)
 """Input as it arrives at the effect (after the actuator effects in front of it)."""
 t = sp.Symbol("t", real=True)

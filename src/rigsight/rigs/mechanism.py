@@ -266,6 +266,45 @@ class Mechanism:
         """Return the time derivative of an expression of the coordinates."""
         return sum((sp.diff(expression, c.symbol) * c.rate for c in self.coordinates), start=sp.Integer(0))
 
+    def prescribed_rate(self, expression: sp.Expr) -> sp.Expr:
+        """Return the time derivative of an expression of prescribed coordinates and their rates."""
+        along = sum(
+            (sp.diff(expression, c.rate) * acceleration(c) for c in self.prescribed), start=sp.Integer(0)
+        )
+        return self.rate(expression) + along
+
+    def carried_by(self, joint: Joint) -> sp.Expr:
+        """Return what drives, weight and other joints' springs put on a joint: what drives push along it less what the others do.
+
+        Of a joint along one coordinate that is all that acts along this coordinate while nothing moves. A joint between several
+        coordinates carries the drives that push along its own motion; how weight is shared between such joints no equation says.
+
+        Parameters
+        ----------
+        joint
+            One of `joints`; its own spring and force are left out.
+        """
+        along = [c for c in self.coordinates if sp.diff(joint.motion, c.symbol) != 0]
+        at_rest = {c.rate: sp.Integer(0) for c in self.coordinates}
+        if len(along) == 1:
+            (coordinate,) = along
+            slope = sp.diff(joint.motion, coordinate.symbol)
+            drives = [sp.diff(drive.along, coordinate.symbol) * drive.force for drive in self.drives]
+            springs = [
+                sp.diff(other.motion, coordinate.symbol)
+                * (other.stiffness * (other.motion - other.rest) + other.force.xreplace(at_rest))
+                for other in self.joints
+                if other is not joint
+            ]
+            return sp.Add(*drives, sp.diff(self.potential, coordinate.symbol), *springs) / slope
+        pushing = []
+        for drive in self.drives:
+            ratios = {sp.diff(drive.along, c.symbol) / sp.diff(joint.motion, c.symbol) for c in along}
+            others = any(sp.diff(drive.along, c.symbol) != 0 for c in self.coordinates if c not in along)
+            if len(ratios) == 1 and not others:
+                pushing.append(ratios.pop() * drive.force)
+        return sp.Add(*pushing)
+
     def moves_inertia(self, expression: sp.Expr) -> bool:
         """Return True if a force along an expression of the coordinates moves a degree of freedom."""
         return any(sp.diff(expression, c.symbol) != 0 for c in self.free)

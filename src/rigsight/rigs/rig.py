@@ -306,6 +306,39 @@ class Rig:
         """
         return self.mechanism.joints[0].name if place is Place.DYNAMICS else place.value
 
+    def constant_forces_at(self, joint: Joint) -> frozenset[str]:
+        """Return the names of the parameters that do nothing but push a joint with a constant force.
+
+        The rest position of its spring is one of them, unless something else goes by it.
+        """
+        mechanism = self.mechanism
+        moving = {c.symbol for c in mechanism.coordinates} | {c.rate for c in mechanism.coordinates}
+        moving |= {state.symbol for state in mechanism.states} | set(mechanism.signals)
+        own = {p.name for p in self.parameters}
+        pushing = {
+            s.name
+            for s in joint.force.free_symbols
+            if s.name in own and not sp.diff(joint.force, s).free_symbols & moving
+        }
+        resting = {s.name for s in joint.rest.free_symbols if s.name in own and joint.stiffness != 0}
+        return frozenset((pushing | resting) - self._read_elsewhere(joint))
+
+    def _read_elsewhere(self, joint: Joint) -> set[str]:
+        """Return the names of what the equations hold beside the force and the rest position of a joint."""
+        mechanism = self.mechanism
+        parts = [
+            mechanism.kinetic,
+            mechanism.potential,
+            *mechanism.signals.values(),
+            *mechanism.initial.values(),
+        ]
+        parts += [part for drive in mechanism.drives for part in (drive.signal, drive.force, drive.along)]
+        parts += [sensor.reads for sensor in mechanism.sensors] + [state.rate for state in mechanism.states]
+        for other in mechanism.joints:
+            parts += [other.motion, other.stiffness, other.damping, other.inertia or sp.S.Zero]
+            parts += [] if other is joint else [other.force, other.rest]
+        return {symbol.name for part in parts for symbol in part.free_symbols}
+
     def places(self, kind: Place) -> tuple[str, ...]:
         """Return the names of the joints, drives, sensors or states at which effects of a kind can act.
 

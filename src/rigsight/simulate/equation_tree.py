@@ -21,6 +21,7 @@ class Kind(StrEnum):
     DEFLECTION_RATE = "deflection_rate"
     SPRING = "spring_torque"
     TORQUE = "torque"
+    LOAD = "load"
     LATERAL = "lateral_rate"
     READING = "reading"
 

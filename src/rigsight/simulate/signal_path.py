@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from rigsight.effects import Effect, Place, placed_dimension
+from rigsight.effects import Effect, Energy, Place, placed_dimension
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Drive, Joint, Rig, Sensor, acceleration, force_symbol, reading_symbol
 from rigsight.simulate.equation_tree import (
@@ -229,11 +229,13 @@ class _Path:
         effects = self._at(drive.name, Place.ACTUATOR)
         for effect in effects:
             if effect.delay is not None:
-                delay = self._binder.effect(effect, effect.delay, self._of_motion())
+                delay = self._binder.effect(effect, effect.delay, {})
                 source = self._define(Kind.DRIVE, effect, late(source, delay))
         for effect in effects:
             if effect.drive is not None:
-                signals = {**self._of_motion(), "u": source}
+                # The speed is that of the drive's own shaft, wherever the joints are.
+                speed = self._bound(self._rig.mechanism.rate(drive.along))
+                signals = {**self._of_motion(), "u": source, "v": speed}
                 lags += self._states(effect, signals)
                 source = self._define(Kind.DRIVE, effect, self._binder.effect(effect, effect.drive, signals))
         self._values[sp.Symbol(drive.name, real=True)] = source
@@ -244,13 +246,23 @@ class _Path:
         signals = self._signals(joint)
         effects = self._at(joint.name, Place.DYNAMICS, Place.DISTURBANCE)
         spring = self._spring(effects, signals, memories)
-        torques = []
-        for effect in effects:
-            if effect.torque is not None:
-                torques.append(
-                    self._define(Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals))
-                )
-                memories += self._states(effect, signals)
+        static = self._bound(
+            joint.force.xreplace({c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates})
+        )
+        carried, torques = [spring, static], []
+        # What weighs on a joint is known before what goes with its load.
+        for effect in sorted(effects, key=lambda effect: effect.reads(canonical.load)):
+            if effect.torque is None:
+                continue
+            if effect.reads(canonical.load):
+                # The effects of other joints' springs are left out: two joints may each lean on the other.
+                load = sp.Add(self._bound(self._rig.mechanism.carried_by(joint)), *carried)
+                signals = {**signals, "load": self._define(Kind.LOAD, effect, load)}
+            torque = self._define(Kind.TORQUE, effect, self._binder.effect(effect, effect.torque, signals))
+            if effect.energy is Energy.CONSERVATIVE:
+                carried.append(torque)
+            torques.append(torque)
+            memories += self._states(effect, signals)
         damping, force = self._bound(joint.damping) * signals["v"], self._bound(joint.force)
         return tuple(term for term in (damping, spring, *torques, force) if term != 0)
 
@@ -258,7 +270,15 @@ class _Path:
         """Return what effects read of the motion of a joint."""
         mechanism = self._rig.mechanism
         x = self._bound(joint.motion) - self._bound(joint.rest)
-        signals = {"x": x, "v": self._bound(mechanism.rate(joint.motion)), "k": self._bound(joint.stiffness)}
+        rate = mechanism.rate(joint.motion)
+        signals = {
+            "x": x,
+            "v": self._bound(rate),
+            "k": self._bound(joint.stiffness),
+            "position": self._bound(joint.motion),
+        }
+        if not any(sp.diff(joint.motion, c.symbol) != 0 for c in mechanism.free):
+            signals["acceleration"] = self._bound(mechanism.prescribed_rate(rate))
         if not any(effect.reads_inertia for effect in self._effects):
             return signals
         inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)

@@ -44,6 +44,8 @@ _CONTENDER = 1.5
 """A model whose held-out error is within this factor of the best is fitted to full precision."""
 _WORTH_RELEASING = 1.05
 """Excess over the floor above which a fixed exponent is released."""
+_SIGNIFICANT = 3.0
+"""Standard errors by which a constant force must differ from what is known of it to be one that is needed: one chance in 370."""
 _RELEASE_GAIN = 1.02
 """Factor by which a released exponent must lower the held-out error to be kept."""
 
@@ -90,7 +92,31 @@ def fit_candidates(
         return scored
 
     models = list(bench.threads.side_by_side(one, looks))
-    return refine(bench, models)
+    return with_a_mean_that_is_needed(bench, refine(bench, models))
+
+
+def with_a_mean_that_is_needed(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
+    """Return single effects without those whose mean force nothing asks for.
+
+    An effect with a mean force, and a plainer one beside a constant force, are the same equation. Where the plainer one leaves
+    the constant forces where they are known to be, it is the whole of it.
+    """
+    alone = {model.names: model.fit for model in models}
+
+    def is_needed(model: Scored) -> bool:
+        held = bench.constant_forces_beside(model.effects)
+        plainer = [alone[name,] for name in model.effects[0].parents if (name,) in alone]
+        return not held or not plainer or any(_moves(fit, held) for fit in plainer)
+
+    return [model for model in models if is_needed(model)]
+
+
+def _moves(fit: FitResult, known: Mapping[str, float]) -> bool:
+    return any(
+        abs(fit.values[name] - value) > _SIGNIFICANT * fit.standard_errors[name]
+        for name, value in known.items()
+        if name in fit.free
+    )
 
 
 def _looks(

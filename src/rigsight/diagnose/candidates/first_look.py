@@ -109,12 +109,13 @@ def look_at(
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
+    known = bench.constant_forces_beside(structure.effects)
+    starts = [{**start, **known} for start in starts]
     nearest = _looked(bench, structure, free, starts, substeps)
     if not np.isfinite(nearest[0].cost) and bench.start:
         unbent = replace(base, values={**base.values, **bench.start})
-        nearest = _looked(
-            bench, structure, free, list(start_values(bench, structure, effects[-1], unbent, {})), substeps
-        )
+        starts = [{**start, **known} for start in start_values(bench, structure, effects[-1], unbent, {})]
+        nearest = _looked(bench, structure, free, starts, substeps)
     return Look(effects, structure, free, nearest, mean_square(nearest[0]))
 
 

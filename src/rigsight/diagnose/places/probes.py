@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
 import sympy as sp
 
 from rigsight.effects import Effect, Place, kind_of
+from rigsight.effects import symbols as canonical
 from rigsight.parameters import Parameter
 from rigsight.rigs import Drive, Joint, Rig, Sensor, Signal, force_symbol
 from rigsight.rigs.mechanism import Coordinate, Mechanism
@@ -15,7 +17,8 @@ from rigsight.simulate import Structure, compose
 
 STIFFNESS = "k"
 _JOINT, _DRIVE, _SENT, _SHOWN = "joint", "drive", "sent", "shown"
-_PUSH, _MOTION = "push at ", "motion of "
+_CARRIED, _MOVED = "carried", "moved"
+_PUSH, _MOTION, _LOAD, _ALONG = "push at ", "motion of ", "load of ", "way of "
 PUSH_SIZE = "push_size"
 
 
@@ -24,38 +27,44 @@ def _real(name: str) -> sp.Symbol:
 
 
 @cache
-def _joint_alone() -> Rig:
-    """Return a spring whose motion is prescribed; effects of a joint act on it."""
-    x = Coordinate(_real("x"), _real("d(x)"), "1", prescribed_by="moved")
+def _joint_alone(with_load: bool) -> Rig:
+    """Return a spring whose motion is prescribed; effects of a joint act on it, with a load beside that of the spring."""
+    x = Coordinate(_real("x"), _real("d(x)"), "1", prescribed_by=_MOVED)
+    inputs = (_MOVED, _CARRIED) if with_load else (_MOVED,)
+    carrier = Drive("carrier", _real(_CARRIED), _real("carrier"), x.symbol)
     mechanism = Mechanism(
-        inputs=("moved",),
+        inputs=inputs,
         coordinates=(x,),
         kinetic=sp.S.Zero,
         potential=sp.S.Zero,
         joints=(Joint(_JOINT, x.symbol, stiffness=_real(STIFFNESS), inertia=sp.S.One),),
-        drives=(),
+        drives=(carrier,) if with_load else (),
         sensors=(Sensor("force", force_symbol(_JOINT), "1"),),
-        order=("force",),
+        order=("carrier", "force") if with_load else ("force",),
     )
     stiffness = Parameter(STIFFNESS, "stiffness")
-    return Rig("joint alone", "", (Signal("moved", "1", ""),), (), (stiffness,), mechanism)
+    signals = tuple(Signal(name, "1", "") for name in inputs)
+    return Rig("joint alone", "", signals, (), (stiffness,), mechanism)
 
 
 @cache
-def _signal_alone() -> Rig:
-    """Return a drive and a sensor that pass on a signal; effects of either act on it."""
-    z, signal = Coordinate(_real("z"), _real("d(z)"), "1"), _real("signal")
+def _signal_alone(with_speed: bool) -> Rig:
+    """Return a drive and a sensor that pass on a signal; effects of either act on it, the drive's along a known motion."""
+    free, signal = Coordinate(_real("z"), _real("d(z)"), "1"), _real("signal")
+    way = Coordinate(_real("x"), _real("d(x)"), "1", prescribed_by=_MOVED)
+    inputs = ("signal", _MOVED) if with_speed else ("signal",)
+    along = way.symbol if with_speed else free.symbol
     mechanism = Mechanism(
-        inputs=("signal",),
-        coordinates=(z,),
-        kinetic=z.rate**2 / 2,
+        inputs=inputs,
+        coordinates=(free, way) if with_speed else (free,),
+        kinetic=free.rate**2 / 2,
         potential=sp.S.Zero,
-        joints=(Joint(_JOINT, z.symbol, damping=sp.S.One),),
-        drives=(Drive(_DRIVE, signal, _real(_DRIVE), z.symbol),),
+        joints=(Joint(_JOINT, free.symbol, damping=sp.S.One),),
+        drives=(Drive(_DRIVE, signal, _real(_DRIVE), along),),
         sensors=(Sensor(_SENT, _real(_DRIVE), "1"), Sensor(_SHOWN, signal, "1")),
         order=(_DRIVE, _SENT, _SHOWN),
     )
-    return Rig("signal alone", "", (Signal("signal", "1", ""),), (), (), mechanism)
+    return Rig("signal alone", "", tuple(Signal(name, "1", "") for name in inputs), (), (), mechanism)
 
 
 def alone(effect: Effect) -> tuple[Structure, int]:
@@ -79,17 +88,18 @@ _known: dict[str, tuple[tuple[object, ...], tuple[Structure, int]]] = {}
 
 def _composed(effect: Effect) -> tuple[Structure, int]:
     if effect.place is Place.ACTUATOR:
-        return compose(_signal_alone(), (replace(effect, at=_DRIVE),)), 0
+        return compose(_signal_alone(effect.reads(canonical.v)), (replace(effect, at=_DRIVE),)), 0
     if effect.place is Place.SENSOR:
-        return compose(_signal_alone(), (replace(effect, at=_SHOWN),)), 1
-    return compose(_joint_alone(), (replace(effect, at=_JOINT),)), 0
+        return compose(_signal_alone(False), (replace(effect, at=_SHOWN),)), 1
+    return compose(_joint_alone(effect.reads(canonical.load)), (replace(effect, at=_JOINT),)), 0
 
 
 def with_probes(rig: Rig) -> Rig:
     """Return a rig with a push at every joint, drive and sensor.
 
     Each push is an input (see `push`), and all of them are in units of the parameter `PUSH_SIZE`. Behind the rig's own outputs
-    stand the motion of each joint (see `motion_columns`) and the signal of each drive (see `signal_columns`).
+    stand the motion of each joint and what others load it with (see `motion_columns`, `load_columns`), the signal of each drive
+    and the way along which it pushes (see `signal_columns`, `way_columns`).
     """
     mechanism, size = rig.mechanism, _real(PUSH_SIZE)
     pushed = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
@@ -111,7 +121,9 @@ def with_probes(rig: Rig) -> Rig:
         replace(sensor, reads=sensor.reads + size * _real(push(sensor.name))) for sensor in mechanism.sensors
     )
     shown = [Sensor(f"{_MOTION}{joint.name}", joint.motion - joint.rest, "") for joint in mechanism.joints]
+    shown += [Sensor(f"{_LOAD}{joint.name}", mechanism.carried_by(joint), "") for joint in mechanism.joints]
     shown += [Sensor(f"{_SENT}{drive.name}", _real(drive.name), "") for drive in mechanism.drives]
+    shown += [Sensor(f"{_ALONG}{drive.name}", drive.along, "") for drive in mechanism.drives]
     order = (*(drive.name for drive in pushes), *mechanism.order, *(sensor.name for sensor in shown))
     return replace(
         rig,
@@ -135,11 +147,25 @@ def push(place: str) -> str:
 
 def motion_columns(rig: Rig) -> dict[str, int]:
     """Return the number of the output, of the rig with probes, that shows the motion of each joint."""
-    first = len(rig.mechanism.sensors)
-    return {joint.name: first + i for i, joint in enumerate(rig.mechanism.joints)}
+    return _columns(len(rig.mechanism.sensors), rig.mechanism.joints)
+
+
+def load_columns(rig: Rig) -> dict[str, int]:
+    """Return the number of the output that shows what loads each joint beside its own spring."""
+    return _columns(len(rig.mechanism.sensors) + len(rig.mechanism.joints), rig.mechanism.joints)
 
 
 def signal_columns(rig: Rig) -> dict[str, int]:
     """Return the number of the output, of the rig with probes, that shows the signal of each drive."""
-    first = len(rig.mechanism.sensors) + len(rig.mechanism.joints)
-    return {drive.name: first + i for i, drive in enumerate(rig.mechanism.drives)}
+    return _columns(len(rig.mechanism.sensors) + 2 * len(rig.mechanism.joints), rig.mechanism.drives)
+
+
+def way_columns(rig: Rig) -> dict[str, int]:
+    """Return the number of the output that shows the way along which each drive pushes."""
+    mechanism = rig.mechanism
+    first = len(mechanism.sensors) + 2 * len(mechanism.joints) + len(mechanism.drives)
+    return _columns(first, mechanism.drives)
+
+
+def _columns(first: int, places: Sequence[Joint | Drive]) -> dict[str, int]:
+    return {place.name: first + i for i, place in enumerate(places)}

@@ -21,9 +21,19 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.candidates.starts import start_values
 from rigsight.diagnose.places.answers import Answers
-from rigsight.diagnose.places.probes import PUSH_SIZE, STIFFNESS, alone, motion_columns, push, with_probes
+from rigsight.diagnose.places.probes import (
+    PUSH_SIZE,
+    STIFFNESS,
+    alone,
+    load_columns,
+    motion_columns,
+    push,
+    way_columns,
+    with_probes,
+)
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.effects import Effect, kind_of, placed_dimension
+from rigsight.effects import Effect, Place, kind_of, placed_dimension
+from rigsight.effects import symbols as canonical
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
@@ -116,8 +126,12 @@ class Lineup:
         p = np.array([[start[name] for name in structure.names] for start in starts]).T
         x0 = np.zeros((max(1, len(structure.states)), p.shape[1]))
         found: list[list[Floats]] = [[] for _ in starts]
-        for record, seen in zip(self._answers.records, self._answers.seen(place), strict=True):
-            moved = Record(record.name, record.dt, {structure.rig.inputs[0].name: seen}, {}, hold=record.hold)
+        for i, (record, seen) in enumerate(
+            zip(self._answers.records, self._answers.seen(place), strict=True)
+        ):
+            signals = (seen, *self._beside(place, effect, i))
+            named = dict(zip((source.name for source in structure.rig.inputs), signals, strict=True))
+            moved = Record(record.name, record.dt, named, {}, hold=record.hold)
             held = record_input(structure, moved)
             with np.errstate(all="ignore"):
                 out = simulate_sets(structure, held, p, x0, record.n_samples, Substeps(_SUBSTEPS))[:, column]
@@ -129,6 +143,13 @@ class Lineup:
             for own, added in zip(found, (out - without).T, strict=True):
                 own.append(added)
         return [own for own in found if all(np.all(np.isfinite(added)) for added in own)]
+
+    def _beside(self, place: str, effect: Effect, index: int) -> list[Floats]:
+        """Return what else an effect sees: the load of its joint, the way along which its drive pushes."""
+        rig, out = self._bench.rig, self._answers.calm_outputs[index]
+        if effect.place is Place.ACTUATOR and effect.reads(canonical.v):
+            return [out[:, way_columns(rig)[place]]]
+        return [out[:, load_columns(rig)[place]]] if effect.reads(canonical.load) else []
 
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
         """Return values of the effect's own parameters from which it is worth trying, with the stiffness of its joint."""

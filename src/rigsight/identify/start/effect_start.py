@@ -24,6 +24,9 @@ from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.units import characteristic_value
 
 _GRID = 12
+_GRID_OF_TWO = 6
+"""Points of each of two inner parameters: 36 in all, three times as many as of one."""
+_SIGNALS = (canonical.x, canonical.v, canonical.u, canonical.position, canonical.load)
 _LOWEST_SHARE = 0.01
 
 
@@ -35,6 +38,8 @@ class _Motion:
     x: NDArray[np.float64]
     v: NDArray[np.float64]
     u: NDArray[np.float64]
+    position: NDArray[np.float64]
+    load: NDArray[np.float64]
 
 
 class EffectRegression:
@@ -63,7 +68,8 @@ class EffectRegression:
         self._values = dict(values)
         self._scales = scales
         self._gain = self._number(rig.motion.drive_gain)
-        self._spring = self._number(rig.motion.stiffness) > 0.0
+        stiffness = self._number(rig.motion.stiffness)
+        self._spring = stiffness > 0.0
         rest = self._number(rig.motion.rest)
         source, response = rig.inputs[0].name, rig.outputs[0].name
         self._motions = []
@@ -72,9 +78,9 @@ class EffectRegression:
             spectra = spectra_of(record, source, response)
             if spectra.omega.size == 0:
                 continue  # a stretch in which the input rests
-            self._motions.append(_Motion(spectra, x - rest, v, record[source]))
+            load = self._gain * record[source] + stiffness * (x - rest)
+            self._motions.append(_Motion(spectra, x - rest, v, record[source], x, load))
         inertia, damping = self._number(rig.motion.inertia), self._number(rig.motion.damping)
-        stiffness = self._number(rig.motion.stiffness)
         self._denominators = [
             stiffness - inertia * m.spectra.omega**2 + 1j * damping * m.spectra.omega for m in self._motions
         ]
@@ -87,6 +93,13 @@ class EffectRegression:
         if effect.states or effect.spring is not None or not self._motions:
             return None
         if effect.torque is None and effect.deflection is None and effect.drive is None:
+            return None
+        # A wave number has as many optima as there are waves in the motion; its start comes from elsewhere.
+        if (
+            effect.wave_number is not None
+            or effect.reads(canonical.t)
+            or effect.reads(canonical.acceleration)
+        ):
             return None
         fitted = [p for p in effect.parameters if p.fitted]
         linear = [p for p in fitted if effect.torque is not None and _is_linear(effect.torque, p)]
@@ -101,13 +114,14 @@ class EffectRegression:
 
     def _grid(self, inner: Sequence[Parameter]) -> Iterator[dict[str, float]]:
         axes = []
+        points = _GRID if len(inner) < 2 else _GRID_OF_TWO
         for parameter in inner:
             size = characteristic_value(parameter.dimension, self._scales)
             low, high = parameter.search
             if parameter.logarithmic or high > 1.0:
-                shares = np.geomspace(max(low, _LOWEST_SHARE), min(high, 3.0), _GRID)
+                shares = np.geomspace(max(low, _LOWEST_SHARE), min(high, 3.0), points)
             else:
-                shares = np.linspace(low, high, _GRID + 2)[1:-1]
+                shares = np.linspace(low, high, points + 2)[1:-1]
             axes.append([float(share * size) for share in shares])
         for combination in itertools.product(*axes):
             yield dict(zip((p.name for p in inner), combination, strict=True))
@@ -148,12 +162,12 @@ def _is_linear(expression: sp.Expr, parameter: Parameter) -> bool:
 
 def _function(expression: sp.Expr, inner: Mapping[str, float]):  # type: ignore[no-untyped-def]
     """Return the expression as a function of the measured signals of a record."""
-    symbols = (canonical.x, canonical.v, canonical.u)
     numbers = {sp.Symbol(name, real=True): value for name, value in inner.items()}
     plain = expression.replace(canonical.positive_part, lambda e: (e + sp.Abs(e)) / 2).subs(numbers)
-    compiled = sp.lambdify(symbols, plain, "numpy", cse=True)
+    compiled = sp.lambdify(_SIGNALS, plain, "numpy", cse=True)
 
     def evaluate(motion: _Motion) -> NDArray[np.float64]:
-        return np.broadcast_to(compiled(motion.x, motion.v, motion.u), motion.x.shape).astype(np.float64)
+        signals = (motion.x, motion.v, motion.u, motion.position, motion.load)
+        return np.broadcast_to(compiled(*signals), motion.x.shape).astype(np.float64)
 
     return evaluate

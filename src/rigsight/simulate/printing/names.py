@@ -21,6 +21,7 @@ GREEK = frozenset({
 _LETTERS = {
     Kind.SPRING: ("T", "spring"),
     Kind.TORQUE: ("T",),
+    Kind.LOAD: ("L",),
     Kind.DEFLECTION: ("x", "spring"),
     Kind.LATERAL: ("c",),
 }

@@ -21,12 +21,12 @@ from rigsight.simulate import compose
 from rigsight.units import parse_dimension
 from rigsight.workflow.own.effect_types import type_faults
 
-_MOTION = ("x", "v", "t", "k", "m")
+_MOTION = ("x", "v", "t", "k", "m", "position", "acceleration")
 _MAY_READ: Mapping[str, tuple[str, ...]] = {
-    "torque": _MOTION,
+    "torque": (*_MOTION, "load"),
     "spring": (*_MOTION, "spring_torque", "deflection", "deflection_rate"),
     "deflection": ("x",),
-    "drive": ("u", "t"),
+    "drive": ("u", "v", "t"),
     "delay": (),
     "lateral": ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback"),
     "measured": ("reading", "t"),
@@ -105,7 +105,7 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
     for pair in effect.searched_as:
         for name in {pair.first, pair.second} - set(names):
             yield f"searched_as names {name}, which is no parameter.{nearest(name, names)}"
-    for field in ("elastic_share", "pulsation"):
+    for field in ("elastic_share", "pulsation", "wave_number"):
         name = getattr(effect, field)
         if name is not None and name not in names:
             yield f"{field} names {name}, which is no parameter.{nearest(str(name), names)}"

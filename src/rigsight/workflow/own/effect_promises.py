@@ -18,7 +18,7 @@ from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import AXIS, RUNNING_GEAR, Rig, Signal
+from rigsight.rigs import AXIS, RUNNING_GEAR, Rig, Signal, joint_of
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 
@@ -260,7 +260,9 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
             name: simulated[name] + rng.normal(scale=s, size=record.n_samples) for name, s in noise.items()
         }
         records.append(simulated.with_signals(**noisy))
-    free = [*bench.free, *(p.name for p in own)]
+    joint = joint_of(bench.rig, effect)
+    known = bench.rig.constant_forces_at(joint) if effect.holds_constant_force else frozenset()
+    free = [*(name for name in bench.free if name not in known), *(p.name for p in own)]
     problem = GreyBoxFit(structure, records, scales, noise)
     for wrong in _WRONG:
         start = {name: value * (wrong if name in free else 1.0) for name, value in truth.items()}

@@ -108,6 +108,7 @@ _OTHERS: dict[str, Check] = {
     ),
     "elastic_share": _or_none(_TEXT),
     "pulsation": _or_none(_TEXT),
+    "wave_number": _or_none(_TEXT),
     "needs_inertia": _YES_OR_NO,
 }
 

@@ -1,0 +1,47 @@
+"""What is known of the constant forces at a joint, where an effect has a mean force of its own?
+
+Friction that differs each way and a constant force beside even friction obey the same equation. Such an effect is fitted with the
+constant forces of its joint held where the simulation in question has them, and competes only where even friction would have to
+move them: then it is the one cause in the place of a cause and a wrong number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rigsight.effects import Effect
+from rigsight.rigs import Rig, joint_of
+
+
+def known_constant_forces(
+    rig: Rig, effect: Effect, given: Mapping[str, float], has_spring: bool
+) -> dict[str, float] | None:
+    """Return the values at which the constant forces beside an effect are held.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    effect
+        At its place, or of no place.
+    given
+        Numbers of the rig that the simulation in question came with.
+    has_spring
+        Whether the spring of a rig of one motion is there: without it a rest position pushes nothing.
+
+    Returns
+    -------
+    Empty for an effect without a mean force; None where a constant force is not known. A force that is not given has its default,
+    a rest position has none: it is where somebody set a sensor to zero.
+    """
+    if not effect.holds_constant_force:
+        return {}
+    joint = joint_of(rig, effect)
+    names = rig.constant_forces_at(joint)
+    resting = {symbol.name for symbol in joint.rest.free_symbols}
+    defaults = {p.name: p.default for p in rig.parameters if p.name not in resting and p.default is not None}
+    known = {**defaults, **given}
+    needed = [name for name in names if has_spring or name not in resting]
+    if any(name not in known for name in needed):
+        return None
+    return {name: known[name] for name in names if name in known}

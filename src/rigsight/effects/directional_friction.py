@@ -1,0 +1,64 @@
+"""Directional friction: dry friction of another size each way.
+
+Equation
+--------
+``resisting torque = T_fwd`` while x' > 0, ``-T_bwd`` while x' < 0; at rest it balances the other torques as long as they stay
+between -T_bwd and T_fwd.
+
+=====  ==========================================================
+T_fwd  friction while x' is positive [force]
+T_bwd  friction while x' is negative [force]; vanishes with T_fwd
+=====  ==========================================================
+
+Applies to lip seals, worm and screw drives, wipers and brushes, whose contact is not the same both ways. It obeys the equation
+of Coulomb friction (T_fwd + T_bwd) / 2 beside a constant force (T_fwd - T_bwd) / 2: it is told from that only where the constant
+force at the joint, or the rest position of its spring, is known.
+
+Signature: as Coulomb friction, and a mean that shifts with the motion; even harmonics.
+
+References: B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994) 1083, on friction that depends on the
+direction.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start
+from rigsight.effects.symbols import drive_size, v
+from rigsight.parameters import Parameter
+
+T_fwd, T_bwd, T_c = sp.symbols("T_fwd T_bwd T_c", real=True)
+
+DIRECTIONAL_FRICTION = Effect(
+    name="directional_friction",
+    place=Place.DYNAMICS,
+    summary="Dry friction is larger one way than the other.",
+    parameters=(
+        Parameter(
+            "T_fwd",
+            "friction while x' is positive",
+            "drive",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.15, 0.3),
+            search=(0.0, 2.0),
+        ),
+        Parameter(
+            "T_bwd",
+            "friction while x' is negative",
+            "drive",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.05, 0.1),
+            search=(0.0, 2.0),
+        ),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.RISES, even_harmonics=True),
+    torque=T_fwd * (1 + sp.sign(v)) / 2 - T_bwd * (1 - sp.sign(v)) / 2,
+    starts=(
+        Start({"T_fwd": 0.1 * drive_size, "T_bwd": 0.1 * drive_size}),
+        Start({"T_fwd": T_c, "T_bwd": T_c}, parent="coulomb_friction"),
+    ),
+)

@@ -1,0 +1,117 @@
+"""An effect is told from its nearest relatives: its own numbers come back, and held-out records fit it better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import effect_named
+from rigsight.identify import characteristic_scales
+from rigsight.records.record import Record
+from rigsight.rigs import RIGS
+from rigsight.simulate import compose, simulate
+
+SIGMAS = 3.0
+WORSE = 1.1
+"""Factor by which relatives leave more of records that were not fitted, at least."""
+NOISE = 1e-3
+"""Of each sensor, in units of what it shows."""
+STAGE = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+FREE_STAGE = {**STAGE, "d": 4.0, "k": 0.0}
+TRAIN = {
+    "k_t": 0.05, "J_m": 1e-4, "J_l": 5e-4, "k_s": 0.4, "d_s": 1e-3, "d_m": 5e-4, "d_l": 1e-3, "k_l": 0.1,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """A rig with an effect, and the relatives that it is to be told from."""
+
+    effect: str
+    truth: Mapping[str, float]
+    relatives: tuple[str, ...]
+    rig: str = "axis"
+    values: Mapping[str, float] = field(default_factory=lambda: STAGE)
+    dt: float = 0.01
+    band: tuple[float, float] = (0.1, 3.0)
+    """Lowest and highest frequency of the input [Hz]."""
+    size: float = 1.0
+
+    def __str__(self) -> str:
+        return self.effect
+
+
+def multisine(
+    rng: np.random.Generator, t: NDArray[np.float64], band: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Return a sum of sines of unit amplitude."""
+    frequencies = np.arange(band[0], band[1], 2.0 / t[-1])
+    phases = rng.uniform(0.0, 2.0 * np.pi, frequencies.size)
+    waves = np.sum(np.cos(2.0 * np.pi * frequencies * t[:, None] + phases), axis=1)
+    return waves / np.max(np.abs(waves))
+
+
+def measured(case: Case, seed: int = 3) -> tuple[Record, ...]:
+    """Return two records to fit and one to score."""
+    rng, rig = np.random.default_rng(seed), RIGS[case.rig]
+    structure = compose(rig, [effect_named(case.effect)])
+    t = case.dt * np.arange(1500)
+    records = []
+    for name, share, role in (
+        ("large", 1.0, "estimation"),
+        ("small", 0.4, "estimation"),
+        ("other", 0.8, "validation"),
+    ):
+        wave = case.size * share * multisine(rng, t, case.band)
+        record = Record(name, case.dt, {rig.inputs[0].name: wave}, {}, role=role)
+        shown = simulate(structure, {**case.values, **case.truth}, record)
+        noisy = {
+            s.name: shown[s.name] + NOISE * np.std(shown[s.name]) * rng.standard_normal(t.size)
+            for s in rig.outputs
+        }
+        records.append(record.with_signals(**noisy))
+    return tuple(records)
+
+
+def bench_of(case: Case, records: tuple[Record, ...]) -> Workbench:
+    rig = RIGS[case.rig]
+    fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
+    values = dict(case.values)
+    scales = characteristic_scales(rig, fitted, values)
+    noise = {s.name: NOISE * float(np.std(records[0][s.name])) for s in rig.outputs}
+    held = frozenset({"k"} if values.get("k") == 0.0 else ())
+    return Workbench(rig, fitted, scored, fitted, scales, noise, held, values, values)
+
+
+def fitted(case: Case, names: tuple[str, ...]) -> dict[str, Scored]:
+    """Return each effect alone, fitted and scored."""
+    bench = bench_of(case, measured(case))
+    models = fit_candidates(bench, fit_linear(bench, bench.start), [effect_named(name) for name in names])
+    return {model.names[0]: model for model in models}
+
+
+CASES = [
+    Case(
+        "directional_friction@motor_bearing", {"T_fwd": 0.012, "T_bwd": 0.005},
+        ("coulomb_friction@motor_bearing", "stribeck_friction@motor_bearing"), "drive_train", TRAIN, band=(0.3, 8.0),
+    ),
+    Case("load_dependent_friction", {"T_c": 0.03, "mu": 0.12}, ("coulomb_friction", "stribeck_friction")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_it_is_told_from_its_relatives(case: Case) -> None:
+    found = fitted(case, (case.effect, *case.relatives))
+    own = found[case.effect]
+    for name, value in case.truth.items():
+        error = own.fit.standard_errors[name]
+        assert abs(own.fit.values[name] - value) < SIGMAS * error, (name, own.fit.values[name], error)
+        assert error < 0.2 * abs(value)
+    left = {name: model.excess / own.excess for name, model in found.items() if name != case.effect}
+    assert min(left.values()) > WORSE, left
