@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
+from rigsight.diagnose.rank import noise_vector, rank
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
@@ -36,6 +37,8 @@ class Case:
     effect: str
     truth: Mapping[str, float]
     relatives: tuple[str, ...]
+    generalizations: tuple[str, ...] = ()
+    """Effects that contain it, and so fit as well with more numbers."""
     rig: str = "axis"
     values: Mapping[str, float] = field(default_factory=lambda: STAGE)
     dt: float = 0.01
@@ -89,29 +92,36 @@ def bench_of(case: Case, records: tuple[Record, ...]) -> Workbench:
     return Workbench(rig, fitted, scored, fitted, scales, noise, held, values, values)
 
 
-def fitted(case: Case, names: tuple[str, ...]) -> dict[str, Scored]:
-    """Return each effect alone, fitted and scored."""
+def ranked(case: Case, names: tuple[str, ...]) -> tuple[Scored, ...]:
+    """Return each effect alone, fitted and scored, the likeliest first."""
     bench = bench_of(case, measured(case))
     models = fit_candidates(bench, fit_linear(bench, bench.start), [effect_named(name) for name in names])
-    return {model.names[0]: model for model in models}
+    noise = noise_vector([s.name for s in bench.rig.outputs], bench.noise)
+    return rank(models, noise, np.random.default_rng(0)).order
 
 
 CASES = [
     Case(
         "directional_friction@motor_bearing", {"T_fwd": 0.012, "T_bwd": 0.005},
-        ("coulomb_friction@motor_bearing", "stribeck_friction@motor_bearing"), "drive_train", TRAIN, band=(0.3, 8.0),
+        ("coulomb_friction@motor_bearing", "stribeck_friction@motor_bearing"), rig="drive_train", values=TRAIN, band=(0.3, 8.0),
     ),
     Case("load_dependent_friction", {"T_c": 0.03, "mu": 0.12}, ("coulomb_friction", "stribeck_friction")),
+    Case(
+        "presliding_friction", {"T_c": 0.15, "x_p": 1e-3},
+        ("coulomb_friction", "stribeck_friction", "iwan_hysteresis"), ("bouc_wen_hysteresis",),
+    ),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_it_is_told_from_its_relatives(case: Case) -> None:
-    found = fitted(case, (case.effect, *case.relatives))
+    order = ranked(case, (case.effect, *case.relatives, *case.generalizations))
+    found = {model.names[0]: model for model in order}
     own = found[case.effect]
     for name, value in case.truth.items():
         error = own.fit.standard_errors[name]
         assert abs(own.fit.values[name] - value) < SIGMAS * error, (name, own.fit.values[name], error)
         assert error < 0.2 * abs(value)
-    left = {name: model.excess / own.excess for name, model in found.items() if name != case.effect}
+    left = {name: found[name].excess / own.excess for name in case.relatives}
     assert min(left.values()) > WORSE, left
+    assert order[0] is own, [(model.names, model.excess) for model in order]

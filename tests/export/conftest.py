@@ -44,6 +44,7 @@ EFFECT_VALUES: Mapping[str, Mapping[str, float]] = {
     "stribeck_friction": {"T_c": 0.08, "T_s": 0.16, "w_s": 0.02},
     "directional_friction": {"T_fwd": 0.12, "T_bwd": 0.05},
     "load_dependent_friction": {"T_c": 0.05, "mu": 0.1},
+    "presliding_friction": {"T_c": 0.1, "x_p": 0.002},
     "quadratic_damping": {"c_2": 20.0},
     "position_dependent_damping": {"c_x": 3e4},
     "cubic_stiffness": {"k_3": 3e5},

@@ -38,7 +38,7 @@ from rigsight.parameters import Parameter
 
 A, a, beta, gamma, n, z = sp.symbols("A a beta gamma n z", real=True)
 
-T_c = sp.Symbol("T_c", real=True)
+T_c, x_p = sp.symbols("T_c x_p", real=True)
 
 
 def _from_secant(share: float, saturation: float, skew: float) -> Start:
@@ -64,6 +64,12 @@ def _from_coulomb(saturation: float) -> Start:
     values = {"k": k + hysteretic, "a": k / (k + hysteretic), "beta": half, "gamma": half}
     return Start(values, parent="coulomb_friction")
 
+
+_FROM_PRESLIDING = Start(
+    {"k": k + T_c / x_p, "a": k / (k + T_c / x_p), "beta": 1 / x_p, "gamma": sp.Integer(0)},
+    parent="presliding_friction",
+)
+"""Beside a spring presliding friction is this loop with gamma = 0."""
 
 BOUC_WEN_HYSTERESIS = Effect(
     name="bouc_wen_hysteresis",
@@ -132,6 +138,7 @@ BOUC_WEN_HYSTERESIS = Effect(
         _from_secant(0.2, 8.0, 8.0),
         _from_coulomb(10.0),
         _from_coulomb(50.0),
+        _FROM_PRESLIDING,
     ),
     special_cases={"n": 1.0},
 )

@@ -24,6 +24,7 @@ from rigsight.effects.load_dependent_friction import LOAD_DEPENDENT_FRICTION
 from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
 from rigsight.effects.placed import AT, placed
 from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPING
+from rigsight.effects.presliding_friction import PRESLIDING_FRICTION
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
 from rigsight.effects.sensor_delay import SENSOR_DELAY
 from rigsight.effects.sensor_lag import SENSOR_LAG
@@ -37,6 +38,7 @@ CATALOGUE: tuple[Effect, ...] = (
     STRIBECK_FRICTION,
     DIRECTIONAL_FRICTION,
     LOAD_DEPENDENT_FRICTION,
+    PRESLIDING_FRICTION,
     QUADRATIC_DAMPING,
     POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,

@@ -7,7 +7,7 @@ Equation
 T_c: friction torque [force]; the effect vanishes at 0.
 
 Applies to guides, seals and bearings that move by much more than their pre-sliding displacement. For displacements of that
-size, see Bouc-Wen hysteresis; for friction that falls with speed, Stribeck friction.
+size, see presliding friction; for friction that falls with speed, Stribeck friction.
 
 Signature: small inputs move nothing, the apparent damping falls with amplitude; odd harmonics; flat tops at reversals.
 

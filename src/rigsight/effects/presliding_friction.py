@@ -1,0 +1,68 @@
+"""Presliding friction (Dahl): dry friction that builds up over a small displacement, like a spring that yields.
+
+Equation
+--------
+``resisting torque = T_c z / x_p``,  ``z' = x' - |x'| z / x_p``
+
+===  ============================================================================
+T_c  friction once it slides [force]; the effect vanishes at 0
+x_p  displacement over which the friction builds up; T_c / x_p is its stiffness
+===  ============================================================================
+
+This is the Bouc-Wen element with n = 1 and gamma = 0, without a spring of its own, and so the LuGre model without its bristle
+damping and its friction that falls with speed. It is preferred to LuGre because records of drives that move by more than x_p do
+not determine these two beside the viscous damping; where friction falls with speed, see Stribeck friction.
+
+Applies to ball bearings, guides and gears that turn back often, or that rest under a small torque: they give way and come back
+before they slide. As x_p goes to 0 this is Coulomb friction.
+
+Signature: stiffer at small amplitude, as if a spring were there that large motions do not know; rounded loops at any speed; odd
+harmonics.
+
+References: P. R. Dahl, *A Solid Friction Model* (Aerospace Corporation TOR-0158, 1968); C. Canudas de Wit et al., IEEE TAC 40
+(1995) 419 (LuGre).
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.symbols import drive_size, v, x_size
+from rigsight.parameters import Parameter
+
+T_c, x_p, z = sp.symbols("T_c x_p z", real=True)
+
+PRESLIDING_FRICTION = Effect(
+    name="presliding_friction",
+    place=Place.DYNAMICS,
+    summary="Dry friction gives way like a spring before it slides.",
+    parameters=(
+        Parameter(
+            "T_c",
+            "friction once it slides",
+            "drive",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.1, 0.3),
+            search=(0.0, 2.0),
+        ),
+        Parameter(
+            "x_p",
+            "displacement over which the friction builds up",
+            "x",
+            lower=1e-12,
+            upper=1e9,
+            starts=(0.1, 0.3),
+            search=(1e-3, 10.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.RISES),
+    torque=T_c * z / x_p,
+    states=(State(z, v - sp.Abs(v) * z / x_p, "x"),),
+    starts=(
+        Start({"T_c": 0.1 * drive_size, "x_p": 0.2 * x_size}),
+        *(Start({"T_c": T_c, "x_p": share * x_size}, parent="coulomb_friction") for share in (0.1, 0.02)),
+    ),
+)
