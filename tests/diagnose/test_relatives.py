@@ -110,6 +110,14 @@ CASES = [
         "presliding_friction", {"T_c": 0.15, "x_p": 1e-3},
         ("coulomb_friction", "stribeck_friction", "iwan_hysteresis"), ("bouc_wen_hysteresis",),
     ),
+    Case(
+        "torque_ripple", {"T_sin": 0.1, "T_cos": -0.06, "kappa": 700.0},
+        ("cubic_stiffness", "gravity_pendulum", "periodic_disturbance"),
+    ),
+    Case(
+        "torque_ripple@load_bearing", {"T_sin": 0.002, "T_cos": 0.001, "kappa": 12.0},
+        ("torque_ripple@motor_bearing", "periodic_disturbance@load_bearing"), rig="drive_train", values=TRAIN, band=(0.3, 8.0),
+    ),
 ]  # fmt: skip
 
 

@@ -45,6 +45,7 @@ EFFECT_VALUES: Mapping[str, Mapping[str, float]] = {
     "directional_friction": {"T_fwd": 0.12, "T_bwd": 0.05},
     "load_dependent_friction": {"T_c": 0.05, "mu": 0.1},
     "presliding_friction": {"T_c": 0.1, "x_p": 0.002},
+    "torque_ripple": {"T_sin": 0.06, "T_cos": 0.04, "kappa": 400.0},
     "quadratic_damping": {"c_2": 20.0},
     "position_dependent_damping": {"c_x": 3e4},
     "cubic_stiffness": {"k_3": 3e5},

@@ -17,7 +17,7 @@ Noise = Literal["low", "high"]
 CatalogueDesign = Literal["small", "standard", "joints"]
 """Lists of cells on the running gear or an axis; together they hold every effect of the catalogue that is told apart there."""
 
-OF_JOINTS = frozenset({"presliding_friction", "load_dependent_friction"})
+OF_JOINTS = frozenset({"torque_ripple", "presliding_friction", "load_dependent_friction"})
 """Effects of measured servo and robot joints, which the catalogue got later.
 
 They have a design of their own, so that the trials of the two others stay those that were counted before.

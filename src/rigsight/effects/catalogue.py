@@ -29,6 +29,7 @@ from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
 from rigsight.effects.sensor_delay import SENSOR_DELAY
 from rigsight.effects.sensor_lag import SENSOR_LAG
 from rigsight.effects.stribeck_friction import STRIBECK_FRICTION
+from rigsight.effects.torque_ripple import TORQUE_RIPPLE
 from rigsight.errors import check_option
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -43,6 +44,7 @@ CATALOGUE: tuple[Effect, ...] = (
     POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,
     GRAVITY_PENDULUM,
+    TORQUE_RIPPLE,
     END_STOP,
     FREE_PLAY,
     BACKLASH,

@@ -98,6 +98,7 @@ def is_linear(effect: Effect) -> bool:
         Of the catalogue or from elsewhere.
     """
     signals = [canonical.x, canonical.v, canonical.u, canonical.reading, canonical.spring_torque]
+    signals += [canonical.position, canonical.load, canonical.acceleration]
     signals += [
         canonical.creepage,
         canonical.lateral_displacement,

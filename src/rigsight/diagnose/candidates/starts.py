@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import sympy as sp
 
 from rigsight.diagnose.candidates.persistent_line import persistent_line
+from rigsight.diagnose.candidates.waves import wave_starts
 from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect, placed_dimension
@@ -41,6 +42,10 @@ def start_values(
         Fits with a simpler effect in its place, by name of that effect.
     """
     starts = list(_plain_starts(bench, structure, effect, base, parents))
+    if effect.wave_number is not None:
+        waves = [with_own_values(structure, effect, base, own) for own in wave_starts(bench, effect, base)]
+        yield from waves or starts
+        return
     yield from starts
     line = _line(bench, base) if effect.pulsation is not None else None
     if line is not None:

@@ -51,8 +51,9 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
     """
     if bench.rig.has_one_motion:
         return Search((), tuple(effects))
-    # What pulsates by itself goes with no motion, so that no push along one tells of it.
-    pushing = [effect for effect in effects if effect.pulsation is None]
+    # What pulsates by itself goes with no motion, so that no push along one tells of it; what comes back with the position has
+    # another form at every wave number.
+    pushing = [effect for effect in effects if not _stands_for_itself(effect)]
     suspects = Lineup(bench, model).suspects(pushing)
     shares = _by_place(bench, suspects)
     most = max(shares.values(), default=0.0)
@@ -61,8 +62,12 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
         key=lambda place: -place.share,
     )
     looked_at = {place.name for place in places if place.looked_at}
-    first = [e for e in effects if e.pulsation is not None or bench.rig.acts_at(e) in looked_at]
+    first = [e for e in effects if _stands_for_itself(e) or bench.rig.acts_at(e) in looked_at]
     return Search(tuple(places), tuple(first), tuple(effect for effect in effects if effect not in first))
+
+
+def _stands_for_itself(effect: Effect) -> bool:
+    return effect.pulsation is not None or effect.wave_number is not None
 
 
 def _by_place(bench: Workbench, suspects: Sequence[Suspect]) -> dict[str, float]:

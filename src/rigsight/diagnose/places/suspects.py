@@ -206,7 +206,7 @@ def structures_of_lineup(
     by_themselves = {
         kind_of(effect.name): alone(effect)[0]
         for effect in effects
-        if effect.pulsation is None and not _is_late(effect)
+        if effect.pulsation is None and effect.wave_number is None and not _is_late(effect)
     }
     return [compose(with_probes(rig), modelled), *by_themselves.values()]
 

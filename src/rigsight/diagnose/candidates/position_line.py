@@ -1,0 +1,129 @@
+"""At which wave number does what a model leaves come back with the position? A line in its spectrum over the position.
+
+A force that repeats along the way has, at changing speed, no line in any spectrum over time. What a force
+``a sin(kappa s) + b cos(kappa s)`` along the measured way s does to an output is its answer by the linear equations: for each
+wave number a regression with coefficients that all records share. The lines of the highest share are where a fit is worth
+starting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+Floats = NDArray[np.float64]
+Law = Callable[[Floats, float], Sequence[Floats]]
+"""Parts of a force (or an error) along a way at a wave number, shape (n_samples,) each, one for each coefficient."""
+Answer = Callable[[Floats], NDArray[np.complex128]]
+"""Answer of the output to that force over the angular frequency."""
+
+_PER_WAVE = 4.0
+"""Wave numbers tried while one more wave comes to lie on the way; a fit finds back from half of one."""
+_MOST_WAVES = 120.0
+"""Waves on the way up to which lines are looked for: more of them would take as long as the fits."""
+_MOST_SAMPLES = 16000
+"""Samples of all records together, for the same reason."""
+_SMOOTHED = 15
+"""Lines over which the spectrum is averaged that the others are weighed by: fewer would flatten what is looked for."""
+_LOWEST_LINE = 2
+"""First line of a spectrum over time that is used: below is drift, which initial states take."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """The way along a record and what a model leaves there, shape (n_samples,) each; `dt` is its sample time [s]."""
+
+    way: Floats
+    left: Floats
+    dt: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """A wave number with the coefficients of the law's parts, and the share of the squared residual that it explains."""
+
+    wave_number: float
+    coefficients: tuple[float, ...]
+    share: float
+
+
+def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2) -> list[Line]:
+    """Return the lines that explain most, best first.
+
+    Parameters
+    ----------
+    law
+        What comes back with the position.
+    runs
+        Records; long ones are read in the stretch that leaves most.
+    answer
+        What the output makes of it.
+    count
+        Number of lines.
+    """
+    share = max(_MOST_SAMPLES // max(len(runs), 1), 64)
+    runs = [_liveliest(run, share) for run in runs]
+    spans = [float(np.ptp(run.way)) for run in runs]
+    span = max(spans, default=0.0)
+    steps = np.concatenate([np.abs(np.diff(run.way)) for run in runs]) if runs else np.zeros(0)
+    if span <= 0.0 or not np.any(steps > 0.0):
+        return []
+    # Two samples tell a wave at the speed that nine tenths of them do not exceed.
+    shortest = 2.0 * max(float(np.quantile(steps, 0.9)), span / _MOST_WAVES / 2.0)
+    waves = np.arange(1.0, max(span / shortest, 1.0) + 1.0 / _PER_WAVE, 1.0 / _PER_WAVE)
+    spectra = [_Spectrum(run, answer) for run in runs]
+    lines = [_line(law, spectra, float(wave)) for wave in 2.0 * np.pi * waves / span]
+    shares = np.array([line.share for line in lines])
+    around = np.pad(shares, 1, constant_values=-1.0)
+    peaks = np.flatnonzero((shares >= around[:-2]) & (shares > around[2:]))
+    return [lines[i] for i in sorted(peaks, key=lambda i: -shares[i])[:count]]
+
+
+class _Spectrum:
+    """What a run leaves over frequency, and how a force along its way would look there."""
+
+    def __init__(self, run: Run, answer: Answer) -> None:
+        n = run.way.size
+        self._window = np.hanning(n)
+        omega = 2.0 * np.pi * np.fft.rfftfreq(n, run.dt)
+        self._used = slice(_LOWEST_LINE, None)
+        self.way = run.way
+        left = self._over_frequency(run.left)
+        # Without weights the few lowest lines, of drift and of forces that are wrong elsewhere, would decide alone.
+        size = np.sqrt(uniform_filter1d(np.abs(left) ** 2, _SMOOTHED, mode="nearest"))
+        self._weight = 1.0 / np.maximum(size, 1e-12 * np.max(size, initial=1e-300))
+        self._answer = answer(omega[self._used]) * self._weight
+        self.left = left * self._weight
+
+    def _over_frequency(self, samples: Floats) -> NDArray[np.complex128]:
+        tapered = self._window * (samples - np.mean(samples))
+        return np.asarray(np.fft.rfft(tapered)[self._used] / np.sqrt(samples.size))
+
+    def of(self, force: Floats) -> NDArray[np.complex128]:
+        """Return the answer to a force."""
+        return np.asarray(self._over_frequency(force) * self._answer)
+
+
+def _line(law: Law, spectra: Sequence[_Spectrum], wave_number: float) -> Line:
+    normal, gradient, total = 0.0, 0.0, 0.0
+    for spectrum in spectra:
+        columns = np.array([spectrum.of(part) for part in law(spectrum.way, wave_number)])
+        normal = normal + np.real(columns.conj() @ columns.T)
+        gradient = gradient + np.real(columns.conj() @ spectrum.left)
+        total += float(np.sum(np.abs(spectrum.left) ** 2))
+    found = np.linalg.lstsq(np.atleast_2d(normal), np.atleast_1d(gradient), rcond=None)[0]
+    share = float(found @ np.atleast_1d(gradient)) / total if total > 0.0 else 0.0
+    return Line(wave_number, tuple(map(float, found)), share)
+
+
+def _liveliest(run: Run, n_samples: int) -> Run:
+    if run.way.size <= n_samples:
+        return run
+    energy = np.cumsum(np.r_[0.0, (run.left - np.mean(run.left)) ** 2])
+    start = int(np.argmax(energy[n_samples:] - energy[:-n_samples]))
+    stop = start + n_samples
+    return Run(run.way[start:stop], run.left[start:stop], run.dt)

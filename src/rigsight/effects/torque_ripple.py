@@ -1,0 +1,73 @@
+"""Torque ripple: a torque that comes back with the position.
+
+Equation
+--------
+``resisting torque = T_sin sin(kappa position) + T_cos cos(kappa position)``
+
+=====  =====================================================================================================
+T_sin  part that is zero at the origin of the position [force]; the effect vanishes where both parts are 0
+T_cos  part that is largest there [force]
+kappa  wave number: periods per turn of an angle in rad, 2 pi over the period of a displacement
+=====  =====================================================================================================
+
+The amplitude is ``sqrt(T_sin^2 + T_cos^2)``, the phase ``atan2(T_cos, T_sin)``. The position counts from the origin of its own
+sensor, wherever the spring rests.
+
+Applies to the cogging of motors with magnets, to gear teeth, ball screws and eccentric pulleys. A torque that comes back with
+time, whatever the motion does, is a periodic disturbance.
+
+Signature: lines whose frequency goes with the speed; a mass at rest is drawn into the nearest valley; even harmonics where that
+is not the middle of the motion.
+
+References: T. M. Jahns and W. L. Soong, IEEE Trans. Ind. Electron. 43 (1996) 321, on pulsating torque and cogging.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.symbols import position
+from rigsight.parameters import Parameter
+
+T_sin, T_cos, kappa = sp.symbols("T_sin T_cos kappa", real=True)
+
+TORQUE_RIPPLE = Effect(
+    name="torque_ripple",
+    place=Place.DYNAMICS,
+    summary="A torque repeats with the position: cogging, gear teeth, an eccentric pulley.",
+    parameters=(
+        Parameter(
+            "T_sin",
+            "part that is zero at the origin",
+            "drive",
+            lower=-1e15,
+            upper=1e15,
+            null=0.0,
+            starts=(0.1, 0.05),
+            search=(-2.0, 2.0),
+        ),
+        Parameter(
+            "T_cos",
+            "part that is largest at the origin",
+            "drive",
+            lower=-1e15,
+            upper=1e15,
+            null=0.0,
+            starts=(0.05, -0.1),
+            search=(-2.0, 2.0),
+        ),
+        Parameter(
+            "kappa",
+            "wave number",
+            "x^-1",
+            lower=1e-9,
+            upper=1e12,
+            starts=(6.0, 15.0),
+            search=(2.0, 60.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.CONSERVATIVE,
+    wave_number="kappa",
+    signature=Signature(gain_trend=GainTrend.RISES, even_harmonics=True),
+    torque=T_sin * sp.sin(kappa * position) + T_cos * sp.cos(kappa * position),
+)
