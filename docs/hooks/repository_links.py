@@ -27,6 +27,7 @@ MOVED = {
     "experiments/rounding/README.md": "experiments/rounding.md",
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",
     "experiments/places/README.md": "experiments/places.md",
+    "experiments/adequacy/README.md": "experiments/adequacy.md",
     "experiments/any_rig_start/README.md": "experiments/any_rig_start.md",
     "experiments/thesis/README.md": "experiments/thesis.md",
 }

@@ -96,7 +96,7 @@ class _Spectrum:
         # Without weights the few lowest lines, of drift and of forces that are wrong elsewhere, would decide alone.
         size = np.sqrt(uniform_filter1d(np.abs(left) ** 2, _SMOOTHED, mode="nearest"))
         self._weight = 1.0 / np.maximum(size, 1e-12 * np.max(size, initial=1e-300))
-        self._answer = answer(omega[self._used]) * self._weight
+        self._answer = answer(np.asarray(omega[self._used], dtype=np.float64)) * self._weight
         self.left = left * self._weight
 
     def _over_frequency(self, samples: Floats) -> NDArray[np.complex128]:

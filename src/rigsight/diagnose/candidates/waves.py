@@ -99,4 +99,8 @@ def _answer(bench: Workbench, effect: Effect, base: FitResult) -> Answer:
     else:
         natural = 1.0 / characteristic_value(placed_dimension(effect, "time"), bench.scales)
         stiffness, damping = mass * natural**2, 2.0 * _DAMPING_RATIO * mass * natural
-    return lambda omega: 1.0 / (stiffness - mass * omega**2 + 1j * damping * omega)
+
+    def answer(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+        return np.asarray(1.0 / (stiffness - mass * omega**2 + 1j * damping * omega), dtype=np.complex128)
+
+    return answer
