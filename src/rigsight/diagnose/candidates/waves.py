@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from rigsight.diagnose.candidates.position_line import Answer, Floats, Law, Run, position_lines
 from rigsight.diagnose.places.measured_motion import Corrections
