@@ -23,6 +23,7 @@ STATED = {
     "candidates.characterize._RELEASE_GAIN": (1.02, "lowers the held-out error by 2 %"),
     "candidates.characterize._CONTENDER": (1.5, "within 1.5 times the best"),
     "predictability.PREDICTABLE": (3.0, "more than three times what they do to the linear rig"),
+    "candidates.chance._BY_CHANCE": (0.5, "at least half of what the model leaves"),
     "windows._CYCLES": (4, "windows of four cycles"),
     "candidates.grow.MOST_EFFECTS": (2, "names two effects at most"),
     "candidates.grow._BEAM": (1.3, "within 1.3 times the best error"),
