@@ -58,12 +58,13 @@ def doubts(model: Scored, linear: Scored) -> tuple[Doubt, ...]:
                 and (zero or abs(value - bound) < _AT_BOUND * abs(bound))
             ):
                 found.append(Doubt(f"{name} = {value:.3g} stands at the bound of its search.", False))
-        if name not in own and name in linear.fit.values and declared.logarithmic:
-            ratio = value / linear.fit.values[name]
+        before = linear.fit.values.get(name, 0.0)
+        if name not in own and declared.lower >= 0.0 and before > 0.0 and value > 0.0:
+            ratio = value / before
             if not 1.0 / _FAR_OFF < ratio < _FAR_OFF:
                 found.append(
                     Doubt(
-                        f"{name} = {value:.3g} where the equations without the effect have {linear.fit.values[name]:.3g}.",
+                        f"{name} = {value:.3g} where the equations without the effect have {before:.3g}.",
                         False,
                     )
                 )
