@@ -64,6 +64,7 @@ def read_channels(
         axes, label = _axes(path, file, found, columns[time], time, time_is_mapped, dt)
         labels = {signal: channel.name for signal, channel in found.items()} | {time: label[0]}
         units = {signal: channel.unit for signal, channel in found.items()} | {time: label[1]}
+        names = tuple(channel.name for channel in file.channels)
     shared = _shared(axes.values())
     if shared is not None:
         values[time] = shared
@@ -75,6 +76,7 @@ def read_channels(
         units={signal: unit for signal, unit in units.items() if unit is not None},
         axes={} if shared is not None else axes,
         row="sample",
+        names=names,
     )
 
 

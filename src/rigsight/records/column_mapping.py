@@ -89,6 +89,8 @@ class Columns:
         Signal name -> time stamps [s], shape (n_samples,), where the signals do not share one axis; else empty.
     row
         What a row is called: ``"line"`` of a text, ``"sample"`` of anything else.
+    names
+        How the file calls all its columns.
     """
 
     values: Mapping[str, NDArray[np.float64]]
@@ -98,3 +100,4 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     row: str = "line"
+    names: tuple[str, ...] = ()

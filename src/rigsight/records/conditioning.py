@@ -19,6 +19,9 @@ LARGEST_JITTER = 0.01
 NEGLIGIBLE_JITTER = 1e-4
 # Of the sample time: with stamps printed more coarsely, rounding cannot be told from a repeated or missing row.
 COARSEST_STAMPS = 0.2
+# Of the typical step: from here on a sample at least is missing. Of the steps: more long ones are jitter.
+LEAST_PAUSE = 1.5
+MOST_PAUSES = 0.05
 # Of the printed resolution: a half, and a little for the fitted grid.
 LARGEST_ROUNDING = 0.6
 STAMPS_LOOKED_AT = 3000
@@ -124,6 +127,26 @@ def time_base(
     return TimeBase(float(stamps[0]), dt, stamps, (note,))
 
 
+def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the samples behind which others are missing; none where the steps vary everywhere, which is jitter.
+
+    Parameters
+    ----------
+    stamps
+        Time stamps, shape (n_samples,).
+    """
+    steps = np.diff(stamps)
+    if steps.size == 0 or np.any(steps <= 0.0):
+        return np.zeros(0, dtype=np.intp)
+    found = np.flatnonzero(steps > LEAST_PAUSE * float(np.median(steps)))
+    return found if found.size <= MOST_PAUSES * steps.size else np.zeros(0, dtype=np.intp)
+
+
+def missing_behind(stamps: NDArray[np.float64], sample: int) -> int:
+    """Return how many samples are missing behind one."""
+    return round(float(stamps[sample + 1] - stamps[sample]) / float(np.median(np.diff(stamps)))) - 1
+
+
 def resolution(stamps: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the spacing of the numbers that the file's digits can express at each stamp, shape (n_samples,).
 
@@ -174,16 +197,13 @@ def _check_order(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: st
 
 
 def _check_gaps(stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str) -> None:
-    """Refuse missing samples; steps that vary everywhere are jitter, not gaps."""
-    steps = np.diff(stamps)
-    dt = float(np.median(steps))
-    gaps = np.flatnonzero(steps > 1.5 * dt)
-    if gaps.size == 0 or gaps.size > 0.05 * steps.size:
+    """Refuse missing samples."""
+    gaps = pauses(stamps)
+    if gaps.size == 0:
         return
     first = int(gaps[0])
-    missing = round(float(steps[first]) / dt) - 1
     more = f" ({gaps.size} gaps in the file)" if gaps.size > 1 else ""
     raise InputError(
-        f"{file}, between {row}s {lines[first]} and {lines[first + 1]}: {missing} samples are missing, "
+        f"{file}, between {row}s {lines[first]} and {lines[first + 1]}: {missing_behind(stamps, first)} samples are missing, "
         f"the time jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}{more}. Split the record there into two files."
     )

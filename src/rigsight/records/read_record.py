@@ -5,42 +5,79 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.errors import InputError, nearest
-from rigsight.records.channel_names import closeness
+from rigsight.errors import InputError
 from rigsight.records.channel_table import read_channels
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns
-from rigsight.records.conditioning import LARGEST_NUMBER, TimeBase, time_base
+from rigsight.records.conditioning import TimeBase, time_base
 from rigsight.records.formats.channel_file import file_format
-from rigsight.records.formats.csv_channels import open_measurement
 from rigsight.records.formats.read_csv import read_csv
-from rigsight.records.plausibility import clipping, is_constant
 from rigsight.records.record import Hold, Kind, Record, Role
 from rigsight.records.resampling import Resampled, in_seconds, refuse_different_axes, resampled
+from rigsight.records.sound_signals import (
+    NamedSignal,
+    alike_notes,
+    check_absent,
+    clipping_notes,
+    listed_columns,
+    moving,
+    refuse_what_nobody_measures,
+    rest_notes,
+)
+from rigsight.records.stretches import one_stretch, stretches
 
 TIME = "t"
-_LISTED = 30
-"""Columns that a message lists."""
 
 
-class NamedSignal(Protocol):
-    """A signal that can be read: what a rig declares, seen from below."""
+class ReadingOptions(TypedDict, total=False):
+    """How a record is to be read, see `read_stretches`."""
 
-    @property
-    def name(self) -> str:
-        """Name in equations and files."""
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
+    columns: Mapping[str, ColumnMapping] | None
+    require_outputs: bool
+    required_outputs: Collection[str] | None
+    absent_inputs: Collection[str]
+    constant_inputs: Mapping[str, float] | None
+    moving_inputs: Collection[str]
+    name: str | None
+    role: Role
+    kind: Kind
+    amplitude: float | None
+    hold: Hold
+    dt: float | None
+    resample: float | None
+    separator: str | None
+    decimal: str | None
+    header: bool | int | None
+    comment: str | None
+    constants: Mapping[str, float] | None
 
 
 def read_record(
+    path: Path,
+    inputs: Sequence[NamedSignal],
+    outputs: Sequence[NamedSignal],
+    **options: Unpack[ReadingOptions],
+) -> Record:
+    """Read, check and repair one record.
+
+    Parameters
+    ----------
+    path, inputs, outputs, **options
+        As of `read_stretches`.
+
+    Raises
+    ------
+    InputError
+        As `read_stretches`, and where the clock of the file pauses.
+    """
+    return read_stretches(path, inputs, outputs, at_pauses="refuse", **options)[0]
+
+
+def read_stretches(
     path: Path,
     inputs: Sequence[NamedSignal],
     outputs: Sequence[NamedSignal],
@@ -63,8 +100,9 @@ def read_record(
     header: bool | int | None = None,
     comment: str | None = None,
     constants: Mapping[str, float] | None = None,
-) -> Record:
-    """Read, check and repair one record.
+    at_pauses: Literal["split", "refuse"] = "split",
+) -> tuple[Record, ...]:
+    """Read, check and repair the stretches of a record between the pauses of its clock; mostly there is one.
 
     Parameters
     ----------
@@ -96,6 +134,8 @@ def read_record(
         See `read_csv`; only delimited text has them.
     constants
         See `Record`.
+    at_pauses
+        Whether a pause parts records, or makes the file unusable.
 
     Raises
     ------
@@ -121,11 +161,11 @@ def read_record(
     absent = [signal.name for signal in recorded if signal.name not in table.values]
     may_rest = kind == "operation" and amplitude is None
     if absent:
-        _check_absent(path, absent, table, is_free=len(absent) == len(inputs) and may_rest)
+        check_absent(path, absent, table, is_free=len(absent) == len(inputs) and may_rest)
     if require_outputs and outputs and not any(signal.name in table.values for signal in outputs):
         listed = ", ".join(signal.name for signal in outputs)
         raise InputError(
-            f"{path.name} has none of the outputs {listed}. Its columns: {_listed(path)}. Map one at least under columns."
+            f"{path.name} has none of the outputs {listed}. Its columns: {listed_columns(table)}. Map one at least under columns."
         )
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     unit_notes: list[str] = []
@@ -136,45 +176,50 @@ def read_record(
             path.name, signal, units[signal], mapping, label, table.units.get(signal)
         )
         unit_notes += notes
-    bases = _bases(path, table)
     raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
-    _refuse_what_nobody_measures(path, raw, table)
+    refuse_what_nobody_measures(path, raw, table)
     found: list[str] = []
     if require_outputs:
-        raw, found = _moving(path, raw, table, needed, outputs)
+        raw, found = moving(path, raw, table, needed, outputs)
         if role == "estimation":
             must_move = moving_inputs if may_rest else [signal.name for signal in recorded]
-            found += _rest_notes(path, raw, table, recorded, must_move)
-    found += _clipping_notes(path, raw, table)
-    found += _alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
-    holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
-    # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
-    raw = raw or {TIME: table.values[TIME]}
-    on_axis = _on_one_axis(
-        path, table, raw, {signal: bases[signal] for signal in raw}, to_si[TIME], resample, holds
-    )
-    samples = {signal: to_si[signal].to_si(own) for signal, own in on_axis.samples.items()}
-    n_samples = next(iter(samples.values())).size
-    held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
-    samples = {signal: np.full(n_samples, value) for signal, value in held.items()} | samples
+            found += rest_notes(path, raw, table, recorded, must_move)
+    found += clipping_notes(path, raw, table)
+    found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     if absent:
         found.append(
             f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, as nothing drives the rig."
         )
-    return Record(
-        name=name or path.stem,
-        dt=on_axis.dt,
-        signals=samples,
-        units={signal: unit for signal, unit in units.items() if signal == TIME or signal in samples},
-        t0=on_axis.t0,
-        role=role,
-        kind=kind,
-        amplitude=amplitude,
-        hold=hold,
-        source=path,
-        notes=(*table.notes, *unit_notes, *on_axis.notes, *found),
-        constants=constants or {},
-    )
+    # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
+    kept = [*raw] or [TIME]
+    cut = stretches(path.name, TIME, table)
+    parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
+    held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
+    holds: dict[str, Hold] = {signal.name: hold for signal in inputs}
+    called, before = name or path.stem, (*table.notes, *unit_notes, *cut.notes)
+    records = []
+    for number, part in enumerate(parts, 1):
+        on_axis = _on_one_axis(path, part, kept, to_si[TIME], resample, holds)
+        samples = {signal: to_si[signal].to_si(own) for signal, own in on_axis.samples.items()}
+        n_samples = next(iter(samples.values())).size
+        samples = {signal: np.full(n_samples, value) for signal, value in held.items()} | samples
+        records.append(
+            Record(
+                name=called if len(parts) == 1 else f"{called} part {number}",
+                dt=on_axis.dt,
+                signals=samples,
+                units={signal: unit for signal, unit in units.items() if signal == TIME or signal in samples},
+                t0=on_axis.t0,
+                role=role,
+                kind=kind,
+                amplitude=amplitude,
+                hold=hold,
+                source=path,
+                notes=(*before, *on_axis.notes, *found) if number == 1 else on_axis.notes,
+                constants=constants or {},
+            )
+        )
+    return tuple(records)
 
 
 @dataclass(frozen=True)
@@ -208,51 +253,6 @@ def _table(
     return replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
 
 
-def _check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: bool) -> None:
-    """Refuse inputs that are missing where the rig was driven, or where a column may well be one of them."""
-    names = [name for name in _names(path) if name not in table.labels.values()]
-    is_free = is_free and not all(name.isdecimal() for name in (*names, *table.labels.values()))
-    for signal in absent:
-        close = [name for name in names if closeness(name, signal) > 0.0]
-        hint = f" Is it '{close[0]}'?" if close else nearest(signal, names)
-        if not hint and is_free:
-            continue
-        raise InputError(
-            f"{path.name} has no column '{signal}' for signal '{signal}'.{hint} Its columns: {_listed(path)}. Map it under "
-            f"columns; if it was constant and not recorded, give its value with the record: inputs = {{ {signal} = 0.0 }}."
-        )
-
-
-def _alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]:
-    """Tell of a column that was not read although it is called nearly like an output that is missing: a slip of the pen."""
-    unread = [name for name in _names(path) if name not in table.labels.values()] if missing else []
-    return [
-        f"{path.name}: has no column '{signal}', so {signal} is taken as not recorded there.{hint} Map it under columns if it is."
-        for signal in missing
-        if (hint := nearest(signal, unread))
-    ]
-
-
-def _names(path: Path) -> list[str]:
-    """Return how a file calls its columns."""
-    with open_measurement(path) as file:
-        return [channel.name for channel in file.channels]
-
-
-def _listed(path: Path) -> str:
-    return ", ".join(f"'{name}'" for name in _names(path)[:_LISTED]) or "none"
-
-
-def _refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
-    for signal, samples in raw.items():
-        largest = float(np.max(np.abs(samples)))
-        if largest > LARGEST_NUMBER:
-            raise InputError(
-                f"{path.name}, column '{table.labels[signal]}': {signal} is as large as {largest:.3g}, which nobody measures "
-                f"(up to {LARGEST_NUMBER:g} is read). Check the column and its type."
-            )
-
-
 def _refuse_dialect(path: Path, dialect: _Dialect) -> None:
     for key, value in vars(dialect).items():
         if value is not None:
@@ -275,13 +275,15 @@ def _bases(path: Path, table: Columns) -> dict[str, TimeBase]:
 def _on_one_axis(
     path: Path,
     table: Columns,
-    raw: Mapping[str, NDArray[np.float64]],
-    bases: Mapping[str, TimeBase],
+    kept: Sequence[str],
     time: ColumnMapping,
     resample: float | None,
     holds: Mapping[str, Hold],
 ) -> Resampled:
-    """Return the signals, not yet in SI, on the even axis [s] that they share or are to share."""
+    """Return the signals that are kept, not yet in SI, on the even axis [s] that they share or are to share."""
+    found = _bases(path, table)
+    bases = {signal: found[signal] for signal in kept}
+    raw = {signal: table.values[signal] for signal in kept}
     scale = 1.0 if time.scale is None else time.scale
     offset = 0.0 if time.offset is None else time.offset
     mended = tuple(dict.fromkeys(note for base in bases.values() for note in base.notes))
@@ -294,58 +296,3 @@ def _on_one_axis(
         refuse_different_axes(path.name, timed, table.labels)
     on_axis = resampled(path.name, raw, timed, resample, holds)
     return replace(on_axis, notes=(*mended, *on_axis.notes))
-
-
-def _moving(
-    path: Path,
-    raw: dict[str, NDArray[np.float64]],
-    table: Columns,
-    needed: Collection[str],
-    outputs: Sequence[NamedSignal],
-) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
-    """Return the signals that can be used, with notes on those that cannot."""
-    constant = {signal for signal, samples in raw.items() if is_constant(samples)}
-    measured = [output.name for output in outputs if output.name in raw]
-    for signal in measured:
-        if signal in constant and (signal in needed or constant.issuperset(measured)):
-            raise InputError(
-                f"{path.name}, column '{table.labels[signal]}': the output {signal} never changes ({raw[signal][0]:g}). "
-                "Check sensor and column, or leave the record out."
-            )
-    still = sorted(constant.intersection(measured))
-    notes = [f"{path.name}: {signal} never changes and is taken as not measured." for signal in still]
-    return {signal: samples for signal, samples in raw.items() if signal not in still}, notes
-
-
-def _rest_notes(
-    path: Path,
-    raw: Mapping[str, NDArray[np.float64]],
-    table: Columns,
-    recorded: Sequence[NamedSignal],
-    must_move: Collection[str],
-) -> list[str]:
-    """Tell of recorded inputs none of which changes: the rig moves freely, or a column is the wrong one."""
-    held = [signal.name for signal in recorded if signal.name in raw]
-    if not held or not all(is_constant(raw[signal]) for signal in held):
-        return []
-    values = ", ".join(f"{signal} = {raw[signal][0]:g}" for signal in held)
-    listed = ", ".join(f"'{table.labels[signal]}'" for signal in held)
-    where = f"{path.name}, column{'s' if len(held) > 1 else ''} {listed}"
-    if set(held) & set(must_move):
-        raise InputError(
-            f"{where}: no input changes ({values}), so nothing is excited and nothing can be identified. Check the column. "
-            'Of a rig that moves freely write kind = "operation" without an amplitude; a record that is only scored has '
-            'role = "validation".'
-        )
-    return [
-        f"{where}: no input changes ({values}); taken as a free motion. Check the column if the rig was driven."
-    ]
-
-
-def _clipping_notes(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> list[str]:
-    return [
-        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples stand exactly at "
-        f"its extreme {level:g}. Check range and saturation of sensor, amplifier or drive."
-        for signal, samples in raw.items()
-        for level, count in clipping(samples)
-    ]

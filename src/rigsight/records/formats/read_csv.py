@@ -110,7 +110,7 @@ def read_csv(
                 f"number ({count} such cell{'s' if count > 1 else ''}). Cut the record there or fill the gap before reading."
             )
     labels = {signal: layout.names[position] for signal, position in found.items()}
-    return Columns(values, labels, np.array(rows, dtype=np.int64), layout.notes)
+    return Columns(values, labels, np.array(rows, dtype=np.int64), layout.notes, names=layout.names)
 
 
 def kept_lines(lines: Sequence[str], comment: str | None = None) -> list[int]:

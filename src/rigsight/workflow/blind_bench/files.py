@@ -117,8 +117,9 @@ class BenchFolder:
         path = self.key(trial)
         tables = [RecordTable.model_validate(table) for table in self.read_key(trial)["withheld"]]
         return [
-            read_listed_record(path, rig, number, table, file_inside(path, number, table))
+            record
             for number, table in enumerate(tables, 1)
+            for record in read_listed_record(path, rig, number, table, file_inside(path, number, table))
         ]
 
     def settle(self, design: Design, seed: int) -> None:

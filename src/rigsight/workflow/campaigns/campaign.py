@@ -16,7 +16,7 @@ from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.workflow.campaigns.campaign_file import (
     WHICH_RIG,
-    CampaignTable,
+    RecordTable,
     RigTable,
     locate,
     read_campaign_table,
@@ -142,10 +142,12 @@ def read_campaign(
             f'{path.name}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
         )
     files = [file_inside(path, number, record) for number, record in enumerate(table.records, 1)]
-    records = tuple(
-        read_listed_record(path, rig, number, record, file)
+    read = [
+        (record, stretch)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
-    )
+        for stretch in read_listed_record(path, rig, number, record, file)
+    ]
+    records = tuple(record for _, record in read)
     constants, differing = of_first_record(given, records)
     notes = [
         note
@@ -161,7 +163,7 @@ def read_campaign(
         modelled=given.modelled,
         constants=constants,
         parameters=given.parameters,
-        records=_with_distinct_names(table, records),
+        records=_with_distinct_names(read),
         notes=tuple(notes),
     )
 
@@ -238,12 +240,12 @@ def _other_amplitude(record: Record, rig: Rig) -> str:
     return f"Record '{record.name}': amplitude = {stated:g}, but {listed} to each side. Is one of them in another unit?"
 
 
-def _with_distinct_names(table: CampaignTable, records: tuple[Record, ...]) -> tuple[Record, ...]:
+def _with_distinct_names(read: Sequence[tuple[RecordTable, Record]]) -> tuple[Record, ...]:
     """Give every record a name of its own: results are keyed by it."""
-    taken = {record.name for record in table.records if record.name is not None}
+    taken = {asked.name for asked, _ in read if asked.name is not None}
     named: list[Record] = []
     used: set[str] = set()
-    for asked, record in zip(table.records, records, strict=True):
+    for asked, record in read:
         name, count = record.name, 1
         while name in used or (asked.name is None and name in taken):
             count += 1

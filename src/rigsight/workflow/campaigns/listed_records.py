@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from rigsight.errors import InputError, nearest, shown
-from rigsight.records import ColumnMapping, Record, read_record
-from rigsight.records.read_record import TIME
+from rigsight.records import ColumnMapping, Record
+from rigsight.records.read_record import TIME, read_stretches
 from rigsight.rigs import Rig
 from rigsight.workflow.campaigns.campaign_file import RecordTable
 from rigsight.workflow.campaigns.given_simulation import checked_numbers
@@ -69,8 +69,10 @@ def file_inside(path: Path, number: int, record: RecordTable) -> Path:
     return inside(path, f"record {number}: file", record.file)
 
 
-def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, file: Path) -> Record:
-    """Read a record as a file that lists it describes it.
+def read_listed_record(
+    path: Path, rig: Rig, number: int, record: RecordTable, file: Path
+) -> tuple[Record, ...]:
+    """Read a record as a file that lists it describes it, in stretches where its clock pauses.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ def read_listed_record(path: Path, rig: Rig, number: int, record: RecordTable, f
     constants = checked_numbers(key, "constants", rig, rig.constants, record.constants)
     _check_inputs(key, rig, record)
     try:
-        return read_record(
+        return read_stretches(
             file,
             rig.inputs,
             rig.outputs,

@@ -1,0 +1,129 @@
+"""Can the signals that were found in a file be used? What is missing, still, cut off, or called nearly like another is told."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, nearest
+from rigsight.records.channel_names import closeness
+from rigsight.records.column_mapping import Columns
+from rigsight.records.conditioning import LARGEST_NUMBER
+from rigsight.records.plausibility import clipping, is_constant
+
+_LISTED = 30
+"""Columns that a message lists."""
+
+
+class NamedSignal(Protocol):
+    """A signal that can be read: what a rig declares, seen from below."""
+
+    @property
+    def name(self) -> str:
+        """Name in equations and files."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+
+
+def check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: bool) -> None:
+    """Refuse inputs that are missing where the rig was driven, or where a column may well be one of them."""
+    names = [name for name in table.names if name not in table.labels.values()]
+    is_free = is_free and not all(name.isdecimal() for name in (*names, *table.labels.values()))
+    for signal in absent:
+        close = [name for name in names if closeness(name, signal) > 0.0]
+        hint = f" Is it '{close[0]}'?" if close else nearest(signal, names)
+        if not hint and is_free:
+            continue
+        raise InputError(
+            f"{path.name} has no column '{signal}' for signal '{signal}'.{hint} Its columns: {listed_columns(table)}. "
+            "Map it under columns; if it was constant and not recorded, give its value with the record: "
+            f"inputs = {{ {signal} = 0.0 }}."
+        )
+
+
+def alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]:
+    """Tell of a column that was not read although it is called nearly like an output that is missing: a slip of the pen."""
+    unread = [name for name in table.names if name not in table.labels.values()] if missing else []
+    return [
+        f"{path.name}: has no column '{signal}', so {signal} is taken as not recorded there.{hint} Map it under columns if it is."
+        for signal in missing
+        if (hint := nearest(signal, unread))
+    ]
+
+
+def listed_columns(table: Columns) -> str:
+    """Return how a file calls its columns, for a message."""
+    return ", ".join(f"'{name}'" for name in table.names[:_LISTED]) or "none"
+
+
+def refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
+    """Refuse numbers that are bytes of another type, or a lost sign of a decimal."""
+    for signal, samples in raw.items():
+        largest = float(np.max(np.abs(samples)))
+        if largest > LARGEST_NUMBER:
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': {signal} is as large as {largest:.3g}, which nobody measures "
+                f"(up to {LARGEST_NUMBER:g} is read). Check the column and its type."
+            )
+
+
+def moving(
+    path: Path,
+    raw: dict[str, NDArray[np.float64]],
+    table: Columns,
+    needed: Collection[str],
+    outputs: Sequence[NamedSignal],
+) -> tuple[dict[str, NDArray[np.float64]], list[str]]:
+    """Return the signals that can be used, with notes on those that cannot."""
+    constant = {signal for signal, samples in raw.items() if is_constant(samples)}
+    measured = [output.name for output in outputs if output.name in raw]
+    for signal in measured:
+        if signal in constant and (signal in needed or constant.issuperset(measured)):
+            raise InputError(
+                f"{path.name}, column '{table.labels[signal]}': the output {signal} never changes ({raw[signal][0]:g}). "
+                "Check sensor and column, or leave the record out."
+            )
+    still = sorted(constant.intersection(measured))
+    notes = [f"{path.name}: {signal} never changes and is taken as not measured." for signal in still]
+    return {signal: samples for signal, samples in raw.items() if signal not in still}, notes
+
+
+def rest_notes(
+    path: Path,
+    raw: Mapping[str, NDArray[np.float64]],
+    table: Columns,
+    recorded: Sequence[NamedSignal],
+    must_move: Collection[str],
+) -> list[str]:
+    """Tell of recorded inputs none of which changes: the rig moves freely, or a column is the wrong one."""
+    held = [signal.name for signal in recorded if signal.name in raw]
+    if not held or not all(is_constant(raw[signal]) for signal in held):
+        return []
+    values = ", ".join(f"{signal} = {raw[signal][0]:g}" for signal in held)
+    listed = ", ".join(f"'{table.labels[signal]}'" for signal in held)
+    where = f"{path.name}, column{'s' if len(held) > 1 else ''} {listed}"
+    if set(held) & set(must_move):
+        raise InputError(
+            f"{where}: no input changes ({values}), so nothing is excited and nothing can be identified. Check the column. "
+            'Of a rig that moves freely write kind = "operation" without an amplitude; a record that is only scored has '
+            'role = "validation".'
+        )
+    return [
+        f"{where}: no input changes ({values}); taken as a free motion. Check the column if the rig was driven."
+    ]
+
+
+def clipping_notes(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> list[str]:
+    """Tell of signals that are cut off at their extremes."""
+    return [
+        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples stand exactly at "
+        f"its extreme {level:g}. Check range and saturation of sensor, amplifier or drive."
+        for signal, samples in raw.items()
+        for level, count in clipping(samples)
+    ]

@@ -1,0 +1,125 @@
+"""Where does the clock of a record pause, and which stretches between its pauses are records by themselves?
+
+A motion across a pause is unknown, so that nothing is put in its place: each stretch begins in a state of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records.column_mapping import Columns
+from rigsight.records.conditioning import (
+    COARSEST_STAMPS,
+    FEWEST_SAMPLES,
+    LARGEST_ROUNDING,
+    missing_behind,
+    pauses,
+    resolution,
+)
+
+_FEWEST_KEPT = 0.5
+"""Share of the samples that must lie in stretches that are long enough: with fewer the file is no record of anything."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """A table cut where its clock pauses.
+
+    Attributes
+    ----------
+    parts
+        The tables of the stretches; the one table where there is no pause.
+    notes
+        Where it was cut, and what was left out.
+    """
+
+    parts: tuple[Columns, ...]
+    notes: tuple[str, ...] = ()
+
+
+def stretches(file: str, time: str, table: Columns) -> Stretches:
+    """Return the stretches of a table between the pauses of its clock.
+
+    Parameters
+    ----------
+    file
+        Name for messages.
+    time
+        Name of the time in the table; signals with axes of their own are left as they are.
+    table
+        What was read.
+
+    Raises
+    ------
+    InputError
+        If there is a pause, and too little lies in stretches that are long enough.
+    """
+    stamps = table.values.get(time)
+    if stamps is None or stamps.size < FEWEST_SAMPLES:
+        return Stretches((table,))
+    ends = pauses(stamps)
+    if ends.size == 0 or _may_be_rounding(stamps):
+        return Stretches((table,))
+    edges = [0, *(int(end) + 1 for end in ends), stamps.size]
+    spans = [(start, stop) for start, stop in pairwise(edges) if stop - start >= FEWEST_SAMPLES]
+    where = _where(stamps, table, ends)
+    kept = sum(stop - start for start, stop in spans)
+    if kept < _FEWEST_KEPT * stamps.size:
+        raise InputError(
+            f"{file}: samples are missing {where}. Only {kept} of {stamps.size} samples lie in stretches of {FEWEST_SAMPLES} or "
+            "more. Record without dropouts, or fill them before reading if you know what was there."
+        )
+    dropped = stamps.size - kept
+    left = f" {dropped} samples in shorter stretches were left out." if dropped else ""
+    note = (
+        f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with "
+        f"initial states of its own; nothing was put between.{left}"
+    )
+    return Stretches(tuple(_part(table, start, stop) for start, stop in spans), (note,))
+
+
+def _may_be_rounding(stamps: NDArray[np.float64]) -> bool:
+    """Return True if an even clock, rounded to the digits that are printed, would jump like this now and then."""
+    digits = resolution(stamps)
+    if np.max(digits) <= COARSEST_STAMPS * float(np.median(np.diff(stamps))):
+        return False
+    index = np.arange(stamps.size, dtype=np.float64)
+    deviation = np.abs(stamps - np.polyval(np.polyfit(index, stamps, 1), index))
+    return bool(np.all(deviation <= LARGEST_ROUNDING * digits))
+
+
+def one_stretch(file: str, found: Stretches) -> Columns:
+    """Return the table of a record that is to be one.
+
+    Raises
+    ------
+    InputError
+        If its clock pauses.
+    """
+    if len(found.parts) == 1 and not found.notes:
+        return found.parts[0]
+    told = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]
+    raise InputError(
+        f"{file}: {told}. Split it there into files of their own; a campaign reads each stretch as a record by itself."
+    )
+
+
+def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) -> str:
+    """Return where the first pause lies and how many there are."""
+    first = int(ends[0])
+    others = "" if ends.size == 1 else f", and at {ends.size - 1} more place{'s' if ends.size > 2 else ''}"
+    return (
+        f"between {table.row}s {table.lines[first]} and {table.lines[first + 1]} ({missing_behind(stamps, first)}; the time "
+        f"jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}){others}"
+    )
+
+
+def _part(table: Columns, start: int, stop: int) -> Columns:
+    values: Mapping[str, NDArray[np.float64]] = {name: v[start:stop] for name, v in table.values.items()}
+    return replace(table, values=values, lines=table.lines[start:stop])

@@ -1,0 +1,95 @@
+"""A clock that pauses: stretches are records of their own, nothing is put between, and what cannot be parted is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.records import read_record
+from rigsight.records.read_record import read_stretches
+from rigsight.workflow.campaigns.campaign import read_campaign
+
+from .test_read_record import INPUTS, OUTPUTS
+
+WriteCsv = Callable[..., Path]
+T = 0.01 * np.arange(400)
+HEAD = 'title = "paused"\n[rig]\nmodel = "axis"\n'
+
+
+def table(*pauses: tuple[int, float], kept: np.ndarray | None = None) -> np.ndarray:
+    """Return rows whose clock stands still for some seconds behind samples, or of which some were lost."""
+    shift = np.zeros(T.size)
+    for sample, seconds in pauses:
+        shift[sample + 1 :] += seconds
+    rows = np.column_stack([T + shift, np.sin(9.0 * T), np.cos(9.0 * T), np.sin(4.0 * T)])
+    return rows if kept is None else rows[kept]
+
+
+def read(write_csv: WriteCsv, rows: np.ndarray):
+    return read_stretches(write_csv(rows=rows), INPUTS, OUTPUTS)
+
+
+def test_stretches_keep_their_times_and_samples(write_csv: WriteCsv) -> None:
+    rows = table((149, 3.0), (299, 0.01))
+    found = read(write_csv, rows)
+    assert [record.n_samples for record in found] == [150, 150, 100]
+    assert [record.t0 for record in found] == pytest.approx([0.0, 4.5, 6.01])
+    assert {record.dt for record in found} == {0.01}
+    np.testing.assert_allclose(np.concatenate([record["psi"] for record in found]), rows[:, 2], atol=1e-8)
+    assert [record.name.partition(" ")[2] for record in found] == ["part 1", "part 2", "part 3"]
+    (note,) = found[0].notes
+    assert "between lines 151 and 152 (300; the time jumps from 1.49 to 4.5), and at 1 more place" in note
+    assert "3 records, each with initial states of its own; nothing was put between" in note
+    assert found[1].notes == ()
+
+
+def test_a_stretch_that_is_too_short_is_left_out_and_said(write_csv: WriteCsv) -> None:
+    found = read(write_csv, table((9, 1.0), (299, 1.0)))
+    assert [record.n_samples for record in found] == [290, 100]
+    assert "10 samples in shorter stretches were left out" in found[0].notes[0]
+
+
+def test_lost_samples_part_a_record_like_a_pause(write_csv: WriteCsv) -> None:
+    found = read(write_csv, table(kept=np.delete(np.arange(400), [200, 201])))
+    assert [record.n_samples for record in found] == [200, 198]
+    assert "(2; the time jumps" in found[0].notes[0]
+
+
+def test_a_single_record_is_refused_with_what_a_campaign_does(write_csv: WriteCsv) -> None:
+    with pytest.raises(InputError, match=r"between lines 151 and 152.*a campaign reads each stretch"):
+        read_record(write_csv(rows=table((149, 3.0))), INPUTS, OUTPUTS)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (
+            table(kept=np.flatnonzero(np.arange(400) % 25 > 1)),
+            r"Only 0 of 368 samples lie in stretches of 50",
+        ),
+        # Every other sample lost now and then: no pause but a clock that cannot be trusted.
+        (table(kept=np.delete(np.arange(400), np.arange(3, 400, 9))), "not equally spaced"),
+        # Two decimals of a sample time of 10.4 ms: what seems to jump is rounding.
+        (np.column_stack([np.round(0.0101 * np.arange(400), 2), table()[:, 1:]]), "1 samples are missing"),
+    ],
+    ids=["dropouts everywhere", "jitter", "coarse stamps"],
+)
+def test_what_cannot_be_parted_is_told(write_csv: WriteCsv, rows: np.ndarray, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read(write_csv, rows)
+
+
+def test_a_campaign_holds_the_stretches(tmp_path: Path) -> None:
+    rows = table((199, 2.0))[:, :3]
+    for name in ("run", "other"):
+        np.savetxt(tmp_path / f"{name}.csv", rows, "%.9g", ",", header="t,u,x", comments="")
+    records = '[[records]]\nfile = "run.csv"\n[[records]]\nfile = "other.csv"\nname = "run part 1"\nrole = "validation"\n'
+    (tmp_path / "campaign.toml").write_text(HEAD + records, encoding="utf-8")
+    campaign = read_campaign(tmp_path)
+    assert [r.n_samples for r in campaign.records] == [200] * 4
+    assert len({r.name for r in campaign.records}) == 4
+    assert [r.role for r in campaign.records] == ["estimation"] * 2 + ["validation"] * 2
