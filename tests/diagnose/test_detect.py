@@ -226,3 +226,13 @@ def test_of_a_lower_bound_nobody_knows_the_upper_limit() -> None:
     floor = floor_of(axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size)))
     assert floor.lower_bound
     assert floor.interval == (floor.std, np.inf)
+
+
+def test_what_swings_by_itself_is_no_noise() -> None:
+    """Two modes that beat: no few exponentials follow a chaotic swing either, and nothing drives it."""
+    rng = np.random.default_rng(8)
+    t = DT * np.arange(3000)
+    x = np.sin(7.0 * t + 2.0 * np.sin(3.1 * t) + np.cumsum(0.05 * rng.standard_normal(t.size)))
+    floor = floor_of(axis_record(np.zeros(t.size), x + SIGMA * rng.standard_normal(t.size)))
+    assert floor.std < 0.1
+    assert floor.lower_bound

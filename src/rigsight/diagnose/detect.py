@@ -174,6 +174,8 @@ def _quiet_stretches(
     """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
     samples = inputs_of(record, sources)
     span = np.ptp(samples, axis=0)
+    if not np.any(span):
+        return []  # what swings by itself is no noise, however little drives it
     # A measured input is never quite still: its own noise is no motion, as long as it is small.
     noise = np.array(
         [min(roughness(column), _QUIET_NOISE * s) for column, s in zip(samples.T, span, strict=True)]
