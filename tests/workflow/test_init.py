@@ -79,6 +79,41 @@ def test_the_kind_of_rig_is_guessed_from_the_channels(tmp_path: Path) -> None:
         assert run_init(tmp_path / folder).model == folder
 
 
+@pytest.mark.parametrize(
+    ("columns", "model"),
+    [
+        (("t", "u", "y"), "axis"),
+        (("time", "current", "y [mm]"), "axis"),
+        (("Zeit", "Spannung", "Messwert"), "axis"),
+        (("t", "u", "angle"), "axis"),
+        (("t", "u", "yaw angle"), "running_gear"),
+        (("t", "current", "lateral displacement"), "running_gear"),
+        (("t", "u", "psi", "y"), "running_gear"),
+    ],
+)
+def test_a_running_gear_is_proposed_only_where_a_channel_speaks_of_one(
+    tmp_path: Path, columns: tuple[str, ...], model: str
+) -> None:
+    write_text(tmp_path / "a.csv", dict(zip(columns, (T, SWEEP, ANSWER, ANSWER), strict=False)), {})
+    assert run_init(tmp_path).model == model
+
+
+def test_the_last_channel_is_taken_for_the_last_signal_and_asked_about(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "y": ANSWER}, {})
+    draft = run_init(tmp_path)
+    text = draft.path.read_text("utf-8")
+    assert 'x = "y"  # taken to be in m; check; the only channel left: check' in text
+    assert "init --model" in text
+    assert "rigsight rigs NAME" in text
+    np.testing.assert_array_equal(read_campaign(tmp_path).records[0]["x"], ANSWER)
+
+
+def test_a_last_channel_of_another_unit_is_not_taken(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "Oil [degC]": ANSWER}, {})
+    run_init(tmp_path, model="axis")
+    assert 'x = "FILL IN"' in (tmp_path / "campaign.toml").read_text("utf-8")
+
+
 def test_the_only_channel_of_a_unit_is_taken_whatever_it_is_called(tmp_path: Path) -> None:
     write_text(
         tmp_path / "a.csv", {"t": T, "Kraft [N]": SWEEP, "Abstand [mm]": 1e3 * ANSWER, "Temp [°C]": T}, {}

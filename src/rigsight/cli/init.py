@@ -55,7 +55,8 @@ def init(
     typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
     if model is None:
         typer.echo(
-            f"The rig is a guess from the channels; remove the file and say --model for another ({', '.join(draft.others)})."
+            f"The rig is a guess from the channels; remove the file and say --model for another ({', '.join(draft.others)}), or "
+            "--rigs FILE --model NAME for a rig file of your own (rigsight rigs NAME prints one to begin with)."
         )
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")

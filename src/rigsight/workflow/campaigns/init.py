@@ -196,7 +196,8 @@ def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str])
     remark = f"# {rig.summary}"
     if others:
         remark = (
-            f"# guessed from the channels: {rig.summary} Others: {', '.join(others)}, or a file of your own"
+            f"# guessed from the channels: {rig.summary} Others: {', '.join(others)} (init --model); or a rig file of your own: "
+            'file = "..." instead (rigsight rigs NAME prints one to begin with)'
         )
     if file is None:
         return ["[rig]", f'model = "{rig.name}"  {remark}']

@@ -150,7 +150,11 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
     needed = _needed(guess)
     left = _left(guess, channels)
     for one in (guess.time, *guess.signals):
-        if one.channel is not None:
+        if one.channel is not None and one.is_alone:
+            (line,) = _column(one)
+            mark = "; " if "  # " in line else "  # "
+            lines.append(f"{line}{mark}the only channel left: check")
+        elif one.channel is not None:
             lines += _column(one)
         elif one.candidates:
             listed = ", ".join(quoted(name) for name in one.candidates[:_LISTED])

@@ -31,6 +31,8 @@ class Guess:
         Whether the file itself states the unit, in a place made for it.
     candidates
         Names of the channels that fit equally well, where several do.
+    is_alone
+        Whether nothing but that no other channel is left speaks for it.
     """
 
     signal: str
@@ -39,6 +41,7 @@ class Guess:
     unit: str | None = None
     is_stated: bool = False
     candidates: tuple[str, ...] = ()
+    is_alone: bool = False
 
     @property
     def is_clear(self) -> bool:
@@ -84,13 +87,37 @@ def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) 
     return replace(found, signals=_completed_by_unit(found, channels, is_text))
 
 
-def _unlikely(guess: FileGuess) -> tuple[int, bool, float, int]:
+def _unlikely(guess: FileGuess) -> tuple[int, bool, bool, float, int]:
     """Return what decides between rigs: one motion before several, then the better and the more telling names."""
-    return guess.open_questions, not guess.rig.has_one_motion, -guess.score, -len(guess.signals)
+    return (
+        guess.open_questions,
+        not guess.rig.has_one_motion,
+        not _is_spoken_of(guess),
+        -guess.score,
+        -len(guess.signals),
+    )
+
+
+def _is_spoken_of(guess: FileGuess) -> bool:
+    """Return True unless nothing but letters that any signal may have speaks of a rig whose motion drives more: u and y.
+
+    The running gear is one, and most files whose output is called y are of something else.
+    """
+    if guess.rig.follower is None:
+        return True
+    needed = guess.rig.required_outputs
+    outputs = guess.signals[len(guess.rig.inputs) :]
+    return any(
+        one.channel is not None and (one.signal in needed or len(split_unit(one.channel.short_name)[0]) > 1)
+        for one in outputs
+    )
 
 
 def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: bool) -> tuple[Guess, ...]:
-    """Return the guesses; a signal without any takes the one channel left that has its unit, in whatever language it is named."""
+    """Return the guesses; a signal without any takes the one channel left that has its unit, in whatever language it is named.
+
+    An output that is the only signal open takes the only channel left without a unit as well; an input may be none of them.
+    """
     guesses = list(found.signals)
     for i, guess in enumerate(guesses):
         if guess.is_clear or guess.candidates:
@@ -102,6 +129,14 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
         rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
         if len(fitting) == len(rivals) == 1:
             guesses[i] = _of_channel(guess, fitting[0], is_text)
+    needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
+    lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
+    left = [c for c in channels if c not in [found.time.channel, *(own.channel for own in guesses)]]
+    if len(lacking) == len(left) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
+        own, alone = guesses[lacking[0]], left[0]
+        unit = _unit_of(alone)
+        if not own.candidates and (unit is None or not has_si(own.si) or is_a(unit, own.si)):
+            guesses[lacking[0]] = replace(_of_channel(own, alone, is_text), is_alone=True)
     return tuple(guesses)
 
 
