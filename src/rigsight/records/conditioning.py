@@ -64,6 +64,22 @@ class TimeBase:
         return np.asarray(CubicSpline(self.stamps, samples)(grid), dtype=np.float64)
 
 
+def check_long_enough(file: str, n_samples: int) -> None:
+    """Raise InputError for a file with too few samples for a record.
+
+    Parameters
+    ----------
+    file
+        Name for messages.
+    n_samples
+        What it has.
+    """
+    if n_samples < FEWEST_SAMPLES:
+        raise InputError(
+            f"{file} has {n_samples} samples; at least {FEWEST_SAMPLES} are needed for a record."
+        )
+
+
 def time_base(
     stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str = "line"
 ) -> TimeBase:
@@ -85,10 +101,7 @@ def time_base(
     InputError
         Naming the line: too few samples, time not increasing, duplicate stamps, gaps, or jitter above 1 %.
     """
-    if stamps.size < FEWEST_SAMPLES:
-        raise InputError(
-            f"{file} has {stamps.size} samples; at least {FEWEST_SAMPLES} are needed for a record."
-        )
+    check_long_enough(file, stamps.size)
     span = abs(stamps[-1] - stamps[0])
     if not (span == 0.0 or span >= SHORTEST_TIME) or not np.max(np.abs(stamps)) <= LARGEST_NUMBER:
         raise InputError(

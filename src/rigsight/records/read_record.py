@@ -13,7 +13,7 @@ from rigsight.errors import InputError
 from rigsight.records.channel_table import read_channels
 from rigsight.records.channel_units import si_mapping
 from rigsight.records.column_mapping import ColumnMapping, Columns
-from rigsight.records.conditioning import TimeBase, time_base
+from rigsight.records.conditioning import TimeBase, check_long_enough, time_base
 from rigsight.records.formats.channel_file import file_format
 from rigsight.records.formats.read_csv import read_csv
 from rigsight.records.record import Hold, Kind, Record, Role
@@ -177,6 +177,8 @@ def read_stretches(
         )
         unit_notes += notes
     raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
+    # A few samples at rest are too few before they are a rest.
+    check_long_enough(path.name, max((values.size for values in raw.values()), default=0))
     refuse_what_nobody_measures(path, raw, table)
     found: list[str] = []
     if require_outputs:

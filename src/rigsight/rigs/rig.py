@@ -310,6 +310,11 @@ class Rig:
         """Return the names of the parameters that do nothing but push a joint with a constant force.
 
         The rest position of its spring is one of them, unless something else goes by it.
+
+        Parameters
+        ----------
+        joint
+            One of the rig's.
         """
         mechanism = self.mechanism
         moving = {c.symbol for c in mechanism.coordinates} | {c.rate for c in mechanism.coordinates}
