@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from rigsight.effects import CATALOGUE, Effect, effect_named, kind_of, placed
 from rigsight.excitation import linear_sweep
 from rigsight.records import Hold, Record
-from rigsight.rigs import RIGS
+from rigsight.rigs import RIGS, Rig, read_rig_file
 from rigsight.simulate import Structure, compose, record_input, simulate
 from rigsight.simulate.kinks import freeze
 from rigsight.simulate.model import Model
@@ -36,7 +37,14 @@ RIG_VALUES: Mapping[str, Mapping[str, float]] = {
     },
     "quarter_car": {"m_b": 300.0, "m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 100.0},
     "cart_pendulum": {"g": 9.81, "m_c": 0.8, "m_p": 0.3, "s": 0.08, "I_p": 0.03, "k_u": 2.0, "d_c": 3.0, "d_p": 0.01},
+    "six_joint_arm": {
+        **{f"m_{i}": 2.0 / i for i in range(1, 7)}, **{f"c_{i}": 0.13 - 0.015 * i for i in range(1, 7)},
+        **{f"I_{i}": 0.012 / i**2 for i in range(1, 7)}, **{f"d_{i}": 0.3 / i for i in range(1, 7)},
+        "g": 9.81, "l_1": 0.27, "l_2": 0.24, "l_3": 0.21, "l_4": 0.18, "l_5": 0.15,
+    },
 }  # fmt: skip
+FROM_FILES = Path(__file__).parents[1] / "rigs" / "files"
+"""Rigs that are not built in."""
 EFFECT_VALUES: Mapping[str, Mapping[str, float]] = {
     "bouc_wen_hysteresis": {"A": 1.0, "a": 0.48, "beta": 736.0, "gamma": -716.0, "n": 1.0},
     "iwan_hysteresis": {"a": 0.3, "x_s": 0.01, "q": -0.4},
@@ -152,6 +160,10 @@ PLANS: dict[str, _Plan] = {effect.name: _Plan("running_gear", (effect.name,)) fo
     "an arm held constant": _Plan("two_link_arm", ("quadratic_damping@elbow",), values={"c_2": 0.05}, hold="zoh"),
     "a prescribed road": _Plan("quarter_car", ("cubic_stiffness@suspension",), values={"k_3": 4e6}, amplitude=0.02),
     "a coupled pendulum": _Plan("cart_pendulum", amplitude=3.0),
+    "an arm of six joints": _Plan("six_joint_arm", amplitude=0.1),
+    "friction in an arm of six joints": _Plan(
+        "six_joint_arm", ("stribeck_friction@joint_3",), values={"T_c": 0.02, "T_s": 0.04, "w_s": 0.1}, hold="zoh", amplitude=0.1
+    ),
 }  # fmt: skip
 """Every effect of the catalogue on the running gear, and what the rigs, places, holds and starts add."""
 
@@ -180,9 +192,15 @@ def fed(structure: Structure, record: Record) -> tuple[NDArray[np.float64], ...]
 
 
 @cache
+def rig_named(name: str) -> Rig:
+    """A rig that is built in, or from a file."""
+    return RIGS[name] if name in RIGS else read_rig_file(FROM_FILES / f"{name}.toml")
+
+
+@cache
 def made_case(name: str) -> Case:
     plan = PLANS[name]
-    structure = compose(RIGS[plan.rig], [_at_its_place(effect) for effect in plan.effects])
+    structure = compose(rig_named(plan.rig), [_at_its_place(effect) for effect in plan.effects])
     known: dict[str, float] = dict(RIG_VALUES[plan.rig])
     for effect in structure.effects:
         own = EFFECT_VALUES[kind_of(effect.name)]

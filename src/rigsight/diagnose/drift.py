@@ -32,12 +32,17 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
     if not motion.coordinates:
         return False
     states = [equation.symbol for equation in structure.equations if equation.symbol not in motion.velocities]
-    rates = [e.rate for e in structure.equations if e.symbol not in motion.coordinates]
-    slopes = sp.Matrix([*rates, *structure.outputs]).jacobian(states)
+    rates = [*structure.out_of_balance, *(e.rate for e in structure.equations[2 * len(motion.coordinates) :])]
+    still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
+    shown = list(structure.outputs)
+    if structure.elimination is not None:
+        # Forces without what the rates bring about are short; the slopes of the others are not.
+        zero = dict.fromkeys(still, sp.S.Zero)
+        rates, shown = ([e.xreplace(zero) for e in own] for own in (rates, shown))
+    slopes = sp.Matrix([*rates, *shown]).jacobian(states)
     symbols = sorted(slopes.free_symbols, key=str)
     function = sp.lambdify(symbols, slopes, [{"positive_part": lambda x: np.maximum(x, 0.0)}, "numpy"])
     rng = np.random.default_rng(0)
-    still = {*motion.velocities, TIME, *(s for i in range(len(rig.inputs)) for s in input_symbols(i)[1:])}
     defaults = {p.name: p.default for p in (*rig.constants, *rig.parameters) if p.default is not None}
     values = {f"parameter {name}": value for name, value in {**defaults, **known}.items()}
     for _ in range(_DRAWS):
@@ -49,10 +54,10 @@ def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
             matrix = np.asarray(function(*numbers), dtype=np.float64)
         if not np.all(np.isfinite(matrix)):
             continue
-        balance, shown = matrix[: len(rates)], matrix[len(rates) :]
+        balance, seen = matrix[: len(rates)], matrix[len(rates) :]
         size = np.linalg.norm(balance, axis=0)
         size[size == 0.0] = 1.0
         free = null_space(balance / size, rcond=_SINGULAR)
-        if not np.any(np.abs((shown / size) @ free) > _SINGULAR * np.max(np.abs(shown), initial=1.0)):
+        if not np.any(np.abs((seen / size) @ free) > _SINGULAR * np.max(np.abs(seen), initial=1.0)):
             return False
     return True

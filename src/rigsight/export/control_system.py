@@ -71,5 +71,9 @@ def _unpacked_input(exported: Exported) -> str:
 
 def _array(exported: Exported, expressions: list[sp.Expr]) -> str:
     targets = [f"result{i}" for i in range(len(expressions))]
-    lines = [*unpacked_states(exported), *PYTHON.statements(targets, expressions, code_names(exported))]
+    steps = exported.structure.steps
+    lines = [
+        *unpacked_states(exported),
+        *PYTHON.statements(targets, expressions, code_names(exported), steps),
+    ]
     return indented([*lines, f"return np.array([{', '.join(targets)}])"])

@@ -273,7 +273,11 @@ class _Names:
         name = re.sub(r"[^0-9A-Za-z_]+", "_", wished).strip("_") or "value"
         if name[0].isdigit():
             name = f"n_{name}"
-        while name in self._used or name in RESERVED or re.fullmatch(r"(part|constant_)\d+", name):
+        while (
+            name in self._used
+            or name in RESERVED
+            or re.fullmatch(r"(part|constant_)\d+|part(_[a-z]+)+(_\d+)+", name)
+        ):
             name += "_"
         self._used.add(name)
         return Quantity(name, source, harmless(unit), harmless(description))

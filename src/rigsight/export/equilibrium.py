@@ -85,11 +85,11 @@ def _is_memory(structure: Structure, index: int) -> bool:
 
 
 def _residual(structure: Structure, index: int, start: dict[int, sp.Expr]) -> sp.Expr:
-    """Return what vanishes at rest: the acceleration of a coordinate, the rate of a state, or what a memory has of the way."""
+    """Return what vanishes at rest: what a coordinate lacks of balance, the rate of a state, or what a memory has of the way."""
     motion = structure.tree.motion
     n = len(motion.coordinates)
     if index < n:
-        return structure.equations[n + index].rate.xreplace(_still(structure))
+        return structure.out_of_balance[index].xreplace(_still(structure))
     equation = structure.equations[index]
     if not _is_memory(structure, index):
         return equation.rate.xreplace(_still(structure))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import sympy as sp
@@ -15,6 +15,7 @@ from rigsight.simulate import parameter_vector, rest_state
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
+from rigsight.simulate.straight_line import straight_line
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 OSCILLATION = 0.03
@@ -44,13 +45,8 @@ def internal_step(model: Model) -> float:
         return LONGEST
     p = parameter_vector(structure, values)
     frozen = freeze(structure)
-    bound = dict(zip(structure.parameter_symbols, p, strict=True))
+    rates = _rates(structure, frozen, p)
     inputs = _input_symbols(structure)
-    rates = sp.lambdify(
-        [inputs, TIME, structure.states, frozen.modes],
-        [rate.xreplace(bound) for rate in frozen.rates],
-        modules=[{"absolute": abs}, "math"],
-    )
     rest, still = _rest(structure, p), np.zeros(len(inputs))
     step = LONGEST
     for modes in _sides(frozen):
@@ -65,14 +61,38 @@ def internal_step(model: Model) -> float:
     return _rounded(step if is_linear(frozen, structure) else CAUTION * step)
 
 
+def _rates(
+    structure: Structure, frozen: FrozenStructure, p: NDArray[np.float64]
+) -> Callable[..., list[float]]:
+    """Return the rates as a function of inputs, time, states and modes."""
+    inputs, modules = _input_symbols(structure), [{"absolute": abs}, "math"]
+    if not frozen.steps:
+        bound = dict(zip(structure.parameter_symbols, p, strict=True))
+        rates: Callable[..., list[float]] = sp.lambdify(
+            [inputs, TIME, structure.states, frozen.modes],
+            [rate.xreplace(bound) for rate in frozen.rates],
+            modules=modules,
+        )
+        return rates
+    arguments = [*inputs, TIME, *structure.states, *frozen.modes, *structure.parameter_symbols]
+    in_parts = straight_line(frozen.rates, frozen.steps).function(arguments, modules)
+    return lambda u, time, x, modes: in_parts(*u, time, *x, *modes, *p)
+
+
 def is_linear(frozen: FrozenStructure, structure: Structure) -> bool:
     """Return True if the rates have neither kinks nor products of states and inputs."""
     moving = {*structure.states, *_input_symbols(structure)}
+    equations = list(frozen.rates)
+    if structure.elimination is not None:
+        motion = structure.tree.motion
+        if any(structure.tree.flattened(mass).free_symbols & moving for mass in motion.mass):
+            return False
+        equations += map(structure.tree.flattened, motion.forces)
     return not frozen.modes and all(
-        sp.diff(rate, a, b) == 0
-        for rate in frozen.rates
-        for a in moving & rate.free_symbols
-        for b in moving & rate.free_symbols
+        sp.diff(equation, a, b) == 0
+        for equation in equations
+        for a in moving & equation.free_symbols
+        for b in moving & equation.free_symbols
     )
 
 

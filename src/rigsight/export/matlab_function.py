@@ -249,9 +249,14 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
         ),
         "STEP": repr(exported.step),
         "MIN_STEPS": min_steps(exported),
-        "RATES": _body("r", equations.rates, {**names, **modes}),
+        "RATES": _body("r", equations.rates, {**names, **modes}, equations.steps),
         "SWITCHES": _body("g", equations.switches, {**names, **modes}),
-        "OUTPUTS": _body("y", equations.outputs, {**names, friction_sign(exported): "friction_sign"}),
+        "OUTPUTS": _body(
+            "y",
+            equations.outputs,
+            {**names, friction_sign(exported): "friction_sign"},
+            equations.shown_steps,
+        ),
         "PIECES": _pieces(exported, inputs),
         "WITHOUT_MODES": "" if frozen.modes else "  m.x = x_new;\n  return\n",
         **friction,
@@ -307,9 +312,14 @@ def _friction(exported: Exported) -> dict[str, str]:
     return {key: text.format(**own) for key, text in texts.items()}
 
 
-def _body(target: str, expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
+def _body(
+    target: str,
+    expressions: Sequence[sp.Expr],
+    names: Mapping[sp.Symbol, str],
+    steps: Mapping[sp.Symbol, sp.Expr] | None = None,
+) -> str:
     targets = [f"{target}({i + 1})" for i in range(len(expressions))]
-    return "\n".join(MATLAB.statements(targets, expressions, names))
+    return "\n".join(MATLAB.statements(targets, expressions, names, steps or {}))
 
 
 def _pieces(exported: Exported, inputs: list[str]) -> str:

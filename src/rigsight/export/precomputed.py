@@ -22,12 +22,16 @@ class Equations:
         the friction's sign, or its multiplier while it sticks.
     constants
         Symbol -> the expression of parameters that it stands for.
+    steps, shown_steps
+        What is computed before the rates, and before the outputs, as `Structure.steps`.
     """
 
     rates: tuple[sp.Expr, ...]
     switches: tuple[sp.Expr, ...]
     outputs: tuple[sp.Expr, ...]
     constants: dict[sp.Symbol, sp.Expr]
+    steps: dict[sp.Symbol, sp.Expr]
+    shown_steps: dict[sp.Symbol, sp.Expr]
 
 
 def equations_of(exported: Exported) -> Equations:
@@ -54,7 +58,10 @@ def equations_of(exported: Exported) -> Equations:
     shown = tuple(output.xreplace(signs) for output in exported.structure.computed_outputs)
     groups = (exported.frozen.rates, exported.frozen.switches, shown)
     rates, switches, outputs = (tuple(map(walk, group)) for group in groups)
-    return Equations(rates, switches, outputs, {symbol: expression for expression, symbol in found.items()})
+    steps = {symbol: walk(step) for symbol, step in exported.frozen.steps.items()}
+    shown_steps = {symbol: walk(step.xreplace(signs)) for symbol, step in exported.structure.steps.items()}
+    constants = {symbol: expression for expression, symbol in found.items()}
+    return Equations(rates, switches, outputs, constants, steps, shown_steps)
 
 
 def _costly(expression: sp.Expr) -> bool:

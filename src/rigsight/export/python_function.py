@@ -143,10 +143,13 @@ def python_function(exported: Exported, source: str) -> str:
                 ),
             ]
         ),
-        "RATES": _returned(unpack, list(equations.rates), every),
+        "RATES": _returned(unpack, list(equations.rates), every, equations.steps),
         "SWITCHES": _returned(unpack, list(equations.switches), every),
         "OUTPUTS": _returned(
-            unpack, list(equations.outputs), {**names, friction_sign(exported): "friction_sign"}
+            unpack,
+            list(equations.outputs),
+            {**names, friction_sign(exported): "friction_sign"},
+            equations.shown_steps,
         ),
         "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **_slopes(exported)}),
         "LIMITS": sequence(limits),
@@ -194,9 +197,14 @@ def sequence(items: list[str]) -> str:
     return ", ".join(items) + ("," if len(items) == 1 else "")
 
 
-def _returned(unpack: list[str], expressions: list[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
+def _returned(
+    unpack: list[str],
+    expressions: list[sp.Expr],
+    names: Mapping[sp.Symbol, str],
+    steps: Mapping[sp.Symbol, sp.Expr] | None = None,
+) -> str:
     targets = [f"result{i}" for i in range(len(expressions))]
-    lines = PYTHON.statements(targets, expressions, names)
+    lines = PYTHON.statements(targets, expressions, names, steps or {})
     return indented([*unpack, *lines, f"return [{', '.join(targets)}]"], 2)
 
 

@@ -150,7 +150,8 @@ def unsaid(content: Exported) -> dict[str, str]:
         if len(content.frictions) > 1:
             found[STICKING_TOGETHER] = "' and '".join(dry) or structure.rig.name
     curvatures = {input_symbols(i)[2] for i in range(len(content.sources))}
-    if any(rate.free_symbols & curvatures for rate in content.frozen.rates):
+    rates = (*content.frozen.rates, *content.frozen.steps.values())
+    if any(rate.free_symbols & curvatures for rate in rates):
         found[ACCELERATION] = structure.rig.name
     for effect in structure.effects:
         if effect.delay is not None:

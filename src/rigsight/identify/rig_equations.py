@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from rigsight.records.record import Record
 from rigsight.rigs import Joint, Rig
 from rigsight.simulate import compose, parameter_vector, record_input, record_values
+from rigsight.simulate.chain_rule import slopes_of
 from rigsight.simulate.equation_tree import Output
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.signal_path import bound_to
+from rigsight.simulate.straight_line import StraightLine, of_parts, straight_line
 from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
@@ -208,16 +210,63 @@ class RigEquations:
         return self._bound([*momenta, *states]), self._bound([*forces, *rates])
 
     def _function(self, expressions: list[sp.Expr], *further: sp.Symbol) -> Any:
-        return sp.lambdify([*self.arguments, *further], expressions, modules=[FUNCTIONS, "numpy"], cse=True)
+        arguments, modules = [*self.arguments, *further], [FUNCTIONS, "numpy"]
+        if self.structure.elimination is not None:
+            return straight_line(expressions, self.structure.steps).function(arguments, modules)
+        return sp.lambdify(arguments, expressions, modules=modules, cse=True)
+
+    @property
+    def mass_entries(self) -> list[sp.Expr]:
+        """The mass matrix row by row; of a large one the symbols of `Structure.steps`."""
+        tree, elimination = self.structure.tree, self.structure.elimination
+        if elimination is not None:
+            return elimination.entries
+        return [tree.flattened(entry) for entry in tree.motion.mass]
+
+    @property
+    def forces(self) -> list[sp.Expr]:
+        """The generalized forces; of a large rig the symbols of `Structure.steps`."""
+        tree, elimination = self.structure.tree, self.structure.elimination
+        if elimination is not None:
+            return list(elimination.loads)
+        return [tree.flattened(force) for force in tree.motion.forces]
+
+    def slopes(
+        self,
+        expressions: Sequence[sp.Expr],
+        by: Sequence[sp.Symbol],
+        further: Sequence[sp.Symbol] = (),
+        beside: Sequence[sp.Expr] = (),
+    ) -> Any:
+        """Return a function for the derivatives of expressions, expression by expression.
+
+        Parameters
+        ----------
+        expressions
+            Of arguments, further symbols, and symbols of `Structure.steps`.
+        by
+            The symbols by which derivatives are taken.
+        further
+            Arguments behind `arguments`.
+        beside
+            Expressions whose values come before the derivatives.
+        """
+        elimination = self.structure.elimination
+        if elimination is None:
+            return self._function([*beside, *(sp.diff(e, s) for e in expressions for s in by)], *further)
+        line = straight_line([*beside, *expressions], elimination.begun(self.structure.steps))
+        changes = slopes_of(StraightLine(line.parts, line.results[len(beside) :]), by)
+        results = (*line.results[: len(beside)], *changes.results)
+        both = of_parts({**line.parts, **changes.parts}, results)
+        return both.function([*self.arguments, *further], [FUNCTIONS, "numpy"])
 
     @cached_property
     def _mass(self) -> Any:
-        return self._function([self.structure.tree.flattened(e) for e in self.structure.tree.motion.mass])
+        return self._function(self.mass_entries)
 
     @cached_property
     def _forces(self) -> Any:
-        tree = self.structure.tree
-        return self._function([tree.flattened(force) for force in tree.motion.forces])
+        return self._function(self.forces)
 
     @cached_property
     def _own_rates(self) -> Any:
@@ -270,18 +319,25 @@ class RigEquations:
         tree, names = self.structure.tree, self.rig.mechanism.free
         motion = tree.motion
         accelerations = [sp.Symbol(f"acceleration {c.name}", real=True) for c in names]
+        n, mass, forces = self.n_coordinates, self.mass_entries, self.forces
         parts: list[list[sp.Expr]] = []
+        sums: list[sp.Expr] = []
         for i, terms in enumerate(motion.terms):
-            inertial = [motion.mass[i, j] * a for j, a in enumerate(accelerations)]
-            parts.append([tree.flattened(part) for part in (*inertial, *(-term for term in terms))])
-        parts += [[tree.flattened(term) for term in state.terms] for state in tree.states]
-        parts += [list(sp.Add.make_args(e)) for e in self._sensor_expressions]
-        slopes = [sp.diff(sp.Add(*own), p) for own in parts for p in self.structure.parameter_symbols]
+            inertial = [mass[i * n + j] * a for j, a in enumerate(accelerations)]
+            parts.append([*inertial, *(tree.flattened(-term) for term in terms)])
+            sums.append(sp.Add(*inertial, -forces[i]))
+        others = [[tree.flattened(term) for term in state.terms] for state in tree.states]
+        others += [list(sp.Add.make_args(e)) for e in self._sensor_expressions]
+        parts += others
+        if self.structure.elimination is None:
+            sums = [sp.Add(*own) for own in parts[:n]]
+        sums += [sp.Add(*own) for own in others]
+        slopes = self.slopes(sums, self.structure.parameter_symbols, accelerations)
         # One part of them may be lacking: an equation of motion without any force.
         parts = [own or [sp.S.Zero] for own in parts]
         ends = list(np.cumsum([len(own) for own in parts]))
         together = self._function([part for own in parts for part in own], *accelerations)
-        return together, self._function(slopes, *accelerations), [int(end) for end in ends]
+        return together, slopes, [int(end) for end in ends]
 
 
 def _of_joint(joint: Joint, rig: Rig) -> dict[str, sp.Expr]:

@@ -9,11 +9,13 @@ from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
+from rigsight.rigs.mechanism import MOST_COUPLED as MOST_COUPLED
 from rigsight.rigs.mechanism import Drive as Drive
 from rigsight.rigs.mechanism import Joint as Joint
 from rigsight.rigs.mechanism import Sensor as Sensor
 from rigsight.rigs.mechanism import acceleration as acceleration
 from rigsight.rigs.mechanism import force_symbol as force_symbol
+from rigsight.rigs.mechanism import has_short_inverse as has_short_inverse
 from rigsight.rigs.mechanism import reading_symbol as reading_symbol
 from rigsight.rigs.reading.rig_file import read_rig_file as read_rig_file
 from rigsight.rigs.reading.rig_file import rig_of_tables as rig_of_tables
@@ -26,6 +28,7 @@ from rigsight.rigs.signal import Signal as Signal
 __all__ = [
     "AXIS",
     "ELEMENT",
+    "MOST_COUPLED",
     "RIGS",
     "ROLLING",
     "RUNNING_GEAR",
@@ -40,6 +43,7 @@ __all__ = [
     "declared_rig",
     "evaluated",
     "force_symbol",
+    "has_short_inverse",
     "joint_of",
     "read_rig_file",
     "reading_symbol",

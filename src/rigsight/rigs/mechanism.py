@@ -6,11 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
 import sympy as sp
 from sympy.simplify.fu import TR8
 
 _LONGEST_SHORTENED = 100
 """In operations. Shortening takes a millisecond for each, and nobody reads what is longer."""
+
+
+MOST_COUPLED = 3
+"""Coordinates that move one another's inertia and whose accelerations are written as formulas. Those of four links in a plane take
+a compiler minutes, those of three a second."""
 
 
 @dataclass(frozen=True)
@@ -309,6 +315,11 @@ class Mechanism:
         """Return True if a force along an expression of the coordinates moves a degree of freedom."""
         return any(sp.diff(expression, c.symbol) != 0 for c in self.free)
 
+    @cached_property
+    def has_short_inverse(self) -> bool:
+        """Whether accelerations and inertias are formulas, see `has_short_inverse`."""
+        return has_short_inverse(self.mass_matrix)
+
     def inertia_along(self, expression: sp.Expr) -> sp.Expr | None:
         """Return the inertia that a force along an expression of the coordinates moves; None where it moves nothing.
 
@@ -319,6 +330,37 @@ class Mechanism:
             return None
         mobility = (slopes * self.mass_matrix.LUsolve(slopes.T))[0, 0]
         return 1 / mobility
+
+    def inertia_at(self, expression: sp.Expr, values: Mapping[str, float]) -> float | None:
+        """Return the number of `inertia_along` where coordinates and parameters have values; None where it moves nothing."""
+        if not self.moves_inertia(expression):
+            return None
+        slopes = [sp.diff(expression, c.symbol) for c in self.free]
+        n, numbers = len(slopes), {sp.Symbol(name, real=True): value for name, value in values.items()}
+        mass = np.array([float(entry.xreplace(numbers)) for entry in self.mass_matrix]).reshape(n, n)
+        along = np.array([float(slope.xreplace(numbers)) for slope in slopes])
+        return float(1.0 / (along @ np.linalg.solve(mass, along)))
+
+
+def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
+    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia: directly, or through others.
+
+    Parameters
+    ----------
+    mass
+        Mass matrix, shape (n, n).
+    """
+    left, largest = set(range(mass.rows)), 0
+    while left:
+        count, waiting = 0, [left.pop()]
+        while waiting:
+            row = waiting.pop()
+            count += 1
+            moved = {column for column in left if mass[row, column] != 0}
+            left -= moved
+            waiting += moved
+        largest = max(largest, count)
+    return largest <= MOST_COUPLED
 
 
 def _shortened(expression: sp.Expr) -> sp.Expr:

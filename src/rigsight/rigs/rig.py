@@ -410,6 +410,8 @@ class Rig:
             return True
         mechanism = self.mechanism
         joint = joint_of(self, effect)
+        if effect.reads_inertia and joint.inertia is None and not mechanism.has_short_inverse:
+            return False
         if joint.stiffness == 0 and (effect.spring is not None or effect.deflection is not None):
             return False
         return not effect.needs_inertia or joint.inertia is not None or mechanism.moves_inertia(joint.motion)

@@ -11,7 +11,7 @@ import sympy as sp
 from rigsight.effects import Effect, placed_dimension
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import MOST_COUPLED, RIGS, Rig, joint_of
 from rigsight.simulate.signal_path import equation_tree
 from rigsight.simulate.structure import Structure, unique_names
 
@@ -77,6 +77,12 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
 def _check_effects(rig: Rig, effects: tuple[Effect, ...]) -> None:
     names = [effect.name for effect in effects]
     for effect in effects:
+        joint = joint_of(rig, effect)
+        if effect.reads_inertia and joint.inertia is None and not rig.mechanism.has_short_inverse:
+            raise InputError(
+                f"Effect '{effect.name}' reads the inertia that moves with a joint, which is no formula on a rig where more than "
+                f"{MOST_COUPLED} coordinates move one another. Give joints.{joint.name} an inertia in the rig file."
+            )
         if not rig.offers(effect):
             raise InputError(f"Effect '{effect.name}' makes no sense on the rig '{rig.name}'.")
     if len(set(names)) < len(names):

@@ -14,6 +14,9 @@ from scipy.optimize import least_squares
 
 from rigsight.effects.symbols import positive_part
 from rigsight.rigs import evaluated
+from rigsight.simulate.chain_rule import slopes_of
+from rigsight.simulate.elimination import Elimination
+from rigsight.simulate.straight_line import straight_line
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 Floats = NDArray[np.float64]
@@ -49,26 +52,42 @@ class Slopes:
     rests: bool
 
 
+@dataclass(frozen=True)
+class _Motion:
+    """The equations of motion, and the rates of the other states, as functions of states, inputs and parameters.
+
+    Attributes
+    ----------
+    mass
+        The mass matrix, shape (n, n).
+    balance, changes
+        Forces, then rates of the states that are no motion, and their derivatives by states and inputs, shape (n_rows, n_by).
+    turned
+        Derivatives of the mass matrix times accelerations, which are the last arguments, shape (n, n_by).
+    """
+
+    mass: Callable[..., Any]
+    balance: Callable[..., Any]
+    changes: Callable[..., Floats]
+    turned: Callable[..., Floats]
+
+
 class SlopeFunctions:
     """Compiled derivatives of a structure's equations; the mass matrix is inverted in numbers, as symbols it would explode."""
 
     def __init__(self, structure: Structure) -> None:
-        tree, motion = structure.tree, structure.tree.motion
-        self._n = len(motion.coordinates)
-        states = structure.states
+        self._n = len(structure.tree.motion.coordinates)
+        self._n_states = len(structure.states)
         triples = [input_symbols(index) for index in range(len(structure.rig.mechanism.inputs))]
-        by = [*states, *(triple[order] for order in range(3) for triple in triples)]
-        self._n_states, self._n_inputs = len(states), len(triples)
+        self._n_inputs = len(triples)
+        by = [*structure.states, *(triple[order] for order in range(3) for triple in triples)]
         arguments = [*by, *structure.parameter_symbols, TIME]
-        mass = motion.mass.applyfunc(tree.flattened)
-        forces = [tree.flattened(force) for force in motion.forces]
-        rates = [tree.flattened(state.rate) for state in tree.states]
-        self._mass = _function(arguments, mass)
-        self._balance = _function(arguments, [*forces, *rates])
-        self._mass_slopes = _function(arguments, [_slope(mass, symbol) for symbol in by])
-        self._force_slopes = _function(arguments, _jacobian(forces, by))
-        self._rate_slopes = _function(arguments, _jacobian(rates, by))
         self._output_slopes = _function(arguments, _jacobian(structure.outputs, by))
+        self._motion = (
+            _whole(structure, arguments, by)
+            if structure.elimination is None
+            else _in_parts(structure, structure.elimination, arguments, by)
+        )
 
     def _place(self, state: Floats, inputs: Floats, p: Floats) -> list[float]:
         return [*state, *inputs, *np.zeros(2 * self._n_inputs), *p, 0.0]
@@ -90,11 +109,10 @@ class SlopeFunctions:
             return self._place(state, inputs, p)
 
         def balance(unknown: Floats) -> Floats:
-            return np.asarray(self._balance(*at(unknown)), dtype=np.float64)
+            return np.asarray(self._motion.balance(*at(unknown)), dtype=np.float64)
 
         def slopes(unknown: Floats) -> Floats:
-            place = at(unknown)
-            return np.vstack([self._force_slopes(*place), self._rate_slopes(*place)])[:, held]
+            return self._motion.changes(*at(unknown))[:, held]
 
         begin = state[held].copy()
         with np.errstate(all="ignore"):
@@ -118,14 +136,14 @@ class SlopeFunctions:
         place = self._place(state, inputs, p)
         slopes = np.zeros((n_states, n_states + 3 * n_inputs))
         with np.errstate(all="ignore"):
-            balance = np.array(self._balance(*place), dtype=np.float64)
-            by_place = np.vstack([self._force_slopes(*place), self._rate_slopes(*place)])
+            balance = np.array(self._motion.balance(*place), dtype=np.float64)
+            by_place = self._motion.changes(*place)
             outputs = self._output_slopes(*place)
             slopes[2 * n :] = by_place[n:]
             if n:
-                mass = self._mass(*place)
+                mass = self._motion.mass(*place)
                 accelerations = np.linalg.solve(mass, balance[:n])
-                turned = np.column_stack([slope @ accelerations for slope in self._mass_slopes(*place)])
+                turned = self._motion.turned(*place, *accelerations)
                 slopes[np.arange(n), n + np.arange(n)] = 1.0
                 slopes[n : 2 * n] = np.linalg.solve(mass, by_place[:n] - turned)
         held = self._held
@@ -175,6 +193,48 @@ def _functions_of(key: _SameStructure) -> SlopeFunctions:
     return SlopeFunctions(key.structure)
 
 
+def _whole(structure: Structure, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]) -> _Motion:
+    """Return the functions of equations that are differentiated as they are."""
+    tree, motion = structure.tree, structure.tree.motion
+    mass = motion.mass.applyfunc(tree.flattened)
+    forces = [tree.flattened(force) for force in motion.forces]
+    rates = [tree.flattened(state.rate) for state in tree.states]
+    of_forces, of_rates = (_function(arguments, _jacobian(own, by)) for own in (forces, rates))
+    of_mass = _function(arguments, [_slope(mass, symbol) for symbol in by])
+    n = len(forces)
+
+    def turned(*place: float) -> Floats:
+        accelerations = np.array(place[len(place) - n :])
+        slopes = of_mass(*place[: len(place) - n])
+        return np.column_stack([slope @ accelerations for slope in slopes])
+
+    return _Motion(
+        mass=_function(arguments, mass),
+        balance=_function(arguments, [*forces, *rates]),
+        changes=lambda *place: np.vstack([of_forces(*place), of_rates(*place)]),
+        turned=turned,
+    )
+
+
+def _in_parts(
+    structure: Structure, elimination: Elimination, arguments: Sequence[sp.Symbol], by: Sequence[sp.Symbol]
+) -> _Motion:
+    """Return the functions of equations that are differentiated part by part."""
+    n, begun = elimination.size, elimination.begun(structure.steps)
+    rates = [structure.tree.flattened(state.rate) for state in structure.tree.states]
+    balance = straight_line([*elimination.loads, *rates], begun)
+    inertial = straight_line([sp.Add(*(m * a for m, a in elimination.moved(i))) for i in range(n)], begun)
+    mass = straight_line(elimination.entries, begun).function(arguments, _MODULES)
+    changes = slopes_of(balance, by).function(arguments, _MODULES)
+    turned = slopes_of(inertial, by).function([*arguments, *elimination.accelerations], _MODULES)
+    return _Motion(
+        mass=lambda *place: np.reshape(mass(*place), (n, n)),
+        balance=balance.function(arguments, _MODULES),
+        changes=lambda *place: np.reshape(changes(*place), (-1, len(by))),
+        turned=lambda *place: np.reshape(turned(*place), (n, len(by))),
+    )
+
+
 def _jacobian(expressions: Sequence[sp.Expr], by: Sequence[sp.Symbol]) -> sp.Matrix:
     return sp.Matrix(
         len(expressions), len(by), [_slope(expression, symbol) for expression in expressions for symbol in by]
@@ -187,8 +247,11 @@ def _slope(expression: Any, symbol: sp.Symbol) -> Any:
 
 
 def _function(arguments: Sequence[sp.Symbol], expressions: Any) -> Callable[..., Any]:
-    return sp.lambdify(arguments, expressions, [{positive_part.__name__: _positive_part}, "numpy"], cse=True)  # type: ignore[no-any-return]
+    return sp.lambdify(arguments, expressions, _MODULES, cse=True)  # type: ignore[no-any-return]
 
 
 def _positive_part(x: float) -> float:
     return max(x, 0.0)
+
+
+_MODULES: list[Any] = [{positive_part.__name__: _positive_part}, "numpy"]

@@ -10,6 +10,8 @@ from functools import cached_property
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
+from rigsight.rigs import has_short_inverse
+from rigsight.simulate.elimination import acceleration_symbols
 
 
 class Kind(StrEnum):
@@ -88,9 +90,16 @@ class EquationsOfMotion:
         """Generalized forces, one for each coordinate."""
         return tuple(sp.Add(*terms) for terms in self.terms)
 
+    @cached_property
+    def is_written(self) -> bool:
+        """Whether the accelerations are formulas, or else symbols of what is found by `Elimination`."""
+        return has_short_inverse(self.mass)
+
     @property
     def accelerations(self) -> tuple[sp.Expr, ...]:
-        """Rates of the velocities: the forces through the inverse of the mass matrix."""
+        """Rates of the velocities: the forces through the inverse of the mass matrix, or symbols, see `is_written`."""
+        if not self.is_written:
+            return acceleration_symbols(len(self.coordinates))
         if len(self.coordinates) == 1:
             return (self.forces[0] / self.mass[0, 0],)
         return tuple(self.mass.LUsolve(sp.Matrix(self.forces))) if self.coordinates else ()
@@ -219,8 +228,13 @@ class EquationTree:
             last = read[0]
             if not isinstance(self._expressions[last], late):
                 return False
-        rate = self.rate_of(reading)
-        return not rate.free_symbols & set(self.inputs) and not rate.atoms(sp.sign, sp.Abs, positive_part)
+        parts = [self.rate_of(reading)]
+        if not self.motion.is_written and parts[0].free_symbols & set(self.motion.accelerations):
+            parts += map(self.flattened, (*self.motion.mass, *self.motion.forces))
+        return not any(
+            part.free_symbols & set(self.inputs) or part.atoms(sp.sign, sp.Abs, positive_part)
+            for part in parts
+        )
 
     def rate_of(self, reading: sp.Expr) -> sp.Expr:
         """Return the time derivative of an expression of the states; what is late stands in it as if it arrived at once."""

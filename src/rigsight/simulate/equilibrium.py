@@ -167,8 +167,8 @@ def _balance_of(key: _Key) -> _Balance:
     moved = {**at_rest, **_moved(structure, before)}
     of_first_order = structure.equations[2 * len(tree.motion.coordinates) :]
     rates, remembers = [], False
-    for equation in structure.equations[len(tree.motion.coordinates) : 2 * len(tree.motion.coordinates)]:
-        rates.append(equation.rate.xreplace(signs).xreplace(still))
+    for missing in structure.out_of_balance:
+        rates.append(missing.xreplace(signs).xreplace(still))
     for index, equation in enumerate(of_first_order, 2 * len(tree.motion.coordinates)):
         rate = equation.rate.xreplace(still)
         if not is_zero(rate):

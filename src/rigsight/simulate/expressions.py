@@ -20,11 +20,17 @@ def hoist_constants(
         Symbol -> the subexpression it stands for.
     """
     hoisted: dict[sp.Expr, sp.Symbol] = {}
+    walked: dict[sp.Expr, sp.Expr] = {}
 
     def symbol_for(expression: sp.Expr) -> sp.Symbol:
         return hoisted.setdefault(expression, sp.Symbol(f"constant {len(hoisted)}", real=True))
 
     def walk(expression: sp.Expr) -> sp.Expr:
+        if expression not in walked:
+            walked[expression] = rewritten(expression)
+        return walked[expression]
+
+    def rewritten(expression: sp.Expr) -> sp.Expr:
         if expression.is_number:
             return expression
         if expression.free_symbols <= constants:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
 from rigsight.errors import InputError
+from rigsight.simulate.jumps import Jumps
 from rigsight.simulate.structure import Structure
 
 _KINKS = (sp.Abs, sp.sign, positive_part)
@@ -57,7 +58,7 @@ class FrozenStructure:
     Attributes
     ----------
     rates, outputs
-        Expressions in states, parameters and `modes`; smooth between events.
+        Expressions in states, parameters, `modes` and the symbols of `steps`; smooth between events.
     modes
         Symbols that take the values -1 and +1.
     switches
@@ -66,6 +67,8 @@ class FrozenStructure:
         The modes of dry friction: signs of a velocity whose flip makes its own acceleration jump, so that it can stay at zero.
     replacements
         What was written in the place of kinks, in the order in which it was.
+    steps
+        What is computed before rates and outputs, as `Structure.remembering_steps`.
     """
 
     rates: tuple[sp.Expr, ...]
@@ -74,6 +77,7 @@ class FrozenStructure:
     switches: tuple[sp.Expr, ...]
     frictions: tuple[Friction, ...]
     replacements: tuple[Mapping[sp.Expr, sp.Expr], ...] = ()
+    steps: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
     def in_modes(self, expression: sp.Expr) -> sp.Expr:
         """Return a part of the structure's equations with the same kinks as modes."""
@@ -90,6 +94,7 @@ class FrozenStructure:
         """Return the signs of velocities that dry friction can hold as the equations hold them, and the symbols for them."""
         found: dict[sp.Expr, sp.Expr] = {}
         expressions = [*(e.rate for e in structure.remembering_equations), *structure.computed_outputs]
+        expressions += structure.remembering_steps.values()
         for atom in set().union(*(expression.atoms(sp.sign) for expression in expressions)):
             argument = self.in_modes(atom.args[0])
             for index, own in enumerate(self.frictions):
@@ -130,6 +135,7 @@ def freeze(structure: Structure) -> FrozenStructure:
     ]
     # A kink of what acts later is an event when it happens: when it acts, the past has a corner there.
     expressions += [history.signal for history in structure.histories]
+    expressions += structure.remembering_steps.values()
     modes: dict[sp.Expr, sp.Symbol] = {}
     replacements = []
     while True:
@@ -156,13 +162,16 @@ def freeze(structure: Structure) -> FrozenStructure:
         replacements.append(replacement)
         expressions = [expression.xreplace(replacement) for expression in expressions]
     n_states, n_rates = len(structure.states), len(structure.states) + len(structure.computed_outputs)
+    n_steps = len(structure.remembering_steps)
+    steps = expressions[len(expressions) - n_steps :]
     return FrozenStructure(
         rates=tuple(expressions[:n_states]),
         outputs=tuple(expressions[n_states:n_rates]),
         modes=tuple(modes.values()),
         switches=tuple(modes),
-        frictions=_frictions(structure, modes, expressions),
+        frictions=_frictions(structure, modes, expressions, steps),
         replacements=tuple(replacements),
+        steps=dict(zip(structure.remembering_steps, steps, strict=True)),
     )
 
 
@@ -177,11 +186,12 @@ def _innermost_kink(expressions: list[sp.Expr], constant: set[sp.Symbol]) -> sp.
 
 
 def _frictions(
-    structure: Structure, modes: dict[sp.Expr, sp.Symbol], expressions: list[sp.Expr]
+    structure: Structure, modes: dict[sp.Expr, sp.Symbol], expressions: list[sp.Expr], steps: list[sp.Expr]
 ) -> tuple[Friction, ...]:
     """Return the modes that are signs of velocities at which the same velocities' accelerations jump."""
     velocities = structure.tree.motion.velocities
     rates = dict(zip(structure.states, expressions, strict=False))
+    named = dict(zip(structure.remembering_steps, map(_of_sympy, steps), strict=True))
     found = []
     for index, (switch, mode) in enumerate(modes.items()):
         moved = [v for v in velocities if v in switch.free_symbols]
@@ -189,10 +199,18 @@ def _frictions(
             continue
         # At rest: one velocity is what the others make it.
         standstill = {moved[0]: moved[0] - switch / sp.diff(switch, moved[0])}
-        jump = sum((sp.diff(switch, v) * sp.diff(rates[v], mode) for v in moved), start=sp.Integer(0))
-        if is_zero(jump.subs(standstill)):
-            continue
-        alone = not any(mode in rates[v].free_symbols for v in velocities if v != moved[0])
+        if structure.elimination is None:
+            jump = sum((sp.diff(switch, v) * sp.diff(rates[v], mode) for v in moved), start=sp.Integer(0))
+            if is_zero(jump.subs(standstill)):
+                continue
+            alone = not any(mode in rates[v].free_symbols for v in velocities if v != moved[0])
+        else:
+            jumps = Jumps(structure.elimination, named, standstill)
+            own = dict(zip(velocities, jumps.by(mode), strict=True))
+            slopes = jumps.numbers([_of_sympy(sp.diff(switch, v)) for v in moved])
+            if abs(sp.Add(*(slope * own[v] for slope, v in zip(slopes, moved, strict=True)))) < _ROUNDED:
+                continue
+            alone = not any(abs(own[v]) > _ROUNDED for v in velocities if v != moved[0])
         held = structure.states.index(moved[0]) if switch == moved[0] else None
         found.append(Friction(index, held, alone))
     if len(found) > MOST_FRICTIONS:
@@ -205,8 +223,13 @@ def _frictions(
 
 def is_zero(expression: sp.Expr) -> bool:
     """Return True for an expression that vanishes at some place of no meaning; sympy would simplify for seconds."""
-    expression = expression.replace(absolute, sp.Abs).replace(positive_part, lambda part: sp.Max(part, 0))
+    expression = _of_sympy(expression)
     symbols = sorted(expression.free_symbols, key=str)
     place = {symbol: sp.sqrt(sp.prime(5 + i)) / (3 + i % 7) for i, symbol in enumerate(symbols)}
     value = expression.evalf(_DIGITS, subs=place)
     return bool(abs(value) < _ROUNDED) if value.is_number else False
+
+
+def _of_sympy(expression: sp.Expr) -> sp.Expr:
+    """Return an expression of functions that sympy has numbers for."""
+    return expression.replace(absolute, sp.Abs).replace(positive_part, lambda part: sp.Max(part, 0))

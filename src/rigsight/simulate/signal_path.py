@@ -281,7 +281,9 @@ class _Path:
             signals["acceleration"] = self._bound(mechanism.prescribed_rate(rate))
         if not any(effect.reads_inertia for effect in self._effects):
             return signals
-        inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)
+        inertia = joint.inertia
+        if inertia is None and mechanism.has_short_inverse:
+            inertia = mechanism.inertia_along(joint.motion)
         if inertia is not None:
             signals["m"] = self._bound(inertia)
         return signals

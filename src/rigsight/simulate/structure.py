@@ -11,6 +11,7 @@ import sympy as sp
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
+from rigsight.simulate.elimination import Elimination, steps_to_accelerations
 from rigsight.simulate.equation_tree import EquationTree, late, rate_within
 
 INPUT = sp.Symbol("input value", real=True)
@@ -112,6 +113,42 @@ class Structure:
                 for state in tree.states
             ),
         )
+
+    @property
+    def out_of_balance(self) -> tuple[sp.Expr, ...]:
+        """For each coordinate what vanishes at standstill: its acceleration as a formula, or the force that is left."""
+        motion = self.tree.motion
+        if self.elimination is not None:
+            return tuple(map(self.tree.flattened, motion.forces))
+        n = len(motion.coordinates)
+        return tuple(equation.rate for equation in self.equations[n : 2 * n])
+
+    @cached_property
+    def elimination(self) -> Elimination | None:
+        """How accelerations are found that stand in the equations as symbols; None where they are formulas."""
+        motion = self.tree.motion
+        return None if motion.is_written else Elimination.of(motion.mass)
+
+    @cached_property
+    def steps(self) -> dict[sp.Symbol, sp.Expr]:
+        """What is computed before the equations, symbol by symbol: masses, loads and what the accelerations are found with.
+
+        It is empty where accelerations are formulas. What is late stands in it as if it arrived at once.
+        """
+        return self._steps(self.tree.flattened)
+
+    @cached_property
+    def remembering_steps(self) -> dict[sp.Symbol, sp.Expr]:
+        """The same with the symbols of `histories`."""
+        return self._steps(self.tree.remembering) if self.histories else self.steps
+
+    def _steps(self, flattened: Callable[[sp.Expr], sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
+        motion, elimination = self.tree.motion, self.elimination
+        if elimination is None:
+            return {}
+        masses = [flattened(motion.mass[place]) for place in elimination.mass]
+        loads = [[flattened(term) for term in terms] for terms in motion.terms]
+        return steps_to_accelerations(elimination, masses, loads)
 
     @cached_property
     def outputs(self) -> tuple[sp.Expr, ...]:

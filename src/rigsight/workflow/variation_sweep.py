@@ -17,6 +17,7 @@ from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, rest_state
 from rigsight.simulate.input_hold import hold_input, together
 from rigsight.simulate.model import Model
+from rigsight.simulate.straight_line import straight_line
 from rigsight.simulate.structure import TIME, input_symbols
 
 MARGIN = (0.5, 1.6)
@@ -122,9 +123,15 @@ def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
     known = dict(zip(structure.parameter_symbols, p, strict=True))
     known |= {symbol: 0.0 for i in range(n_inputs) for symbol in input_symbols(i)} | {TIME: 0.0}
     functions = {"positive_part": lambda value: max(value, 0.0)}
-    rates = sp.lambdify(
-        [structure.states], [e.rate.xreplace(known) for e in structure.equations], [functions, "numpy"]
-    )
+    own_rates, modules = [e.rate for e in structure.equations], [functions, "numpy"]
+    if structure.steps:
+        line = straight_line(own_rates, structure.steps)
+        in_parts = line.function([*structure.states, *known], modules)
+
+        def rates(x: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[float]:
+            return in_parts(*x, *known.values())  # type: ignore[no-any-return]
+    else:
+        rates = sp.lambdify([structure.states], [rate.xreplace(known) for rate in own_rates], modules)
     jacobian = np.empty((rest.size, rest.size))
     for i in range(rest.size):
         step = np.zeros(rest.size)

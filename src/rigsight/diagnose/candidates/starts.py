@@ -141,10 +141,17 @@ def _evaluated(
         canonical.v_size: sizes["x"] / sizes["time"],
         canonical.time_size: sizes["time"],
     }
-    inertia = joint.inertia if joint.inertia is not None else bench.rig.mechanism.inertia_along(joint.motion)
-    if inertia is not None:
-        # Of an inertia that changes with the motion its size will do: that where all coordinates are zero.
-        numbers[canonical.m] = evaluated(inertia, {**dict.fromkeys(_moving(bench.rig), 0.0), **values})
+    mechanism = bench.rig.mechanism
+    # Of an inertia that changes with the motion its size will do: that where all coordinates are zero.
+    at_zero = {**dict.fromkeys(_moving(bench.rig), 0.0), **values}
+    if joint.inertia is None and not mechanism.has_short_inverse:
+        moved = mechanism.inertia_at(joint.motion, at_zero)
+        if moved is not None:
+            numbers[canonical.m] = moved
+    else:
+        inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)
+        if inertia is not None:
+            numbers[canonical.m] = evaluated(inertia, at_zero)
     result = {}
     for name, formula in formulas.items():
         own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}

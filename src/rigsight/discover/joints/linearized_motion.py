@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from rigsight.records.record import Record
 from rigsight.simulate import Structure, parameter_vector, record_input
+from rigsight.simulate.chain_rule import slopes_of
 from rigsight.simulate.compiled.linear_forms import slope
+from rigsight.simulate.elimination import Elimination
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.simulation import record_values
+from rigsight.simulate.straight_line import straight_line
 from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
@@ -87,18 +90,23 @@ class MotionEquations:
         n_inputs = len(structure.rig.mechanism.inputs)
         inputs = [symbol for index in range(n_inputs) for symbol in input_symbols(index)]
         self._arguments = arguments = [*states, *inputs, TIME, *structure.parameter_symbols]
+        others = [equation.limited_rate for equation in structure.equations[2 * self._n :]]
+        readings = list(structure.outputs)
+        by_name = dict(zip(structure.names, structure.parameter_symbols, strict=True))
+        directions = [*states, *(by_name[name] for name in self.fitted)]
+        if structure.elimination is not None:
+            self._values, self._slopes = _in_parts(
+                structure, structure.elimination, [*others, *readings], arguments, directions
+            )
+            return
         accelerations = [sp.Symbol(f"acceleration_{i}", real=True) for i in range(self._n)]
         mass = [tree.flattened(entry) for entry in motion.mass]
         forces = [tree.flattened(force) for force in motion.forces]
-        others = [equation.limited_rate for equation in structure.equations[2 * self._n :]]
-        readings = list(structure.outputs)
         # The mass matrix is inverted in numbers: in symbols that of a robot fills pages.
         balance = [
             force - sum((mass[i * self._n + j] * accelerations[j] for j in range(self._n)), start=sp.S.Zero)
             for i, force in enumerate(forces)
         ]
-        by_name = dict(zip(structure.names, structure.parameter_symbols, strict=True))
-        directions = [*states, *(by_name[name] for name in self.fitted)]
         slopes = [slope(e, s) for e in (*balance, *others, *readings) for s in directions]
         self._values = _compiled(arguments, [*mass, *forces, *others, *readings])
         self._slopes = _compiled([*arguments, *accelerations], slopes)
@@ -229,6 +237,23 @@ class MotionEquations:
         values = _evaluated(self._slopes, (*x, *u, t, *p, *accelerations), x.shape[1])
         n_directions = self._n_states + len(self.fitted)
         return np.moveaxis(values.reshape(-1, n_directions, x.shape[1]), 2, 0)
+
+
+def _in_parts(
+    structure: Structure,
+    elimination: Elimination,
+    others: Sequence[sp.Expr],
+    arguments: Sequence[sp.Symbol],
+    directions: Sequence[sp.Symbol],
+) -> tuple[Any, Any]:
+    """Return masses, forces and other expressions, and the slopes of what is out of balance, of long equations of motion."""
+    begun = elimination.begun(structure.steps)
+    values = straight_line([*elimination.entries, *elimination.loads, *others], begun)
+    slopes = slopes_of(straight_line([*elimination.left, *others], begun), directions)
+    modules = [_FUNCTIONS, "numpy"]
+    return values.function(arguments, modules), slopes.function(
+        [*arguments, *elimination.accelerations], modules
+    )
 
 
 def _compiled(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Any:

@@ -115,7 +115,10 @@ class GreyBoxFit:
             self._problem = [
                 # Bounds and start values stand in no equation.
                 dict(structure.rig.declaration),
-                [str(equation) for equation in (*structure.equations, *structure.outputs)],
+                [
+                    str(equation)
+                    for equation in (*structure.equations, *structure.outputs, *structure.steps.items())
+                ],
                 list(structure.names),
                 sorted(self.scales.items()),
                 [record_digest(record) for record in records],

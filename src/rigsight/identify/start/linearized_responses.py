@@ -17,10 +17,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.identify.rig_equations import FUNCTIONS, RigEquations
+from rigsight.identify.rig_equations import RigEquations
 from rigsight.records.record import Record
 from rigsight.simulate.structure import input_symbols
 
@@ -136,15 +135,12 @@ class LinearizedResponses:
         equations = self._equations
         tree, structure = equations.structure.tree, equations.structure
         inputs = [s for i in range(len(equations.rig.inputs)) for s in input_symbols(i)]
-        along = [*structure.states, *inputs]
         rows = [
-            *(tree.flattened(force) for force in tree.motion.forces),
+            *equations.forces,
             *(tree.flattened(state.rate) for state in tree.states),
             *structure.outputs[: len(equations.sensor_names)],
         ]
-        mass = [tree.flattened(e) for e in tree.motion.mass]
-        slopes = [sp.diff(row, symbol) for row in rows for symbol in along]
-        return sp.lambdify(equations.arguments, [*mass, *slopes], modules=[FUNCTIONS, "numpy"], cse=True)
+        return equations.slopes(rows, [*structure.states, *inputs], beside=equations.mass_entries)
 
 
 def _lines(equations: RigEquations, record: Record, p: Floats, most: int) -> _Lines:

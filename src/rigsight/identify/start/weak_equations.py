@@ -30,6 +30,7 @@ from rigsight.identify.start.measured_states import (
     sensor_factors,
     supposed_states,
 )
+from rigsight.identify.start.parameter_products import MixedError, parameter_products
 from rigsight.identify.start.projection import Projection, projected
 from rigsight.records.record import Record
 from rigsight.simulate.structure import input_symbols
@@ -190,6 +191,8 @@ class WeakEquations:
         terms: dict[tuple[int, bool, sp.Expr], sp.Expr] = {}
         mixed: list[_Term] = []
         momenta, forces = equations.momenta_and_forces
+        if structure.elimination is not None:
+            return _in_products((momenta, forces), shift, frozenset(unknown), frozenset(signals))
         for is_momentum, sides in ((True, momenta), (False, forces)):
             for index, side in enumerate(sides):
                 moved = side.xreplace(shift)
@@ -233,9 +236,9 @@ class WeakEquations:
         p = list(self._equations.structure.parameter_symbols)
         factors = sp.lambdify(p, [t.factor for t in self._terms], modules=[FUNCTIONS, "numpy"], cse=True)
         signals = function([t.signal for t in self._terms])
-        slopes = function([sp.diff(t.signal, s) for t in self._terms for s in states])
+        slopes = self._equations.slopes([t.signal for t in self._terms], states)
         mixed = function([t.signal for t in self._mixed])
-        mixed_slopes = function([sp.diff(t.signal, s) for t in self._mixed for s in states])
+        mixed_slopes = self._equations.slopes([t.signal for t in self._mixed], states)
         return factors, signals, slopes, mixed, mixed_slopes
 
     def _factors(self, p: Floats) -> Floats:
@@ -321,3 +324,26 @@ class WeakEquations:
         except np.linalg.LinAlgError:
             return np.full((n_points, n), np.nan, dtype=np.complex128)
         return np.asarray(np.linalg.solve(root, (error / size)[:, :, None])[:, :, 0])
+
+
+def _in_products(
+    sides: tuple[Sequence[sp.Expr], Sequence[sp.Expr]],
+    shift: Mapping[sp.Symbol, sp.Expr],
+    unknown: frozenset[sp.Symbol],
+    signals: frozenset[sp.Symbol],
+) -> tuple[list[_Term], list[_Term]]:
+    """Return terms and mixed ones of equations that are too long to be multiplied out: one for each product of unknowns."""
+    terms: dict[tuple[int, bool, sp.Expr], list[sp.Expr]] = {}
+    mixed: list[_Term] = []
+    for is_momentum, side in zip((True, False), sides, strict=True):
+        for index, whole in enumerate(side):
+            moved = sp.expand_trig(whole.xreplace(shift)) if shift else whole
+            for part in sp.Add.make_args(moved):
+                try:
+                    products = parameter_products(part, unknown, signals)
+                except MixedError:
+                    mixed.append(_Term(index, is_momentum, sp.S.One, part))
+                    continue
+                for product, factor in products.items():
+                    terms.setdefault((index, is_momentum, product), []).append(factor)
+    return [_Term(*key, sp.Add(*factors)) for key, factors in terms.items() if sp.Add(*factors) != 0], mixed

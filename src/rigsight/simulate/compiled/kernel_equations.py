@@ -11,7 +11,10 @@ import sympy as sp
 from rigsight.simulate.expressions import gathered, hoist_constants
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.printing.c import C_LANES, C, limited
+from rigsight.simulate.straight_line import StraightLine, needed_steps
 from rigsight.simulate.structure import TIME, Structure, input_symbols
+
+_NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 
 # Each is written where it is called: some compilers warn of those that are not.
 FUNCTIONS = {
@@ -45,6 +48,8 @@ class KernelEquations:
         self._friction_signs = self.frozen.friction_signs(structure)
         fixed, speeds = set(structure.parameter_symbols), self.frozen.speeds(structure)
         groups: dict[str, Sequence[sp.Expr]] = {
+            "steps": list(self.frozen.steps.values()),
+            "live_steps": [self._live(step) for step in structure.remembering_steps.values()],
             "rates": [gathered(rate, fixed, set(self.frozen.modes)) for rate in self.frozen.rates],
             "switches": self.frozen.switches,
             "switch_slopes": [self._slope(switch) for switch in self.frozen.switches],
@@ -67,6 +72,7 @@ class KernelEquations:
         self.constants: dict[sp.Symbol, sp.Expr] = hoisted
         remaining = iter(flat)
         self._groups = {name: [next(remaining) for _ in group] for name, group in groups.items()}
+        self._steps = dict(zip(self.frozen.steps, self._groups["steps"], strict=True))
         limited_states = (
             i for i, equation in enumerate(structure.remembering_equations) if equation.limit is not None
         )
@@ -127,7 +133,11 @@ class KernelEquations:
                 ("q",), ["const double delay"], self._groups["delay"], names, "return delay;"
             ),
             "RATES": function_body(
-                ("now", "x", "s", "q", "r"), elements("r", n_states), self._groups["rates"], names
+                ("now", "x", "s", "q", "r"),
+                elements("r", n_states),
+                self._groups["rates"],
+                names,
+                steps=self._steps,
             ),
             "SWITCHES": function_body(
                 ("now", "x", "k", "s", "q", "g", "d"),
@@ -143,6 +153,7 @@ class KernelEquations:
                 elements("y", len(structure.computed_outputs)),
                 self._groups["outputs"],
                 names,
+                steps=self._steps,
             ),
         }
         texts = {key: str(value) for key, value in fragments.items()}
@@ -163,7 +174,9 @@ class KernelEquations:
         frictions, several = self.frozen.frictions, self.has_several_frictions
         speeds, slopes = self._groups["speeds"], self._groups["speed_slopes"]
         curvatures = {input_symbols(i)[2] for i in range(len(structure.rig.inputs))}
-        read = set().union(*(e.free_symbols for e in (*rates, *self.outputs, *slopes)))
+        read = set().union(
+            *(e.free_symbols for e in (*rates, *self.outputs, *slopes, *self.lane_steps.values()))
+        )
         integrated = [i for i in range(len(structure.states)) if i not in self._followed]
         return {
             "SINGLE_FRICTION": str(0 if frictions and not several else -1),
@@ -178,7 +191,12 @@ class KernelEquations:
             "N_INTEGRATED": str(len(integrated)),
             "INTEGRATED": ", ".join(map(str, integrated)) or "0",
             "LANE_RATES": function_body(
-                ("now", "x", "q", "r"), elements("r", len(rates)), rates, names, lanes=True
+                ("now", "x", "q", "r"),
+                elements("r", len(rates)),
+                rates,
+                names,
+                lanes=True,
+                steps=self.lane_steps,
             ),
             "LANE_OUTPUTS": function_body(
                 ("now", "x", "q", "y"),
@@ -186,6 +204,7 @@ class KernelEquations:
                 self.outputs,
                 names,
                 lanes=True,
+                steps=self.lane_steps,
             ),
             "LANE_FOLLOWERS": function_body(
                 (), [f"y[{i}]" for i in followers], kept, self._plus_own(names, kept), lanes=True
@@ -219,6 +238,11 @@ class KernelEquations:
         """The rates where sets are side by side."""
         rates = self._groups["live_rates"]
         return [sp.Integer(0) if i in self._followed else rate for i, rate in enumerate(rates)]
+
+    @cached_property
+    def lane_steps(self) -> dict[sp.Symbol, sp.Expr]:
+        """What is computed before rates and outputs where sets are side by side, as `Structure.steps`."""
+        return dict(zip(self.frozen.steps, self._groups["live_steps"], strict=True))
 
     def _put_back(self, array: str, limits: Mapping[int, sp.Expr]) -> tuple[list[str], list[sp.Expr]]:
         states = self.structure.states
@@ -301,21 +325,21 @@ class KernelEquations:
         return bool(frozen.frictions) and (frozen.single_friction is None or self.friction_is_shown)
 
     def _live_rates(self) -> list[sp.Expr]:
-        """Return the rates with signs as they come, for steps that are not cut at events.
+        """Return the rates with signs as they come, for steps that are not cut at events."""
+        return [self._live(equation.rate) for equation in self.structure.remembering_equations]
+
+    def _live(self, expression: sp.Expr) -> sp.Expr:
+        """Return a part of the equations with signs as they come.
 
         What cannot leave a range is seen at its end there: the state itself runs on within a substep and is put back at its end,
         exact as long as its rate keeps its sign. The sign of a velocity that dry friction can hold is an argument.
         """
-        structure = self.structure
         held = {
             e.symbol: limited(e.symbol, e.limit)
-            for e in structure.remembering_equations
+            for e in self.structure.remembering_equations
             if e.limit is not None
         }
-        return [
-            equation.rate.xreplace({**self._friction_signs, **held})
-            for equation in structure.remembering_equations
-        ]
+        return expression.xreplace({**self._friction_signs, **held})
 
     @cached_property
     def _followed(self) -> dict[int, tuple[str, str]]:
@@ -356,11 +380,23 @@ def function_body(
     names: Mapping[sp.Symbol, str],
     *further: str,
     lanes: bool = False,
+    steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
 ) -> str:
     """Return the body of a function; arguments that its equations happen not to read are marked for the compiler."""
-    for symbol in sorted(set().union(*(e.free_symbols for e in expressions)) - set(names), key=str):
+    needed = needed_steps(expressions, steps)
+    read = set().union(*(e.free_symbols for e in (*expressions, *needed.values())))
+    for symbol in sorted(read - set(needed) - set(names), key=str):
         raise KeyError(f"The symbol {symbol} has no number: no name of a rig or an effect may reach C.")
-    lines = (C_LANES if lanes else C).statements(targets, expressions, names) if targets else []
+    lines = (C_LANES if lanes else C).statements(targets, expressions, names, needed) if targets else []
+    return _marked(arguments, lines, further)
+
+
+def lane_body(targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]) -> str:
+    """Return the body of a function of lanes that computes expressions in parts."""
+    return _marked((), C_LANES.written(targets, line, names), ())
+
+
+def _marked(arguments: Sequence[str], lines: Sequence[str], further: Sequence[str]) -> str:
     text = "\n".join([*lines, *further])
     unread = [a for a in arguments if f"{a}[" not in text and f"{a}->" not in text]
     marks = [" ".join(f"(void){argument};" for argument in unread)] if unread else []

@@ -7,16 +7,19 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
+from rigsight.simulate.compiled.eliminated_forms import EliminatedForms, eliminated_forms
 from rigsight.simulate.compiled.kernel_equations import (
     KernelEquations,
     elements,
     function_body,
+    lane_body,
     real,
     symbols,
 )
-from rigsight.simulate.compiled.linear_forms import linear_forms, slope
+from rigsight.simulate.compiled.linear_forms import LinearForms, linear_forms, slope
 from rigsight.simulate.kinks import absolute
 from rigsight.simulate.printing.c import C, limited
+from rigsight.simulate.straight_line import needed_steps, of_parts
 from rigsight.simulate.structure import INPUT, INPUT_RATE
 
 _EARLIER = sp.Symbol("earlier input", real=True)
@@ -34,7 +37,7 @@ def carries_tangents(equations: KernelEquations) -> bool:
     structure = equations.structure
     if equations.limits or structure.measured_late is not None or equations.has_several_frictions:
         return False
-    expressions = (*equations.lane_rates, *equations.outputs)
+    expressions = (*equations.lane_rates, *equations.outputs, *equations.lane_steps.values())
     return bool(equations.frozen.frictions) or any(
         _is_costly(part) for expression in expressions for part in expression.atoms(sp.Function, sp.Pow)
     )
@@ -50,6 +53,7 @@ def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
     of_constants = dict(zip(equations.constants, symbols("dq", len(equations.constants)), strict=True))
     arriving = {INPUT: INPUT + _EARLIER * INPUT_RATE} if structure.delay is not None else {}
     rates, outputs = [rate.xreplace(arriving) for rate in equations.lane_rates], equations.outputs
+    steps = {symbol: step.xreplace(arriving) for symbol, step in equations.lane_steps.items()}
     groups: dict[str, tuple[Sequence[str], Sequence[sp.Expr], Mapping[sp.Symbol, sp.Symbol]]] = {
         "RATE": (elements("r", n), rates, {**of_states, _EARLIER: real("(earlier)")}),
         "OUTPUT": (elements("r", len(outputs)), outputs, of_states),
@@ -58,14 +62,33 @@ def tangent_fragments(equations: KernelEquations) -> dict[str, str]:
     fragments = {"PREPARE_CHANGES": _prepare_changes(equations)}
     for key, (targets, expressions, own) in groups.items():
         changes = {**own, **of_constants}
-        forms = linear_forms(expressions, changes, set(equations.constants))
-        now = [factor.xreplace({_EARLIER: sp.Integer(0)}) for factor in forms.factors.values()]
+        forms = _forms(equations, expressions, changes, steps)
+        now = {_EARLIER: sp.Integer(0)}
         numbered = {symbol: f"d[{i}]" for i, symbol in enumerate(forms.factors)}
         names = {**equations.lane_names, **numbered, **{change: change.name for change in changes.values()}}
-        fragments[f"N_{key}_FACTORS"] = str(max(1, len(now)))
-        fragments[f"{key}_FACTORS"] = function_body((), elements("d", len(now)), now, names, lanes=True)
-        fragments[f"{key}_CHANGES"] = function_body((), targets, forms.sums, names, lanes=True)
+        factors = tuple(factor.xreplace(now) for factor in forms.factors.values())
+        places = elements("d", len(factors))
+        fragments[f"N_{key}_FACTORS"] = str(max(1, len(factors)))
+        if isinstance(forms, EliminatedForms):
+            parts = {symbol: part.xreplace(now) for symbol, part in forms.parts.items()}
+            fragments[f"{key}_FACTORS"] = lane_body(places, of_parts(parts, factors), names)
+            fragments[f"{key}_CHANGES"] = lane_body(targets, of_parts(forms.steps, forms.sums), names)
+        else:
+            fragments[f"{key}_FACTORS"] = function_body((), places, factors, names, lanes=True)
+            fragments[f"{key}_CHANGES"] = function_body((), targets, forms.sums, names, lanes=True)
     return fragments
+
+
+def _forms(
+    equations: KernelEquations,
+    expressions: Sequence[sp.Expr],
+    changes: Mapping[sp.Symbol, sp.Symbol],
+    steps: Mapping[sp.Symbol, sp.Expr],
+) -> LinearForms | EliminatedForms:
+    elimination, constants = equations.structure.elimination, set(equations.constants)
+    if elimination is None or not needed_steps(expressions, steps):
+        return linear_forms(expressions, changes, constants)
+    return eliminated_forms(expressions, changes, constants, elimination, steps)
 
 
 def _prepare_changes(equations: KernelEquations) -> str:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
+
+from rigsight.simulate.straight_line import StraightLine, needed_steps, straight_line
+
+_NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
 
 
 class PowersAsProducts:
@@ -33,7 +38,11 @@ class Language:
         return str(self.printer.doprint(_plain(_renamed(expression, names))))
 
     def statements(
-        self, targets: Sequence[str], expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str]
+        self,
+        targets: Sequence[str],
+        expressions: Sequence[sp.Expr],
+        names: Mapping[sp.Symbol, str],
+        steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
     ) -> list[str]:
         """Return statements that assign expressions to targets, sharing common parts.
 
@@ -45,7 +54,11 @@ class Language:
             Right-hand sides, same length.
         names
             Name in the code of each symbol.
+        steps
+            Symbols without a name -> what they are; those that the expressions read are computed first.
         """
+        if needed_steps(expressions, steps):
+            return self.written(targets, straight_line(expressions, steps), names)
         renamed = [_renamed(expression, names) for expression in expressions]
         parts = (sp.Symbol(f"part{i}", real=True) for i in range(10_000))
         shared, reduced = sp.cse(renamed, symbols=parts, optimizations=None)
@@ -54,6 +67,35 @@ class Language:
             self.assigned.format(target, self.printer.doprint(_plain(e)))
             for target, e in zip(targets, reduced, strict=True)
         ]
+
+    def written(
+        self, targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]
+    ) -> list[str]:
+        """Return statements that assign expressions, whose parts are known, to targets.
+
+        Parameters
+        ----------
+        targets
+            Left-hand sides.
+        line
+            Right-hand sides.
+        names
+            Name in the code of each symbol that is no part.
+        """
+        # Words of this form are taken from names of rigs and effects in exports.
+        own = {part: f"part_{part.name.replace(' ', '_')}" for part in line.parts}
+        every = {**names, **own}
+        known = {symbol: sp.Symbol(name, real=True) for symbol, name in every.items()}
+        printed = [_printed(self.printer, e.xreplace(known)) for e in (*line.parts.values(), *line.results)]
+        forms = [(self.declared, name) for name in own.values()]
+        forms += [(self.assigned, target) for target in targets]
+        return [form.format(target, text) for (form, target), text in zip(forms, printed, strict=True)]
+
+
+@lru_cache(maxsize=16_384)
+def _printed(printer: Any, expression: sp.Expr) -> str:
+    """Return a part as code; those of a rig are the same whatever effects act on it."""
+    return str(printer.doprint(_plain(expression)))
 
 
 def _renamed(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> sp.Expr:

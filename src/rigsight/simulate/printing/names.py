@@ -123,6 +123,7 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
             names[definition.symbol] = (
                 before.beside(label(definition.owner)) if short in names.values() else short
             )
+    names |= _of_elimination(structure, names.values())
     for output in tree.outputs:
         names[output_symbol(output.name)] = _free(declared_name(output.name), names)
     return names
@@ -150,6 +151,18 @@ def _owned(structure: Structure) -> list[tuple[sp.Symbol, str, str | None]]:
     parameters = zip(structure.parameter_symbols, structure.names, strict=True)
     owned = [(symbol, *of_effects.get(name, (name, None))) for symbol, name in parameters]
     return owned + [(s.symbol, s.symbol.name.rpartition(".")[2], s.owner) for s in structure.tree.states]
+
+
+def _of_elimination(structure: Structure, taken: Iterable[ShownName]) -> dict[sp.Symbol, ShownName]:
+    """Return the names of masses and generalized forces where equations of motion are too long without them."""
+    if structure.elimination is None:
+        return {}
+    masses = structure.elimination.mass.items()
+    names = {mass: ShownName("M", (str(i + 1), str(j + 1))) for (i, j), mass in masses}
+    for i, load in enumerate(structure.elimination.loads):
+        names[load] = ShownName("h", (str(i + 1),))
+    every = set(taken)
+    return {s: name.beside("motion") if name in every else name for s, name in names.items()}
 
 
 def _signal_names(structure: Structure) -> dict[str, ShownName]:

@@ -134,7 +134,8 @@ def shown_equations(structure: Structure, label: Callable[[str], str] = in_words
     effects = [
         ShownEquation(d.owner, d.symbol, (d.expression,)) for d in tree.definitions if d.rate_of is None
     ]
-    every = [*_motion(structure), *effects, *_states(structure), *_outputs(structure, names)]
+    motion = _motion(structure) if structure.elimination is None else _motion_in_parts(structure)
+    every = [*motion, *effects, *_states(structure), *_outputs(structure, names)]
     every = [replace(e, terms=tuple(map(with_limits, e.terms))) for e in every]
     owners = dict.fromkeys([None, *(equation.owner for equation in every)])
     return ShownEquations(names, tuple(e for owner in owners for e in every if e.owner == owner))
@@ -186,6 +187,25 @@ def _motion(structure: Structure) -> list[ShownEquation]:
         left = sp.Add(*(mass * rate for mass, rate in inertia))
         equations.append(ShownEquation(None, left, terms or (sp.S.Zero,), inertia=inertia))
     return equations
+
+
+def _motion_in_parts(structure: Structure) -> list[ShownEquation]:
+    """Return the equations of motion with long masses and forces by names, and then what these are."""
+    motion, elimination = structure.tree.motion, structure.elimination
+    assert elimination is not None
+    rates = dict(zip(elimination.accelerations, map(rate_symbol, motion.velocities), strict=True))
+    equations = []
+    for row, load in enumerate(elimination.loads):
+        inertia = tuple((mass, rates[a]) for mass, a in elimination.moved(row))
+        left = sp.Add(*(mass * rate for mass, rate in inertia))
+        equations.append(ShownEquation(None, left, (load,), inertia=inertia))
+    masses = [ShownEquation(None, mass, (motion.mass[at],)) for at, mass in elimination.mass.items()]
+    loads = zip(elimination.loads, motion.terms, strict=True)
+    return [
+        *equations,
+        *masses,
+        *(ShownEquation(None, load, terms or (sp.S.Zero,)) for load, terms in loads),
+    ]
 
 
 def _states(structure: Structure) -> list[ShownEquation]:

@@ -1,0 +1,181 @@
+"""How are accelerations found that are too long to be written down? By elimination in numbers, in steps with names.
+
+``mass @ accelerations = loads`` is solved by ``mass = L D L'``, with ones on the diagonal of L. That needs no root: numbers that a fit
+tries on its way may give a mass matrix that is none.
+
+G. H. Golub and C. F. Van Loan, Matrix Computations (2013), 4.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import islice
+
+import sympy as sp
+
+from rigsight.effects.symbols import positive_part
+from rigsight.simulate.straight_line import StraightLine, straight_line
+
+_SHORT = 40
+"""Numbers, symbols and operations of a force that are not worth a search for what it shares with others."""
+_KINKS = (sp.Abs, sp.sign, positive_part)
+
+
+def acceleration_symbols(count: int) -> tuple[sp.Symbol, ...]:
+    """Return the symbols of accelerations that are found by elimination."""
+    return tuple(_symbol("acceleration", i) for i in range(count))
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """The steps that lead from a mass matrix and loads to accelerations.
+
+    Attributes
+    ----------
+    mass
+        Symbol of each entry of the lower half that is not zero, by row and column.
+    size
+        Number of degrees of freedom.
+    """
+
+    mass: Mapping[tuple[int, int], sp.Symbol]
+    size: int
+
+    @classmethod
+    def of(cls, mass: sp.ImmutableMatrix) -> Elimination:
+        """Return the elimination of a mass matrix, which leaves out what is zero in it."""
+        entries = [(i, j) for i in range(mass.rows) for j in range(i + 1) if mass[i, j] != 0]
+        return cls({(i, j): _symbol("mass", i, j) for i, j in entries}, mass.rows)
+
+    @property
+    def loads(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the generalized forces."""
+        return tuple(_symbol("load", i) for i in range(self.size))
+
+    @property
+    def accelerations(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the accelerations."""
+        return acceleration_symbols(self.size)
+
+    def solution(self, name: str) -> tuple[sp.Symbol, ...]:
+        """Return the symbols of a solution that is called by a name."""
+        return tuple(_symbol(name, i) for i in range(self.size))
+
+    @property
+    def entries(self) -> list[sp.Expr]:
+        """The mass matrix row by row, of symbols and zeros."""
+        places = [(max(i, j), min(i, j)) for i in range(self.size) for j in range(self.size)]
+        return [self.mass.get(place, sp.S.Zero) for place in places]
+
+    @property
+    def left(self) -> list[sp.Expr]:
+        """What of each load is left once masses are moved: zero in motion."""
+        return [load - sp.Add(*(mass * a for mass, a in self.moved(i))) for i, load in enumerate(self.loads)]
+
+    def moved(self, index: int) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
+        """Return the masses in a row of the matrix, each with the acceleration that it is multiplied by."""
+        row = ((self.mass.get((max(index, j), min(index, j))), a) for j, a in enumerate(self.accelerations))
+        return tuple((mass, a) for mass, a in row if mass is not None)
+
+    @cached_property
+    def steps(self) -> dict[sp.Symbol, sp.Expr]:
+        """Symbol -> what it is of masses, loads and symbols in front of it; the accelerations come last."""
+        solved = self.solved(self.loads, "acceleration")
+        return {**self._factors[1], **solved}
+
+    def begun(self, steps: Mapping[sp.Symbol, sp.Expr]) -> dict[sp.Symbol, sp.Expr]:
+        """Return those of all steps to the accelerations that lead to masses and loads."""
+        return {symbol: step for symbol, step in steps.items() if symbol not in self.steps}
+
+    def solved(self, loads: Sequence[sp.Expr], name: str) -> dict[sp.Symbol, sp.Expr]:
+        """Return the steps that solve the system for other loads, once the matrix is eliminated.
+
+        Parameters
+        ----------
+        loads
+            The right side.
+        name
+            What the solution is called, see `solution`.
+        """
+        (factors, _), n = self._factors, self.size
+        found: dict[sp.Symbol, sp.Expr] = {}
+        forward = [_symbol(f"{name} forward", i) for i in range(n)]
+        for i, load in enumerate(loads):
+            found[forward[i]] = load - sp.Add(
+                *(factors[i, k] * forward[k] for k in range(i) if (i, k) in factors)
+            )
+        solution = self.solution(name)
+        for i in reversed(range(n)):
+            above = (factors[k, i] * solution[k] for k in range(i + 1, n) if (k, i) in factors)
+            found[solution[i]] = forward[i] * _symbol("mobility", i) - sp.Add(*above)
+        return found
+
+    @cached_property
+    def _factors(self) -> tuple[dict[tuple[int, int], sp.Symbol], dict[sp.Symbol, sp.Expr]]:
+        """The symbols of L below its diagonal, and the steps to them and to the inverse of D."""
+        factors: dict[tuple[int, int], sp.Symbol] = {}
+        rows: dict[tuple[int, int], sp.Symbol] = {}
+        steps: dict[sp.Symbol, sp.Expr] = {}
+        for j in range(self.size):
+            for i in range(j, self.size):
+                before = [
+                    factors[j, k] * rows[i, k] for k in range(j) if (j, k) in factors and (i, k) in rows
+                ]
+                left = self.mass.get((i, j), sp.S.Zero) - sp.Add(*before)
+                if i == j:
+                    steps[_symbol("mobility", j)] = 1 / left
+                elif left != 0:
+                    rows[i, j], factors[i, j] = _symbol("row", i, j), _symbol("share", i, j)
+                    steps[rows[i, j]] = left
+                    steps[factors[i, j]] = rows[i, j] * _symbol("mobility", j)
+        return factors, steps
+
+
+def steps_to_accelerations(
+    elimination: Elimination, masses: Sequence[sp.Expr], loads: Sequence[Sequence[sp.Expr]]
+) -> dict[sp.Symbol, sp.Expr]:
+    """Return all steps to the accelerations, from what stands in the equations of motion.
+
+    Parameters
+    ----------
+    elimination
+        How the accelerations are found.
+    masses
+        What is not zero of the mass matrix, as `Elimination.mass` has it.
+    loads
+        The parts of each generalized force.
+
+    Returns
+    -------
+    Symbol -> what it is, of states, inputs, parameters and symbols in front of it. No symbol stands in a kink, so that its sign
+    depends on nothing that is computed on the way.
+    """
+    long = [term for terms in loads for term in terms if _is_long(term)]
+    shared = _shared(tuple(e for e in (*masses, *long) if not e.has(*_KINKS)))
+    short = dict(zip(shared[0], shared[1].results, strict=True))
+    return {
+        **shared[1].parts,
+        **{s: short.get(e, e) for s, e in zip(elimination.mass.values(), masses, strict=True)},
+        **{
+            load: sp.Add(*(short.get(term, term) for term in terms))
+            for load, terms in zip(elimination.loads, loads, strict=True)
+        },
+        **elimination.steps,
+    }
+
+
+def _is_long(term: sp.Expr) -> bool:
+    return any(True for _ in islice(sp.preorder_traversal(term), _SHORT, None))
+
+
+@lru_cache(maxsize=64)
+def _shared(expressions: tuple[sp.Expr, ...]) -> tuple[tuple[sp.Expr, ...], StraightLine]:
+    """Return expressions and their parts; a rig's are the same whatever effects act on it."""
+    return expressions, straight_line(expressions, name="inner")
+
+
+def _symbol(name: str, *indices: int) -> sp.Symbol:
+    # Names of a rig hold no blank, so none is called so.
+    return sp.Symbol(" ".join([name, *map(str, indices)]), real=True)

@@ -1,0 +1,121 @@
+"""How are long expressions evaluated part by part, so that nothing is computed twice?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+_NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """Expressions in parts.
+
+    Attributes
+    ----------
+    parts
+        Symbol -> what it is, of arguments and of symbols in front of it.
+    results
+        The expressions, of arguments and parts.
+    """
+
+    parts: Mapping[sp.Symbol, sp.Expr]
+    results: tuple[sp.Expr, ...]
+
+    def function(self, arguments: Sequence[sp.Symbol], modules: list[Any]) -> Callable[..., Any]:
+        """Return a function of numbers or arrays that gives the results as a list.
+
+        Parameters
+        ----------
+        arguments
+            Its arguments.
+        modules
+            As `sympy.lambdify` takes them.
+        """
+        # Names that Python can read, or sympy would look through all parts for each that it cannot.
+        plain = {s: sp.Symbol(f"v{i}", real=True) for i, s in enumerate((*arguments, *self.parts))}
+        parts = [(plain[s], part.xreplace(plain)) for s, part in self.parts.items()]
+        results = [result.xreplace(plain) for result in self.results]
+        function: Callable[..., Any] = sp.lambdify(
+            [plain[s] for s in arguments], results, modules, cse=lambda written: (parts, written)
+        )
+        return function
+
+
+def straight_line(
+    expressions: Iterable[sp.Expr],
+    steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
+    name: str = "shared",
+) -> StraightLine:
+    """Return expressions in parts.
+
+    Parameters
+    ----------
+    expressions
+        The expressions.
+    steps
+        Symbols in them that are parts already -> what they are, of symbols in front of them.
+    name
+        What further parts are called: this and a number.
+    """
+    expressions = tuple(map(sp.sympify, expressions))
+    steps = needed_steps(expressions, steps)
+    names = (sp.Symbol(f"{name} {i}", real=True) for i in range(1_000_000))
+    shared, reduced = sp.cse([*steps.values(), *expressions], symbols=names, optimizations=None)
+    parts = {**dict(shared), **dict(zip(steps, reduced, strict=False))}
+    return of_parts(parts, tuple(reduced[len(steps) :]))
+
+
+def needed_steps(
+    expressions: Iterable[sp.Expr], steps: Mapping[sp.Symbol, sp.Expr]
+) -> dict[sp.Symbol, sp.Expr]:
+    """Return those of the steps that expressions are made of.
+
+    Parameters
+    ----------
+    expressions
+        The expressions.
+    steps
+        Symbol -> what it is, of symbols in front of it.
+    """
+    waiting = [s for expression in expressions for s in expression.free_symbols if s in steps]
+    found: set[sp.Symbol] = set()
+    while waiting:
+        symbol = waiting.pop()
+        if symbol not in found:
+            found.add(symbol)
+            waiting += [s for s in steps[symbol].free_symbols if s in steps]
+    return {symbol: step for symbol, step in steps.items() if symbol in found}
+
+
+def of_parts(parts: Mapping[sp.Symbol, sp.Expr], results: tuple[sp.Expr, ...]) -> StraightLine:
+    """Return results with the parts that they are made of, each behind those that it is made of itself.
+
+    Parameters
+    ----------
+    parts
+        Symbol -> what it is, in any order.
+    results
+        The results.
+    """
+    ordered: dict[sp.Symbol, sp.Expr] = {}
+    inner = {s: [i for i in in_order(part.free_symbols) if i in parts] for s, part in parts.items()}
+    for result in results:
+        waiting = [s for s in reversed(in_order(result.free_symbols)) if s in parts]
+        while waiting:
+            symbol = waiting[-1]
+            missing = [s for s in inner[symbol] if s not in ordered]
+            if missing and symbol not in ordered:
+                waiting += reversed(missing)
+            else:
+                ordered.setdefault(waiting.pop(), parts[symbol])
+    return StraightLine(ordered, results)
+
+
+def in_order(symbols: Iterable[sp.Symbol]) -> list[sp.Symbol]:
+    """Return symbols in an order that is the same in every run."""
+    return sorted(symbols, key=lambda symbol: symbol.name)
