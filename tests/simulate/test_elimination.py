@@ -39,7 +39,8 @@ VALUES: Mapping[str, Mapping[str, float]] = {
     },
     "two_link_arm": {
         "l_1": 0.3, "g": 9.81, "I_1": 0.05, "I_2": 0.02, "m_2": 0.6, "s_1": 0.12, "s_2": 0.08, "d_1": 0.05, "d_2": 0.02,
-        "coulomb_friction@shoulder.T_c": 0.1, "stribeck_friction@elbow.T_c": 0.02, "T_c": 0.05, "T_s": 0.04, "w_s": 0.1, "T_d": 0.012, "c_2": 0.03,
+        "coulomb_friction@shoulder.T_c": 0.1, "stribeck_friction@elbow.T_c": 0.02, "T_c": 0.05, "T_s": 0.04,
+        "w_s": 0.1, "T_d": 0.012, "c_2": 0.03,
     },
     "quarter_car": {"m_b": 300.0, "m_w": 40.0, "k_b": 2e4, "d_b": 1500.0, "k_t": 2e5, "d_t": 100.0, "k_3": 4e6},
 }  # fmt: skip

@@ -15,8 +15,8 @@ _LONGEST_SHORTENED = 100
 
 
 MOST_COUPLED = 3
-"""Coordinates that move one another's inertia and whose accelerations are written as formulas. Those of four links in a plane take
-a compiler minutes, those of three a second."""
+"""Coordinates that move one another's inertia and whose accelerations are written as formulas. Those of four links in a plane
+take a compiler minutes, those of three a second."""
 
 
 @dataclass(frozen=True)
