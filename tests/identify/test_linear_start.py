@@ -137,7 +137,6 @@ def test_a_record_without_lateral_displacement() -> None:
     ("rig", "constants", "still", "moving"),
     [
         (AXIS, AXIS_CONSTANTS, "x", "u"),
-        (AXIS, AXIS_CONSTANTS, "u", "x"),
         (RUNNING_GEAR, GEAR_CONSTANTS, "psi", "u"),
         (ELEMENT, {}, "x", "force"),
         (ELEMENT, {}, "force", "x"),

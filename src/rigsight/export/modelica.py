@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-
-import sympy as sp
 
 from rigsight.export.at_rest import state_at_rest
 from rigsight.export.description import header_lines
 from rigsight.export.equations import Exported, Quantity
+from rigsight.simulate.printing.language import part_name
 from rigsight.simulate.printing.modelica import MODELICA
+from rigsight.simulate.straight_line import StraightLine, straight_line
 from rigsight.simulate.structure import INPUT
 
 
@@ -42,15 +41,17 @@ def modelica(exported: Exported, source: str, name: str) -> str:
         )
         names = {**names, INPUT: late}
     own_outputs, shown = _outputs(exported, used)
-    accelerations = () if structure.elimination is None else structure.elimination.accelerations
+    if structure.elimination is not None:
+        accelerations = structure.elimination.accelerations
+        line = straight_line(accelerations, structure.steps)
+        declared += [f"Real {part_name(part)};" for part in line.parts]
+        equations += MODELICA.written([], StraightLine(line.parts, ()), names)
+        names = {**names, **{a: part_name(a) for a in accelerations}}
     for state, equation, start in zip(
         exported.states, structure.equations, state_at_rest(exported), strict=True
     ):
         kind = "output Real" if state.name in own_outputs else "Real"
         declared.append(f"{kind} {state.name}{_unit(state, f'start={start!r}, fixed=true')} {_said(state)};")
-        if equation.rate in accelerations:
-            equations.append(_balance(exported, accelerations.index(equation.rate), names))
-            continue
         rate = MODELICA.expression(equation.rate, names)
         if equation.limit is not None:
             half = MODELICA.expression(equation.limit, names)
@@ -73,19 +74,6 @@ def modelica(exported: Exported, source: str, name: str) -> str:
         f"end {name};",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _balance(exported: Exported, row: int, names: Mapping[sp.Symbol, str]) -> str:
-    """Return an equation of motion as it is: tools of Modelica solve for the accelerations themselves."""
-    tree = exported.structure.tree
-    masses = zip(tree.motion.mass.row(row), tree.motion.velocities, strict=True)
-    inertial = [
-        f"({MODELICA.expression(tree.flattened(mass), names)})*der({names[velocity]})"
-        for mass, velocity in masses
-        if mass != 0
-    ]
-    force = MODELICA.expression(tree.flattened(tree.motion.forces[row]), names)
-    return f"{' + '.join(inertial)} = {force};"
 
 
 def _outputs(exported: Exported, used: set[str]) -> tuple[set[str], dict[int, tuple[str, Quantity]]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import sympy as sp
@@ -131,10 +131,10 @@ def export_model(
         _check_name(chosen, name)
     if step is not None:
         _check_step(chosen, step)
-    content = exported(
-        model, _hold(chosen, model, hold), step or (internal_step(model) if chosen.fixed_step else LONGEST)
-    )
+    content = exported(model, _hold(chosen, model, hold), step or LONGEST)
     _check_expressible(chosen, content)
+    if step is None and chosen.fixed_step:
+        content = replace(content, step=internal_step(model))
     if source_only:
         return fmu(content, harmless(source), name, version=_FMUS[target], source_only=True)
     return chosen.write(content, harmless(source), name)

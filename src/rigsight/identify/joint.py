@@ -133,7 +133,7 @@ def fit_jointly(
     Raises
     ------
     InputError
-        If all records are of one kind, a record's input never moves, or an effect's start value is missing.
+        If all records are of one kind, a motion that an input prescribes never moves, or an effect's start value is missing.
     """
     label = group_of or (lambda record: record.kind)
     groups = {name: [r for r in records if label(r) == name] for name in dict.fromkeys(map(label, records))}

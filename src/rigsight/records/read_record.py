@@ -178,7 +178,7 @@ def read_stretches(
         unit_notes += notes
     raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
     # A few samples at rest are too few before they are a rest.
-    check_long_enough(path.name, max((values.size for values in raw.values()), default=0))
+    check_long_enough(path.name, max(values.size for values in table.values.values()))
     refuse_what_nobody_measures(path, raw, table)
     found: list[str] = []
     if require_outputs:

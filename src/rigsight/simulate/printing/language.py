@@ -82,14 +82,18 @@ class Language:
         names
             Name in the code of each symbol that is no part.
         """
-        # Words of this form are taken from names of rigs and effects in exports.
-        own = {part: f"part_{part.name.replace(' ', '_')}" for part in line.parts}
+        own = {part: part_name(part) for part in line.parts}
         every = {**names, **own}
         known = {symbol: sp.Symbol(name, real=True) for symbol, name in every.items()}
         printed = [_printed(self.printer, e.xreplace(known)) for e in (*line.parts.values(), *line.results)]
         forms = [(self.declared, name) for name in own.values()]
         forms += [(self.assigned, target) for target in targets]
         return [form.format(target, text) for (form, target), text in zip(forms, printed, strict=True)]
+
+
+def part_name(part: sp.Symbol) -> str:
+    """Return how code calls a part of an expression; in exports no name of a rig or an effect is like that."""
+    return f"part_{part.name.replace(' ', '_')}"
 
 
 @lru_cache(maxsize=16_384)

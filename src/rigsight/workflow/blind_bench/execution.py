@@ -326,7 +326,7 @@ def _run_on_worker(run_one: Callable[[Name], Result], mark: Path | None, wanted:
 @functools.cache
 def source_version() -> str:
     """Return rigsight's version with a short hash of its source, which tells two states of development apart."""
-    package = Path(__file__).parents[1]
+    package = Path(__file__).parents[2]
     found = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):
         found.update(file.relative_to(package).as_posix().encode())
