@@ -257,6 +257,18 @@ def test_a_rig_at_rest_and_dry_friction_are_not_stuck():
     assert sensor_faults(AXIS, moving) == []
 
 
+def test_a_constant_start_is_not_stuck():
+    """An encoder stands exactly still until the drive sets in, and leaves its rest by whole steps."""
+    t = 1e-4 * np.arange(6000)
+    drive = np.where(t > 0.1, 1.0, 0.0) * np.sin(20.0 * (t - 0.1))
+    moving = simulate(compose(AXIS), VALUES, Record("start", 1e-4, {"u": 0.5 + drive}, {}))
+    encoder = 0.5 * np.max(np.abs(np.diff(moving["x"])))
+    counted = moving.with_signals(x=encoder * np.round(moving["x"] / encoder))
+    still = np.flatnonzero(np.diff(counted["x"]))[0]
+    assert still > 500
+    assert not [f for f in sensor_faults(AXIS, counted) if f.kind == "stuck"]
+
+
 def test_one_amplitude_cannot_tell():
     record = sweeps()[0]
     quality = looked_at([record, replace(record, name="again", role="validation")])

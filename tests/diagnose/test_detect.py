@@ -105,6 +105,20 @@ def test_quiet_stretch_before_a_sweep() -> None:
     assert floor.std == pytest.approx(SIGMA, rel=4.0 / np.sqrt(2.0 * 800))
 
 
+@pytest.mark.parametrize("level", [0.0, 2.5], ids=["at zero", "at a constant command"])
+@pytest.mark.parametrize("backwards", [False, True], ids=["first", "last"])
+def test_a_rest_from_which_an_input_moves_off_gently(level: float, backwards: bool) -> None:
+    """The steps of a slow start are as small as those of a rest: the rest counts, the motion does not."""
+    rng = np.random.default_rng(9)
+    t = DT * np.arange(2000)
+    slow = 4.0 * np.sin(0.02 * t**3) * np.minimum(t / 2.0, 1.0)
+    u = level + np.concatenate([np.zeros(800), slow if not backwards else slow[::-1]])
+    u = u[::-1] if backwards else u
+    floor = floor_of(axis_record(u, driven(u) + SIGMA * rng.standard_normal(u.size)))
+    assert "rests" in floor.method
+    assert floor.std == pytest.approx(SIGMA, rel=4.0 / np.sqrt(2.0 * 400))
+
+
 def test_quiet_stretches_see_the_disturbance_that_passes_the_rig() -> None:
     rng = np.random.default_rng(5)
     u = np.concatenate([np.zeros(4000), linear_sweep(DT * np.arange(1500), 4.0, 3.0, 50.0)])

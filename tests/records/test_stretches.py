@@ -53,6 +53,17 @@ def test_a_stretch_that_is_too_short_is_left_out_and_said(write_csv: WriteCsv) -
     assert "10 samples in shorter stretches were left out" in found[0].notes[0]
 
 
+def test_a_stretch_in_which_nothing_moves_is_left_out_and_said(write_csv: WriteCsv) -> None:
+    rows = table((299, 1.0))
+    rows[300:, 2:] = 0.5
+    (found,) = read(write_csv, rows)
+    assert found.n_samples == 300
+    assert (
+        "100 samples in stretches that are shorter, or in which no output changes, were left out"
+        in found.notes[0]
+    )
+
+
 def test_lost_samples_part_a_record_like_a_pause(write_csv: WriteCsv) -> None:
     found = read(write_csv, table(kept=np.delete(np.arange(400), [200, 201])))
     assert [record.n_samples for record in found] == [200, 198]
@@ -69,7 +80,7 @@ def test_a_single_record_is_refused_with_what_a_campaign_does(write_csv: WriteCs
     [
         (
             table(kept=np.flatnonzero(np.arange(400) % 25 > 1)),
-            r"Only 0 of 368 samples lie in stretches of 50",
+            r"Only 0 of 368 samples lie in stretches of 50 or more",
         ),
         # Every other sample lost now and then: no pause but a clock that cannot be trusted.
         (table(kept=np.delete(np.arange(400), np.arange(3, 400, 9))), "not equally spaced"),

@@ -184,12 +184,10 @@ def _quiet_stretches(
     still = np.all(np.abs(np.diff(samples, axis=0)) <= allowed, axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = []
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        moved = np.ptp(samples[start : stop + 1], axis=0)
-        if (
-            np.any(moved > np.maximum(_QUIET_INPUT * span, 2.0 * _WITHIN * noise))
-            or stop - start < _MIN_QUIET
-        ):
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        moved = np.maximum(_QUIET_INPUT * span, 2.0 * _WITHIN * noise)
+        start, stop = (begin + place for place in _held(samples[begin : end + 1], moved))
+        if stop - start < _MIN_QUIET:
             continue
         settled = record[output][start + (stop - start) // 2 if start > 0 else start : stop]
         if settled.size < _MIN_QUIET // 2:
@@ -203,6 +201,21 @@ def _quiet_stretches(
         if steady and (deviation <= 3.0 * scatter or not _is_free_motion(settled)):
             found.append((settled - np.mean(settled), record.dt))
     return found
+
+
+def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much.
+
+    Slow motion has small steps as well: a rest from which an input moves off gently ends where it has moved.
+    """
+
+    def length(ordered: NDArray[np.float64]) -> int:
+        spanned = np.maximum.accumulate(ordered, axis=0) - np.minimum.accumulate(ordered, axis=0)
+        beyond = np.flatnonzero(np.any(spanned > moved, axis=1))
+        return int(beyond[0]) if beyond.size else ordered.shape[0]
+
+    n, ahead, behind = samples.shape[0], length(samples), length(samples[::-1])
+    return (0, ahead - 1) if ahead >= behind else (n - behind, n - 1)
 
 
 def _is_free_motion(samples: NDArray[np.float64]) -> bool:

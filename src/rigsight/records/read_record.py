@@ -194,7 +194,8 @@ def read_stretches(
         )
     # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
     kept = [*raw] or [TIME]
-    cut = stretches(path.name, TIME, table)
+    measured = [output.name for output in outputs if output.name in raw] if require_outputs else []
+    cut = stretches(path.name, TIME, table, measured)
     parts = (one_stretch(path.name, cut),) if at_pauses == "refuse" else cut.parts
     held = {**dict.fromkeys(absent, 0.0), **constant_inputs}
     holds: dict[str, Hold] = {signal.name: hold for signal in inputs}

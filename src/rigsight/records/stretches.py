@@ -5,7 +5,7 @@ A motion across a pause is unknown, so that nothing is put in its place: each st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -22,6 +22,7 @@ from rigsight.records.conditioning import (
     pauses,
     resolution,
 )
+from rigsight.records.plausibility import is_constant
 
 _FEWEST_KEPT = 0.5
 """Share of the samples that must lie in stretches that are long enough: with fewer the file is no record of anything."""
@@ -43,7 +44,7 @@ class Stretches:
     notes: tuple[str, ...] = ()
 
 
-def stretches(file: str, time: str, table: Columns) -> Stretches:
+def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
     """Return the stretches of a table between the pauses of its clock.
 
     Parameters
@@ -54,6 +55,8 @@ def stretches(file: str, time: str, table: Columns) -> Stretches:
         Name of the time in the table; signals with axes of their own are left as they are.
     table
         What was read.
+    outputs
+        Of these one at least changes in a stretch that is worth a record.
 
     Raises
     ------
@@ -67,16 +70,22 @@ def stretches(file: str, time: str, table: Columns) -> Stretches:
     if ends.size == 0 or _may_be_rounding(stamps):
         return Stretches((table,))
     edges = [0, *(int(end) + 1 for end in ends), stamps.size]
-    spans = [(start, stop) for start, stop in pairwise(edges) if stop - start >= FEWEST_SAMPLES]
+    long = [(start, stop) for start, stop in pairwise(edges) if stop - start >= FEWEST_SAMPLES]
+    spans = [(start, stop) for start, stop in long if _moves(table, outputs, start, stop)]
     where = _where(stamps, table, ends)
     kept = sum(stop - start for start, stop in spans)
     if kept < _FEWEST_KEPT * stamps.size:
         raise InputError(
             f"{file}: samples are missing {where}. Only {kept} of {stamps.size} samples lie in stretches of {FEWEST_SAMPLES} or "
-            "more. Record without dropouts, or fill them before reading if you know what was there."
+            "more in which an output changes. Record without dropouts, or fill them before reading if you know what was there."
         )
     dropped = stamps.size - kept
-    left = f" {dropped} samples in shorter stretches were left out." if dropped else ""
+    why = (
+        "shorter stretches"
+        if len(spans) == len(long)
+        else "stretches that are shorter, or in which no output changes,"
+    )
+    left = f" {dropped} samples in {why} were left out." if dropped else ""
     note = (
         f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with "
         f"initial states of its own; nothing was put between.{left}"
@@ -118,6 +127,10 @@ def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) 
         f"between {table.row}s {table.lines[first]} and {table.lines[first + 1]} ({missing_behind(stamps, first)}; the time "
         f"jumps from {stamps[first]:.9g} to {stamps[first + 1]:.9g}){others}"
     )
+
+
+def _moves(table: Columns, outputs: Sequence[str], start: int, stop: int) -> bool:
+    return not outputs or any(not is_constant(table.values[name][start:stop]) for name in outputs)
 
 
 def _part(table: Columns, start: int, stop: int) -> Columns:

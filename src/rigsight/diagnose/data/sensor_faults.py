@@ -15,6 +15,8 @@ _LONGEST_SHARE_STILL = 0.5
 """A channel that stands still for longer than this in other places too is a rig at rest, not a stuck sensor."""
 _ABRUPT = 0.5
 """Step into or out of standing still, in root mean square steps, that no mass makes."""
+_ONE_STEP = 1.5
+"""Least steps of a channel up to which a change is one of them."""
 _FEWEST_LEVELS = 200
 _JUMP_SIZE = 0.05
 """Least size of a jump, in standard deviations of the channel."""
@@ -92,7 +94,9 @@ def _stuck(record: Record, name: str) -> list[Finding]:
     typical = float(np.sqrt(np.mean(steps[~still] ** 2)))
     before = np.abs(steps[np.maximum(starts - 1, 0)]) * (starts > 0)
     after = np.abs(steps[np.minimum(stops, steps.size - 1)]) * (stops < steps.size)
-    stuck = np.flatnonzero(long & (np.maximum(before, after) > _ABRUPT * typical))
+    # An encoder leaves its rest by a whole step however gently the mass does.
+    broken_off = max(_ABRUPT * typical, _ONE_STEP * float(np.min(np.abs(steps[~still]))))
+    stuck = np.flatnonzero(long & (np.maximum(before, after) > broken_off))
     if stuck.size == 0:
         return []
     told = [
