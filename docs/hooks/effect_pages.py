@@ -11,7 +11,8 @@ from rigsight.effects import CATALOGUE, Effect, GainTrend, Place
 from rigsight.parameters import Parameter
 from rigsight.report.equations import equations_of
 from rigsight.report.wording import effect_label, listed, sentence_case
-from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR
+from rigsight.rigs import RIGS
+from rigsight.workflow.own.effect_promises import ELEMENT_BENCH, bench_of
 
 _PLACES = {
     Place.ACTUATOR: "actuator",
@@ -100,8 +101,7 @@ def _facts(effect: Effect) -> str:
 
 
 def _equations(effect: Effect) -> str:
-    rig = AXIS if AXIS.offers(effect) else RUNNING_GEAR
-    motion, own = equations_of(rig, [effect])
+    motion, own = equations_of(bench_of(effect).rig, [effect])
     groups = (
         ("The effect:", own.equations),
         (f"In the equation of the {motion.title.lower()}:", motion.equations),
@@ -174,6 +174,8 @@ def _caption(effect: Effect) -> str:
         how = "Running gear with the numbers of the thesis; the frequency is that of the drive."
     elif effect.lateral is not None:
         how = "Running gear with the numbers of the thesis: lateral displacement over motor current."
+    elif bench_of(effect) is ELEMENT_BENCH:
+        how = "Element with d = 2 N s/m, k = 100 N/m: force over the frequency of the prescribed motion."
     else:
         how = "Axis with m = 1 kg, d = 2 N s/m, k = 100 N/m: it resonates at 10 rad/s."
     return (

@@ -131,7 +131,7 @@ def _first_harmonic(
 
 
 def _gain(effect: Effect, bench: Bench, values: Values, levels: tuple[float, ...]) -> Panel:
-    unit = {"x": "m/N", "y": "m/A"}[bench.output]
+    unit = {"x": "m/N", "y": "m/A", "force": "N/m"}[bench.output]
     linear = np.abs(_response(compose(bench.rig), bench, values, FULL))
     structure = compose(bench.rig, [effect])
     lines = [Line(FREQUENCIES, linear, "linear rig", None)]

@@ -39,7 +39,8 @@ class Parameter:
     logarithmic
         True for positive quantities that are searched over decades.
     fitted
-        False for a redundant or purely conventional number that no record can determine.
+        False for a redundant or purely conventional number that no record can determine. A fit leaves it at its first start, if
+        it has one, else at its default.
     """
 
     name: str
@@ -54,6 +55,25 @@ class Parameter:
     search: tuple[float, float] = (-math.inf, math.inf)
     logarithmic: bool = False
     fitted: bool = True
+
+    def held_at(self, size: float) -> float:
+        """Return where a fit leaves a number that it does not move.
+
+        Parameters
+        ----------
+        size
+            Characteristic size of the number, see `rigsight.units.characteristic_value`.
+
+        Raises
+        ------
+        ValueError
+            If it has neither a start nor a default.
+        """
+        if self.starts:
+            return self.starts[0] * size
+        if self.default is None:
+            raise ValueError(f"Parameter {self.name} is not fitted and has neither a start nor a default.")
+        return self.default
 
     def check(self, value: float) -> float:
         """Return `value` as a float.

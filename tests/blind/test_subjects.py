@@ -37,10 +37,11 @@ def test_none_is_missed(design: CatalogueDesign) -> None:
     assert ("pair" in {s.kind for s in subjects}) == (design != "joints")
 
 
-def test_what_no_axis_and_no_gear_tells_apart_is_drawn_on_larger_rigs() -> None:
-    train = {kind_of(effect.name) for effect in candidates_on(RIGS["drive_train"], CATALOGUE)}
+def test_what_no_axis_and_no_gear_tells_apart_is_drawn_on_other_rigs() -> None:
+    others = [rig for name, rig in RIGS.items() if name not in ("axis", "running_gear")]
+    offered = {kind_of(effect.name) for rig in others for effect in candidates_on(rig, CATALOGUE)}
     assert OF_JOINTS.isdisjoint(ELSEWHERE)
-    assert ELSEWHERE & {effect.name for effect in CATALOGUE} <= train
+    assert offered >= ELSEWHERE
 
 
 def test_another_pass_and_another_seed_are_other_orders_of_the_same_cells() -> None:

@@ -47,5 +47,7 @@ def test_a_pair_of_one_law_must_be_exact_and_needed(
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_linear_effects_are_known(effect) -> None:
-    linear = {"flexible_mode", "actuator_lag", "input_delay", "sensor_lag", "sensor_delay"}
+    linear = {
+        "flexible_mode", "maxwell_branch", "inertia", "actuator_lag", "input_delay", "sensor_lag", "sensor_delay", "time_shift",
+    }  # fmt: skip
     assert is_linear(effect) == (effect.name in linear)

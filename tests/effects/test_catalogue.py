@@ -21,6 +21,7 @@ from rigsight.workflow.own.effect_promises import (
     PER_PERIOD,
     PROMISES,
     SMALL,
+    bench_of,
     is_found_again,
     last_period,
     sine_record,
@@ -28,13 +29,13 @@ from rigsight.workflow.own.effect_promises import (
 )
 
 each_effect = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
-each_effect_of_an_axis = pytest.mark.parametrize(
-    "effect", [effect for effect in CATALOGUE if AXIS.offers(effect)], ids=lambda effect: effect.name
+each_effect_of_one_motion = pytest.mark.parametrize(
+    "effect", [effect for effect in CATALOGUE if effect.lateral is None], ids=lambda effect: effect.name
 )
 """Those of the lateral motion are tested in test_lateral.py."""
 
 
-@each_effect_of_an_axis
+@each_effect_of_one_motion
 @pytest.mark.parametrize(
     "promise", [p for p in PROMISES if p is not is_found_again], ids=lambda promise: promise.__name__
 )
@@ -43,27 +44,28 @@ def test_promise_is_kept(effect, promise):
     assert promise(effect) is None
 
 
-@each_effect_of_an_axis
+@each_effect_of_one_motion
 def test_accuracy_wish_is_met(effect):
-    record = sine_record(FULL, 4)
-    structure = compose(AXIS, [effect])
+    bench = bench_of(effect)
+    record = sine_record(FULL, 4, bench=bench)
+    structure = compose(bench.rig, [effect])
     for values in start_values(effect)[:2]:
-        exact = simulate(structure, values, record, accuracy=1e-9)["x"]
+        exact = simulate(structure, values, record, accuracy=1e-9)[bench.output]
         for accuracy in (1e-4, 1e-6):
-            error = simulate(structure, values, record, accuracy=accuracy)["x"] - exact
+            error = simulate(structure, values, record, accuracy=accuracy)[bench.output] - exact
             assert np.sqrt(np.mean(error**2)) <= accuracy * np.std(exact)
 
 
 def harmonics(effect: Effect, amplitude: float) -> NDArray[np.complex128]:
-    values = start_values(effect)[0]
+    values, bench = start_values(effect)[0], bench_of(effect)
     if effect.name == "gravity_pendulum":
         # This axis turns through a hundredth of a radian only.
         values["k_g"] *= 20.0
-    x = simulate(compose(AXIS, [effect]), values, sine_record(amplitude, 40))["x"]
+    x = simulate(compose(bench.rig, [effect]), values, sine_record(amplitude, 40, bench=bench))[bench.output]
     return np.fft.rfft(last_period(x))[:4] / (PER_PERIOD / 2) / amplitude
 
 
-@each_effect_of_an_axis
+@each_effect_of_one_motion
 def test_signature_is_the_measured_one(effect):
     small, full = harmonics(effect, SMALL), harmonics(effect, FULL)
     change = abs(full[1]) / abs(small[1]) - 1.0

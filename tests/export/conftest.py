@@ -54,6 +54,12 @@ EFFECT_VALUES: Mapping[str, Mapping[str, float]] = {
     "load_dependent_friction": {"T_c": 0.05, "mu": 0.1},
     "presliding_friction": {"T_c": 0.1, "x_p": 0.002},
     "torque_ripple": {"T_sin": 0.06, "T_cos": 0.04, "kappa": 400.0},
+    "speed_limit": {"u_s": 0.8, "c_u": 2.0},
+    "encoder_eccentricity": {"e_sin": 2e-4, "e_cos": 1e-4, "kappa": 600.0},
+    "maxwell_branch": {"k_m": 40.0, "tau_m": 0.2},
+    "power_law_stiffness": {"k_p": 40.0, "n": 1.6, "x_r": 0.01},
+    "time_shift": {"T_x": 0.027},
+    "inertia": {"m_e": 0.02},
     "quadratic_damping": {"c_2": 20.0},
     "position_dependent_damping": {"c_x": 3e4},
     "cubic_stiffness": {"k_3": 3e5},
@@ -124,6 +130,8 @@ class _Plan:
 
 
 PLANS: dict[str, _Plan] = {effect.name: _Plan("running_gear", (effect.name,)) for effect in CATALOGUE} | {
+    "inertia": _Plan("element", ("inertia",), amplitude=0.01),
+    "element with a late force": _Plan("element", ("time_shift",), amplitude=0.01),
     "linear running gear": _Plan("running_gear"),
     "linear axis": _Plan("axis"),
     "axis without a spring": _Plan("axis", values={"k": 0.0}),
@@ -228,7 +236,11 @@ def made_case(name: str) -> Case:
     )  # fmt: skip
 
 
-@pytest.fixture(params=PLANS)
+NOT_WRITTEN = {"inertia", "element with a late force"}
+"""What every target but LaTeX refuses."""
+
+
+@pytest.fixture(params=[name for name in PLANS if name not in NOT_WRITTEN])
 def case(request: pytest.FixtureRequest) -> Case:
     """Each of the models in turn."""
     return made_case(request.param)
@@ -243,4 +255,4 @@ def case_named() -> Callable[[str], Case]:
 @pytest.fixture(scope="session")
 def case_names() -> tuple[str, ...]:
     """The names of all models."""
-    return tuple(PLANS)
+    return tuple(name for name in PLANS if name not in NOT_WRITTEN)

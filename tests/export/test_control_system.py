@@ -13,6 +13,7 @@ from rigsight.export import export_model
 REFUSED = {e.name for e in CATALOGUE if e.torque is not None and e.torque.has(sp.sign)} | {
     "input_delay",
     "sensor_delay",
+    "time_shift",
 }
 SMOOTH, KINKED = 1e-6, 1e-4
 """A solver that knows no events crosses kinks with the error of its step."""

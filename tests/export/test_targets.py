@@ -11,15 +11,21 @@ from rigsight.errors import InputError
 from rigsight.export import TARGETS, export_model
 
 STICKS = {"coulomb_friction", "stribeck_friction", "directional_friction", "load_dependent_friction"}
-LATE = {"input_delay", "sensor_delay"}
+LATE = {"input_delay", "sensor_delay", "time_shift"}
 REFUSED = {"control": STICKS | LATE, "modelica": STICKS}
+WITHOUT = "forces that go with the acceleration of a prescribed motion"
 
 
 @pytest.mark.parametrize("target", [name for name in TARGETS if not name.startswith("fmu")])
 @pytest.mark.parametrize("name", [effect.name for effect in CATALOGUE])
 def test_every_effect_is_written_or_refused_by_name(name: str, target: str, case_named):
     model = case_named(name).model
-    if name in REFUSED.get(target, ()):
+    if name == "inertia" and target != "latex":
+        with pytest.raises(
+            InputError, match=f"'{name}' cannot be exported to {target}, .*{WITHOUT}.* it: latex."
+        ):
+            export_model(model, target, source="model.json", name="rig")
+    elif name in REFUSED.get(target, ()):
         with pytest.raises(
             InputError, match=f"'{name}' cannot be exported to {target}.*Targets with it: python, c"
         ):
@@ -42,6 +48,18 @@ def test_an_effect_that_has_vanished_is_left_out(case_named):
     model = case_named("coulomb_friction").model
     without = replace(model, values={**model.values, "T_c": 0.0})
     assert "T_c" not in str(export_model(without, "control", source="model.json"))
+
+
+@pytest.mark.parametrize("target", [name for name in TARGETS if name != "latex"])
+def test_a_shifted_record_is_of_a_rig_that_moves_freely_and_late(target: str, case_named):
+    with pytest.raises(InputError, match=f"'time_shift' cannot be exported to {target}, .*{WITHOUT}"):
+        export_model(case_named("element with a late force").model, target, source="model.json", name="rig")
+    late = case_named("time_shift").model
+    early = replace(late, values={**late.values, "T_x": -0.02})
+    with pytest.raises(
+        InputError, match=r"'time_shift' shows a signal 0\.02 s before it happens.*set T_x = 0"
+    ):
+        export_model(early, target, source="model.json", name="rig")
 
 
 @pytest.mark.parametrize("target", ["python", "c", "fmu", "fmu3", "matlab"])

@@ -70,30 +70,31 @@ DRIFTING_SENSOR = Effect(
     signature=_STEADY,
     measured=reading + _strength * t,
 )
-BROKEN_POWER_STIFFNESS = Effect(
-    name="broken_power_stiffness",
+LEVELING_STIFFNESS = Effect(
+    name="leveling_stiffness",
     place=Place.DYNAMICS,
-    summary="A second spring, as of a contact, whose force grows with the power 1.5 of the deflection.",
+    summary="A second spring whose force levels off, as that of a magnet.",
     parameters=(
-        _strength_of("stiffness of the contact", "force x^-1", 0.5, 1.0),
-        Parameter("reach", "deflection at which it has that stiffness", "x", starts=(1.0,)),
+        _strength_of("its stiffness about rest", "force x^-1", 0.5, 1.0),
+        Parameter("reach", "deflection at which it levels off", "x", starts=(0.3,)),
     ),
     energy=Energy.CONSERVATIVE,
-    signature=Signature(GainTrend.FALLS),
-    torque=_strength * x * sp.sqrt(sp.Abs(x)) / sp.sqrt(_reach),
+    signature=_RISES,
+    torque=_strength * _reach * sp.tanh(x / _reach),
 )
-MAXWELL_BRANCH = Effect(
-    name="maxwell_branch",
+THINNING_BRANCH = Effect(
+    name="thinning_branch",
     place=Place.DYNAMICS,
-    summary="Beside the spring, another one in series with a damper: rubber that relaxes.",
+    summary="Beside the spring, another one in series with a damper that gives way more under a larger force.",
     parameters=(
         _strength_of("stiffness of the branch", "force x^-1", 0.3, 0.8),
-        Parameter("settling", "relaxation time", "time", starts=(0.5, 2.0)),
+        Parameter("settling", "relaxation time at the deflection `reach`", "time", starts=(0.5, 2.0)),
+        Parameter("reach", "deflection of the branch", "x", starts=(0.3,)),
     ),
     energy=Energy.DISSIPATIVE,
-    signature=_STEADY,
+    signature=_RISES,
     torque=_strength * _memory,
-    states=(State(_memory, v - _memory / _time, "x"),),
+    states=(State(_memory, v - _memory * sp.Abs(_memory) / (_reach * _time), "x"),),
 )
 CUBIC_DAMPING = Effect(
     name="cubic_damping",
@@ -139,8 +140,8 @@ UNLIKE_THE_CATALOGUE: tuple[Effect, ...] = (
     DRIFTING_SENSOR,
 )
 LIKE_THE_CATALOGUE: tuple[Effect, ...] = (
-    BROKEN_POWER_STIFFNESS,
-    MAXWELL_BRANCH,
+    LEVELING_STIFFNESS,
+    THINNING_BRANCH,
     CUBIC_DAMPING,
     STRUCTURAL_DAMPING,
     DRIVE_OVER_SPEED,

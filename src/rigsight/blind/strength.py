@@ -35,8 +35,7 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
             start = p.starts[int(rng.integers(len(p.starts)))]
             shape[p.name] = start * _unit(effect, p.dimension, scales) * spread
         else:
-            assert p.default is not None
-            shape[p.name] = p.default
+            shape[p.name] = p.held_at(_unit(effect, p.dimension, scales))
         shape[p.name] = min(max(shape[p.name], p.lower), p.upper)
         if p.null == 1.0:
             shape[p.name] = rng.uniform(0.1, 0.5)

@@ -17,13 +17,16 @@ Noise = Literal["low", "high"]
 CatalogueDesign = Literal["small", "standard", "joints"]
 """Lists of cells on the running gear or an axis; together they hold every effect of the catalogue that is told apart there."""
 
-OF_JOINTS = frozenset({"torque_ripple", "presliding_friction", "load_dependent_friction"})
+OF_JOINTS = frozenset({
+    "encoder_eccentricity", "load_dependent_friction", "maxwell_branch", "power_law_stiffness", "presliding_friction",
+    "speed_limit", "time_shift", "torque_ripple",
+})  # fmt: skip
 """Effects of measured servo and robot joints, which the catalogue got later.
 
 They have a design of their own, so that the trials of the two others stay those that were counted before.
 """
-ELSEWHERE = frozenset({"directional_friction"})
-"""Effects that neither rig tells from a plainer one: a rest position is a constant force, and nobody knows it."""
+ELSEWHERE = frozenset({"directional_friction", "inertia"})
+"""Effects that neither rig has: friction that differs each way is a rest position there, and the motion is not prescribed."""
 
 TIERS: dict[Tier, tuple[float, float]] = {"faint": (1.5, 5.0), "clear": (5.0, 20.0), "strong": (20.0, 80.0)}
 """Gap that the re-identified equations leave, in units of the noise floor."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.candidates.one_law import is_linear
 from rigsight.diagnose.location.block_means import RESAMPLES, block_means
 from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored
@@ -158,9 +159,9 @@ def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
 
 
 def _late_drive_in_disguise(model: Scored) -> bool:
-    """Return True for a sensor's effect on a rig with one output, where a late sensor and a late drive are the same records."""
+    """Return True for a linear effect of the sensor of a rig with one output: it is one of the drive in the same records."""
     one_output = len(model.fit.structure.rig.outputs) == 1
-    return one_output and any(effect.place is Place.SENSOR for effect in model.effects)
+    return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
 
 
 def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:

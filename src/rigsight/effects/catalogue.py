@@ -12,29 +12,36 @@ from rigsight.effects.creep_saturation import CREEP_SATURATION
 from rigsight.effects.cubic_stiffness import CUBIC_STIFFNESS
 from rigsight.effects.directional_friction import DIRECTIONAL_FRICTION
 from rigsight.effects.effect import Effect
+from rigsight.effects.encoder_eccentricity import ENCODER_ECCENTRICITY
 from rigsight.effects.end_stop import END_STOP
 from rigsight.effects.flexible_mode import FLEXIBLE_MODE
 from rigsight.effects.free_play import FREE_PLAY
 from rigsight.effects.gravity_pendulum import GRAVITY_PENDULUM
+from rigsight.effects.inertia import INERTIA
 from rigsight.effects.input_dead_zone import INPUT_DEAD_ZONE
 from rigsight.effects.input_delay import INPUT_DELAY
 from rigsight.effects.input_saturation import INPUT_SATURATION
 from rigsight.effects.iwan_hysteresis import IWAN_HYSTERESIS
 from rigsight.effects.load_dependent_friction import LOAD_DEPENDENT_FRICTION
+from rigsight.effects.maxwell_branch import MAXWELL_BRANCH
 from rigsight.effects.periodic_disturbance import PERIODIC_DISTURBANCE
 from rigsight.effects.placed import AT, placed
 from rigsight.effects.position_dependent_damping import POSITION_DEPENDENT_DAMPING
+from rigsight.effects.power_law_stiffness import POWER_LAW_STIFFNESS
 from rigsight.effects.presliding_friction import PRESLIDING_FRICTION
 from rigsight.effects.quadratic_damping import QUADRATIC_DAMPING
 from rigsight.effects.sensor_delay import SENSOR_DELAY
 from rigsight.effects.sensor_lag import SENSOR_LAG
+from rigsight.effects.speed_limit import SPEED_LIMIT
 from rigsight.effects.stribeck_friction import STRIBECK_FRICTION
+from rigsight.effects.time_shift import TIME_SHIFT
 from rigsight.effects.torque_ripple import TORQUE_RIPPLE
 from rigsight.errors import check_option
 
 CATALOGUE: tuple[Effect, ...] = (
     BOUC_WEN_HYSTERESIS,
     IWAN_HYSTERESIS,
+    MAXWELL_BRANCH,
     COULOMB_FRICTION,
     STRIBECK_FRICTION,
     DIRECTIONAL_FRICTION,
@@ -43,6 +50,7 @@ CATALOGUE: tuple[Effect, ...] = (
     QUADRATIC_DAMPING,
     POSITION_DEPENDENT_DAMPING,
     CUBIC_STIFFNESS,
+    POWER_LAW_STIFFNESS,
     GRAVITY_PENDULUM,
     TORQUE_RIPPLE,
     END_STOP,
@@ -50,15 +58,19 @@ CATALOGUE: tuple[Effect, ...] = (
     BACKLASH,
     ASYMMETRIC_STIFFNESS,
     FLEXIBLE_MODE,
+    INERTIA,
     INPUT_DELAY,
     ACTUATOR_LAG,
     INPUT_SATURATION,
+    SPEED_LIMIT,
     INPUT_DEAD_ZONE,
     PERIODIC_DISTURBANCE,
     CREEP_SATURATION,
     CONICITY_VARIATION,
     SENSOR_DELAY,
     SENSOR_LAG,
+    TIME_SHIFT,
+    ENCODER_ECCENTRICITY,
 )
 
 

@@ -206,6 +206,11 @@ class Effect:
         return tuple(dict.fromkeys(parent for parent in others if parent is not None))
 
     @property
+    def shifts_the_record(self) -> bool:
+        """True for a reading whose time base stands off, either way: what is recorded, not what a control law reads."""
+        return self.measured_late is not None and any(p.lower < 0.0 for p in self.parameters)
+
+    @property
     def holds_constant_force(self) -> bool:
         """True for a force with a mean that goes with the direction: no record tells the mean from a constant force."""
         lopsided = self.torque is not None and self.signature.even_harmonics

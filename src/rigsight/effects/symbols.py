@@ -49,6 +49,8 @@ x_size = sp.Symbol("x_size", positive=True)
 """Size of the displacement in the records; in start values only."""
 drive_size = sp.Symbol("drive_size", positive=True)
 """Size of the drive's force in the records; in start values only."""
+input_size = sp.Symbol("input_size", positive=True)
+"""Size of the drive's input in the records; in start values only."""
 v_size = sp.Symbol("v_size", positive=True)
 """Size of the velocity in the records; in start values only."""
 time_size = sp.Symbol("time_size", positive=True)

@@ -9,6 +9,7 @@ from functools import partial
 
 import sympy as sp
 
+from rigsight.effects import symbols
 from rigsight.errors import InputError, check_in_range, check_option
 from rigsight.export.c_source import c_source
 from rigsight.export.control_system import control_system
@@ -31,6 +32,8 @@ DELAY = "a delay"
 SENSOR_DELAY = "a late sensor"
 STICKING_TOGETHER = "dry friction that sticks at several joints"
 ACCELERATION = "the acceleration of a prescribed motion"
+FELT_ACCELERATION = "forces that go with the acceleration of a prescribed motion"
+"""Known once the next sample is: what runs along with its input has none at a sample."""
 _SHORTEST = 1e-9
 _RESERVED = {"matlab": MATLAB, "modelica": MODELICA}
 
@@ -70,21 +73,26 @@ TARGETS: dict[str, Target] = {
     for target in (
         Target(
             "python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s),
-            lacks=frozenset({STICKING_TOGETHER}), fixed_step=True, named=False,
+            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), fixed_step=True, named=False,
         ),
         Target(
             "control", ".py", "a python-control NonlinearIOSystem", control_system,
-            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY, ACCELERATION}), steps=False, named=False,
+            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY, ACCELERATION, FELT_ACCELERATION}), steps=False, named=False,
         ),
-        Target("c", ".c", "one C99 file without dependencies", c_source),
-        Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu),
-        Target("fmu3", ".fmu", "an FMU: FMI 3.0, co-simulation", partial(fmu, version=3)),
+        Target("c", ".c", "one C99 file without dependencies", c_source, lacks=frozenset({FELT_ACCELERATION})),
+        Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu, lacks=frozenset({FELT_ACCELERATION})),
+        Target(
+            "fmu3", ".fmu", "an FMU: FMI 3.0, co-simulation", partial(fmu, version=3), lacks=frozenset({FELT_ACCELERATION})
+        ),
         Target(
             "matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function,
-            lacks=frozenset({STICKING_TOGETHER}), fixed_step=True,
+            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), fixed_step=True,
         ),
         Target("latex", ".tex", "equations and numbers for a document", lambda e, s, _: latex(e, s), steps=False, named=False),
-        Target("modelica", ".mo", "a Modelica model", modelica, lacks=frozenset({STICKING, ACCELERATION}), steps=False),
+        Target(
+            "modelica", ".mo", "a Modelica model", modelica,
+            lacks=frozenset({STICKING, ACCELERATION, FELT_ACCELERATION}), steps=False,
+        ),
     )
 }  # fmt: skip
 """In the order in which they are shown."""
@@ -140,6 +148,19 @@ def export_model(
     return chosen.write(content, harmless(source), name)
 
 
+def _check_nothing_is_early(content: Exported) -> None:
+    structure = content.structure
+    values = {**dict(structure.fixed), **dict(zip(structure.names, content.values, strict=True))}
+    for effect in structure.effects:
+        own = structure.values_of(effect, values)
+        if effect.shifts_the_record and any(value < 0.0 for value in own.values()):
+            ((name, early),) = own.items()
+            raise InputError(
+                f"'{effect.name}' shows a signal {-early:g} s before it happens, which nothing that runs along with its input "
+                f"can. It is of the records and not of the rig: set {name} = 0 in the model."
+            )
+
+
 def unsaid(content: Exported) -> dict[str, str]:
     """Return what of a model not every target can say, with the effect, or the rig, that it comes from."""
     structure: Structure = content.structure
@@ -153,6 +174,9 @@ def unsaid(content: Exported) -> dict[str, str]:
     rates = (*content.frozen.rates, *content.frozen.steps.values())
     if any(rate.free_symbols & curvatures for rate in rates):
         found[ACCELERATION] = structure.rig.name
+    if any(shown.free_symbols & curvatures for shown in structure.computed_outputs):
+        feeling = [e.name for e in structure.effects if e.reads(symbols.acceleration) or e.shifts_the_record]
+        found[FELT_ACCELERATION] = (feeling or [structure.rig.name])[0]
     for effect in structure.effects:
         if effect.delay is not None:
             found[DELAY] = effect.name
@@ -162,6 +186,7 @@ def unsaid(content: Exported) -> dict[str, str]:
 
 
 def _check_expressible(target: Target, content: Exported) -> None:
+    _check_nothing_is_early(content)
     for what, effect in unsaid(content).items():
         if what in target.lacks:
             able = ", ".join(t.name for t in TARGETS.values() if what not in t.lacks)

@@ -9,6 +9,7 @@ from typing import Any
 
 import sympy as sp
 
+from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
 from rigsight.parameters import Parameter
 from rigsight.rigs.evaluation import evaluated
@@ -398,11 +399,17 @@ class Rig:
             return self.follower is not None
         if not self.places(effect.place) or not self._suits(effect):
             return False
-        if self.is_driven:
+        if effect.reads(symbols.acceleration) and not self._is_prescribed(effect):
+            return False
+        if self.is_driven or effect.shifts_the_record:
             return True
         return effect.place is Place.DYNAMICS and (
             not effect.needs_inertia or joint_of(self, effect).inertia is not None
         )
+
+    def _is_prescribed(self, effect: Effect) -> bool:
+        """Return True if an effect acts where the motion is prescribed: there its acceleration is known."""
+        return not self.mechanism.moves_inertia(joint_of(self, effect).motion)
 
     def _suits(self, effect: Effect) -> bool:
         """Return False for an effect of a spring or of a mass at a joint that has none."""

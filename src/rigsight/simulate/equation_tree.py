@@ -34,6 +34,10 @@ class late(sp.Function):  # type: ignore[misc]  # noqa: N801
     is_real = True
 
 
+class shifted(late):  # noqa: N801
+    """The same of a reading that nothing else reads, whose record is shifted as a whole, either way."""
+
+
 @dataclass(frozen=True)
 class Definition:
     """A named value: what an effect makes of the signal that reaches it, or what the rig calls by a name of its own.
@@ -217,7 +221,12 @@ class EquationTree:
         return self.lateness(symbol)[0] in self.inputs
 
     def _is_shown_late(self, symbol: sp.Symbol) -> bool:
-        """Return True for a reading that nothing else reads, and whose rate is one of states alone and without kinks."""
+        """Return True for a reading that nothing else reads, and whose rate is one of states alone and without kinks.
+
+        Of a record that is shifted as a whole, rate and kinks do not matter.
+        """
+        if isinstance(self._expressions[symbol], shifted):
+            return True
         last, (reading, _) = symbol, self.lateness(symbol)
         while True:
             read, moves, shown = self._readers(last)
@@ -244,6 +253,14 @@ class EquationTree:
         rates |= {state.symbol: state.rate for state in self.states}
         present = [s for s in rates if s in flat.free_symbols]
         return sum((sp.diff(flat, s) * self.flattened(rates[s]) for s in present), start=sp.Integer(0))
+
+    def shown_lateness(self, symbol: sp.Symbol) -> sp.Expr | None:
+        """Return the time by which a reading is shown late behind the simulation; None where it is not."""
+        delays: list[sp.Expr] = []
+        while symbol not in self.remembered and isinstance(expression := self._expressions.get(symbol), late):
+            symbol, delay = expression.args
+            delays.append(delay)
+        return sp.Add(*delays) if delays else None
 
     def lateness(self, symbol: sp.Symbol) -> tuple[sp.Symbol, sp.Expr | None]:
         """Return what a symbol was before it was delayed, and by how much in all; None without a delay."""

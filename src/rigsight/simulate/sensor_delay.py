@@ -16,7 +16,7 @@ from rigsight.simulate.structure import Structure
 def as_measured(
     structure: Structure, p: NDArray[np.float64], out: NDArray[np.float64], held: HeldInput
 ) -> NDArray[np.float64]:
-    """Shift outputs by the delays of their sensors; before the record the motion went on as it started.
+    """Shift outputs by the delays of their sensors; before the record the motion went on as it started, behind it as it ended.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def _shifted(
         x, v = value[:, i], rise[:, i]
         a, b, va, vb = x[start], x[start + 1], v[start], v[start + 1]
         inside = a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb)))
-        shifted[:, i] = np.where(s < 0.0, x[0] + v[0] * place, inside)
+        before = np.where(s < 0.0, x[0] + v[0] * place, inside)
+        shifted[:, i] = np.where(s > 1.0, x[-1] + v[-1] * (place - (n_samples - 1)), before)
     return shifted
 
 

@@ -21,6 +21,7 @@ from rigsight.simulate.equation_tree import (
     Kind,
     Output,
     late,
+    shifted,
 )
 from rigsight.simulate.structure import TIME, input_symbols
 from rigsight.units import size_of
@@ -369,13 +370,20 @@ class _Path:
                 reading = self._define(
                     Kind.READING, effect, self._binder.effect(effect, effect.measured, signals)
                 )
-        for effect in effects:
-            if effect.measured_late is not None:
-                delay = self._binder.effect(effect, effect.measured_late, self._of_motion())
+        delays = [
+            (effect, self._binder.effect(effect, effect.measured_late, {}))
+            for effect in effects
+            if effect.measured_late is not None
+        ]
+        for effect, delay in delays:
+            if not effect.shifts_the_record:
                 reading = self._define(Kind.READING, effect, late(reading, delay))
         if reading_symbol(sensor.name) in self._read:
             reading = self._name(Kind.READING, sensor.name, reading)
         self._values[reading_symbol(sensor.name)] = reading
+        for effect, delay in delays:
+            if effect.shifts_the_record:
+                reading = self._define(Kind.READING, effect, shifted(reading, delay))
         return (reading,)
 
     def _define(

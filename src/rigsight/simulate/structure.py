@@ -170,12 +170,7 @@ class Structure:
     @cached_property
     def shown_late(self) -> tuple[sp.Expr | None, ...]:
         """For each output the time by which it is shown late behind the simulation, or None."""
-        delays = []
-        for output in self.tree.outputs:
-            reading = sp.Add(*output.terms)
-            known = reading in self.tree.remembered
-            delays.append(None if known else self.tree.lateness(reading)[1])
-        return tuple(delays)
+        return tuple(self.tree.shown_lateness(sp.Add(*output.terms)) for output in self.tree.outputs)
 
     @property
     def is_shifted(self) -> bool:
@@ -216,14 +211,19 @@ class Structure:
         shown = self.outputs
         if self.histories:
             shown = tuple(self.tree.remembering(sp.Add(*output.terms)) for output in self.tree.outputs)
-        rates = [
+        rates = {equation.symbol: equation.rate for equation in self.remembering_equations}
+        for index in range(len(self.rig.inputs)):
+            value, rate, curvature = input_symbols(index)
+            rates |= {value: rate, rate: curvature}
+        slopes = [
             sum(
-                (sp.diff(reading, s.symbol) * s.rate for s in self.remembering_equations), start=sp.Integer(0)
+                (_slope(reading, s) * rates[s] for s in rates if s in reading.free_symbols),
+                start=sp.Integer(0),
             )
             for reading, delay in zip(shown, self.shown_late, strict=True)
             if delay is not None
         ]
-        return (*shown, *rates)
+        return (*shown, *slopes)
 
     @property
     def states(self) -> tuple[sp.Symbol, ...]:
@@ -253,6 +253,11 @@ class Structure:
         """Return an effect's own values by their own names, out of values of this structure."""
         names = {p.name: self.parameter_name(effect, p.name) for p in effect.parameters}
         return {own: values[name] for own, name in names.items() if name in values}
+
+
+def _slope(reading: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Return the derivative of a reading; where it jumps, that beside the jump."""
+    return sp.diff(reading, symbol).replace(sp.DiracDelta, lambda *_: sp.Integer(0))
 
 
 def carried_over(values: Mapping[str, float], source: Structure, target: Structure) -> dict[str, float]:

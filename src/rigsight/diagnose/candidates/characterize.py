@@ -92,7 +92,15 @@ def fit_candidates(
         return scored
 
     models = list(bench.threads.side_by_side(one, looks))
-    return with_a_mean_that_is_needed(bench, refine(bench, models))
+    refined = with_a_mean_that_is_needed(bench, refine(bench, models))
+    late = {m.effects[0].at for m in refined if m.effects[0].measured_late is not None and not _shift(m)}
+    return [model for model in refined if not (_shift(model) > 0.0 and model.effects[0].at in late)]
+
+
+def _shift(model: Scored) -> float:
+    """Return the time by which a single effect shifts a record: late it is what a late sensor shows as well [s]."""
+    (effect,), fit = model.effects, model.fit
+    return sum(fit.structure.values_of(effect, fit.values).values()) if effect.shifts_the_record else 0.0
 
 
 def with_a_mean_that_is_needed(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:

@@ -89,12 +89,12 @@ class _Spectrum:
     def __init__(self, run: Run, answer: Answer) -> None:
         n = run.way.size
         self._window = np.hanning(n)
-        omega = 2.0 * np.pi * np.fft.rfftfreq(n, run.dt)
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(n, run.dt), dtype=np.float64)
         self._used = slice(_LOWEST_LINE, None)
         self.way = run.way
         left = self._over_frequency(run.left)
         # Without weights the few lowest lines, of drift and of forces that are wrong elsewhere, would decide alone.
-        size = np.sqrt(uniform_filter1d(np.abs(left) ** 2, _SMOOTHED, mode="nearest"))
+        size = np.asarray(np.sqrt(uniform_filter1d(np.abs(left) ** 2, _SMOOTHED, mode="nearest")))
         self._weight = 1.0 / np.maximum(size, 1e-12 * np.max(size, initial=1e-300))
         self._answer = answer(np.asarray(omega[self._used], dtype=np.float64)) * self._weight
         self.left = left * self._weight

@@ -74,6 +74,11 @@ def _plain_starts(
 ) -> Iterator[dict[str, float]]:
     fitted = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
     rest = {p.name: p.default for p in effect.parameters if p not in fitted and p.default is not None}
+    rest |= {
+        p.name: p.held_at(characteristic_value(placed_dimension(effect, p.dimension), bench.scales))
+        for p in effect.parameters
+        if not p.fitted
+    }
     if effect.starts:
         for start in effect.starts:
             origin = base if start.parent is None else parents.get(start.parent)
@@ -132,11 +137,12 @@ def _evaluated(
     joint = joint_of(bench.rig, effect)
     sizes = {
         base: characteristic_value(placed_dimension(effect, base), bench.scales)
-        for base in ("drive", "x", "time")
+        for base in ("drive", "input", "x", "time")
     }
     numbers = {
         canonical.k: evaluated(joint.stiffness, values),
         canonical.drive_size: sizes["drive"],
+        canonical.input_size: sizes["input"],
         canonical.x_size: sizes["x"],
         canonical.v_size: sizes["x"] / sizes["time"],
         canonical.time_size: sizes["time"],

@@ -293,8 +293,13 @@ def term_signals(
     linear = [p for p in fitted if effect.torque is not None and _is_linear(effect, p)]
     inside = [p for p in fitted if p not in linear]
     names = tuple(p.name for p in linear)
+    held = {
+        p.name: p.held_at(characteristic_value(p.dimension, scales))
+        for p in effect.parameters
+        if not p.fitted
+    }
     for values in itertools.product(*(_grid(p, scales) for p in inside)):
-        inner = dict(zip((p.name for p in inside), values, strict=True))
+        inner = {**held, **dict(zip((p.name for p in inside), values, strict=True))}
         parts = tuple(tuple(_signals(effect, linear, inner, motion)) for motion in motions)
         yield TermSignals(effect, inner, names, parts)
 

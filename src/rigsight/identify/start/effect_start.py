@@ -104,9 +104,15 @@ class EffectRegression:
         fitted = [p for p in effect.parameters if p.fitted]
         linear = [p for p in fitted if effect.torque is not None and _is_linear(effect.torque, p)]
         inner = [p for p in fitted if p not in linear]
+        held = {
+            p.name: p.held_at(characteristic_value(p.dimension, self._scales))
+            for p in effect.parameters
+            if not p.fitted
+        }
         best: dict[str, float] | None = None
         lowest = float("inf")
-        for values in self._grid(inner):
+        for grid in self._grid(inner):
+            values = {**held, **grid}
             found, error = self._regressed(effect, linear, values)
             if found is not None and error < lowest:
                 best, lowest = {**found, **values}, error

@@ -1,7 +1,7 @@
 """Does a simulated effect do what every effect promises: vanish at null, stay finite, give no energy, be found again?
 
-Measured on one mass with a spring (lateral effects on the running gear). Each function returns a sentence that says what is
-broken, or None.
+Measured on one mass with a spring, lateral effects on the running gear, those of a prescribed motion on an element. Each function
+returns a sentence that says what is broken, or None.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import AXIS, RUNNING_GEAR, Rig, Signal, joint_of
+from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, Signal, joint_of
 from rigsight.simulate import compose, simulate
 from rigsight.units import characteristic_value
 
@@ -82,18 +82,24 @@ _GEAR_VALUES = {
 GEAR_BENCH = Bench(
     RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
 )
+_ELEMENT_VALUES = {"d": 2.0, "k": RESONANCE**2, "force_off": 0.0}
+ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", "k", "force_off"))
 
 
 def bench_of(effect: Effect) -> Bench:
-    """Return the bench on which an effect is tried."""
-    return AXIS_BENCH if AXIS.offers(effect) else GEAR_BENCH
+    """Return the bench on which an effect is tried: the first that offers it."""
+    benches = (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH)
+    return next((bench for bench in benches if bench.rig.offers(effect)), GEAR_BENCH)
 
 
-def sine_record(amplitude: float, n_periods: int, omega: float = 0.25 * RESONANCE) -> Record:
+def sine_record(
+    amplitude: float, n_periods: int, omega: float = 0.25 * RESONANCE, bench: Bench = AXIS_BENCH
+) -> Record:
     """Return the input of a sine test; by default so low that the third harmonic stays below the resonance."""
     dt = 2.0 * np.pi / omega / PER_PERIOD
     time = dt * np.arange(n_periods * PER_PERIOD + 1)
-    return Record("sine", dt, {"u": amplitude * np.sin(omega * time)}, {"u": "input"})
+    source = bench.rig.inputs[0]
+    return Record("sine", dt, {source.name: amplitude * np.sin(omega * time)}, {source.name: source.unit})
 
 
 def sizes(bench: Bench, record: Record) -> dict[str, float]:
@@ -106,7 +112,7 @@ def sizes(bench: Bench, record: Record) -> dict[str, float]:
 def start_values(effect: Effect) -> list[dict[str, float]]:
     """Return the bench's values with all combinations of the effect's first two start values."""
     bench = bench_of(effect)
-    scales = sizes(bench, sine_record(FULL, 3))
+    scales = sizes(bench, sine_record(FULL, 3, bench=bench))
     choices = []
     for p in effect.parameters:
         size = characteristic_value(p.dimension, scales)
@@ -118,7 +124,7 @@ def start_values(effect: Effect) -> list[dict[str, float]]:
 def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float]]:
     """Return the bench's values with the corners of the search box and random points in it, as far as a search goes there."""
     bench = bench_of(effect)
-    scales = sizes(bench, sine_record(FULL, 3))
+    scales = sizes(bench, sine_record(FULL, 3, bench=bench))
     fitted = [p for p in effect.parameters if p.fitted]
     corners = list(itertools.product(*[p.search for p in fitted]))
     inside = [tuple(rng.uniform(*p.search) for p in fitted) for _ in range(5)]
@@ -127,7 +133,8 @@ def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float
         own = {
             p.name: c * characteristic_value(p.dimension, scales) for p, c in zip(fitted, point, strict=True)
         }
-        own |= {p.name: p.default or 0.0 for p in effect.parameters if not p.fitted}
+        held = [p for p in effect.parameters if not p.fitted]
+        own |= {p.name: p.held_at(characteristic_value(p.dimension, scales)) for p in held}
         # A search moves sum and difference themselves. A negative sum lets a memory grow without end; where the unloading branch
         # is the steeper one, a saturated loop has nothing but its rounding to come back with.
         if all(
@@ -141,7 +148,8 @@ def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float
 
 def null_gives_the_rig(effect: Effect) -> str | None:
     """Check that its null values leave the rig exactly as it is."""
-    bench, record = bench_of(effect), sine_record(FULL, 3)
+    bench = bench_of(effect)
+    record = sine_record(FULL, 3, bench=bench)
     null = effect.null_values()
     plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
     with_effect = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **null}, record)
@@ -152,7 +160,8 @@ def null_gives_the_rig(effect: Effect) -> str | None:
 
 def vanishes_continuously(effect: Effect) -> str | None:
     """Check that close to its null values the response is close to the rig's."""
-    bench, record = bench_of(effect), sine_record(FULL, 3)
+    bench = bench_of(effect)
+    record = sine_record(FULL, 3, bench=bench)
     start = start_values(effect)[0]
     near = {
         name: null / 2.0 if abs(null) > 1e3 * abs(start[name]) else _close(null, start[name])
@@ -176,16 +185,19 @@ def gives_no_energy(effect: Effect) -> str | None:
     """Check that in a steady cycle a dissipative effect takes energy, and a conservative one neither takes nor gives."""
     if effect.place is not Place.DYNAMICS or effect.energy is Energy.ACTIVE:
         return None
+    bench = bench_of(effect)
+    pushed, moved = ("u", "x") if bench is AXIS_BENCH else ("force", "x")
     for omega in (0.4 * RESONANCE, 0.9 * RESONANCE):
-        record = sine_record(SMALL, 40, omega)
+        record = sine_record(SMALL, 40, omega, bench)
         for values in start_values(effect):
-            x = simulate(compose(AXIS, [effect]), values, record)["x"]
+            run = simulate(compose(bench.rig, [effect]), values, record)
+            x = run[moved]
             cycle, before = last_period(x), x[-2 * PER_PERIOD - 1 : -PER_PERIOD - 1]
             still = np.ptp(cycle) == 0.0
             if still or np.max(np.abs(cycle - before)) > _STEADY * np.ptp(cycle):
                 continue
             step = np.diff(np.append(cycle, cycle[0]))
-            force = last_period(record["u"])
+            force = last_period(run[pushed])
             work = float(np.sum(0.5 * (force + np.roll(force, -1)) * step))
             damper = values["d"] * float(np.sum(step**2)) / record.dt
             size = abs(work) + damper
@@ -206,7 +218,8 @@ def last_period(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def finite_where_searched(effect: Effect) -> str | None:
     """Check that the simulation stays finite wherever a search may go."""
-    bench, record = bench_of(effect), sine_record(FULL, 3)
+    bench = bench_of(effect)
+    record = sine_record(FULL, 3, bench=bench)
     may_escape = effect.energy is Energy.CONSERVATIVE and any(
         p.null is not None and p.search[0] < p.null for p in effect.parameters
     )
@@ -238,8 +251,9 @@ def is_found_again(effect: Effect) -> str | None:
 def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
     rng = np.random.default_rng(4)
     t = 0.01 * np.arange(1500, dtype=np.float64)
+    source = bench.rig.inputs[0].name
     driven = [
-        Record("sweep", 0.01, {"u": linear_sweep(t, share * amplitude, 1.0, 30.0)}, {}, hold="zoh")
+        Record("sweep", 0.01, {source: linear_sweep(t, share * amplitude, 1.0, 30.0)}, {}, hold="zoh")
         for share in (0.4, 1.0)
     ]
     plain = [simulate(compose(bench.rig), bench.swept, record) for record in driven]
@@ -250,6 +264,7 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
     truth = {
         **bench.swept,
         **{p.name: p.default for p in effect.parameters if p.default is not None},
+        **{p.name: p.held_at(size[p.name]) for p in effect.parameters if not p.fitted},
         **{p.name: p.starts[0] * size[p.name] for p in own},
     }
     noise = {signal.name: _NOISE * scales[base] for signal, base in _bases(bench.rig)}
@@ -297,7 +312,7 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
 
 
 def _bases(rig: Rig) -> list[tuple[Signal, str]]:
-    return list(zip(rig.outputs, ("x", "length"), strict=False))
+    return list(zip(rig.outputs, ("x", "length") if rig.is_driven else ("force",), strict=False))
 
 
 PROMISES: tuple[Callable[[Effect], str | None], ...] = (

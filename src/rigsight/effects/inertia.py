@@ -1,0 +1,45 @@
+"""Inertia: a mass that moves with an element whose motion is prescribed.
+
+Equation
+--------
+``resisting torque = m_e x''``
+
+m_e: inertia that moves with the element; the effect vanishes at 0.
+
+Applies to what a bench accelerates between its load cell and the element: a fixture, a piston, half of a bellows. A rig that
+moves freely has its own inertia among its parameters. The acceleration is that of the smoothed motion: noise of the displacement
+grows in it with the square of the frequency.
+
+Signature: stiffness that falls with the square of the frequency, at every amplitude; no loss.
+
+References: D. J. Ewins, *Modal Testing* (Research Studies Press 2000), on mass cancellation.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature
+from rigsight.effects.symbols import acceleration
+from rigsight.parameters import Parameter
+
+m_e = sp.Symbol("m_e", real=True)
+
+INERTIA = Effect(
+    name="inertia",
+    place=Place.DYNAMICS,
+    summary="A mass moves with the element and takes its share of the measured force.",
+    parameters=(
+        Parameter(
+            "m_e",
+            "inertia that moves with the element",
+            "force time^2 x^-1",
+            lower=0.0,
+            upper=1e12,
+            null=0.0,
+            starts=(0.1, 0.5),
+            search=(0.0, 10.0),
+        ),
+    ),
+    energy=Energy.CONSERVATIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    torque=m_e * acceleration,
+)

@@ -1,0 +1,69 @@
+"""Maxwell branch: beside the spring another one, in series with a damper, which relaxes.
+
+Equation
+--------
+``resisting torque = k_m q``,  ``q' = x' - q / tau_m``
+
+=====  ===========================================================================
+k_m    stiffness of the branch; the effect vanishes at 0
+tau_m  relaxation time: damping of the damper over k_m
+=====  ===========================================================================
+
+q is the deflection of the branch's own spring. With it the rig's own spring is that of very slow motion; the three together are
+the standard linear solid (Zener's model).
+
+Applies to rubber, belts, ropes, hydraulic bushings and gears with plastic teeth, whose stiffness grows with frequency. Loops
+that are as wide at every speed are hysteresis, a further resonance is a flexible mode.
+
+Signature: stiffness that rises and damping that falls about the frequency 1 / tau_m, at every amplitude; a step creeps to its
+end.
+
+References: J. D. Ferry, *Viscoelastic Properties of Polymers* (Wiley 1980), chapter 1.
+"""
+
+import sympy as sp
+
+from rigsight.effects.effect import Effect, Energy, GainTrend, Place, Signature, Start, State
+from rigsight.effects.symbols import drive_size, time_size, v, x_size
+from rigsight.parameters import Parameter
+
+k_m, tau_m, q = sp.symbols("k_m tau_m q", real=True)
+
+
+def _at(ratio: float) -> Start:
+    """Start with a third of the drive's force, relaxing in `ratio` times the period of the motion over 2 pi."""
+    return Start({"k_m": 0.3 * drive_size / x_size, "tau_m": ratio * time_size})
+
+
+MAXWELL_BRANCH = Effect(
+    name="maxwell_branch",
+    place=Place.DYNAMICS,
+    summary="Beside the spring another one relaxes through a damper.",
+    parameters=(
+        Parameter(
+            "k_m",
+            "stiffness of the branch",
+            "force x^-1",
+            lower=0.0,
+            upper=1e18,
+            null=0.0,
+            starts=(0.3, 0.8),
+            search=(0.0, 10.0),
+        ),
+        Parameter(
+            "tau_m",
+            "relaxation time",
+            "time",
+            lower=1e-9,
+            upper=1e9,
+            starts=(1.0, 3.0),
+            search=(0.01, 100.0),
+            logarithmic=True,
+        ),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(gain_trend=GainTrend.STEADY),
+    torque=k_m * q,
+    states=(State(q, v - q / tau_m, "x"),),
+    starts=(_at(0.5), _at(5.0)),
+)
