@@ -111,8 +111,8 @@ def test_the_equations_of_a_step_are_made_of_the_derivatives(name: str) -> None:
 def test_where_functions_cost_or_friction_is_dry_derivatives_are_carried_along() -> None:
     carried = {e.name for e in CATALOGUE if AXIS.offers(e) and carries_tangents(compose(AXIS, [e]))}
     assert carried == {
-        "bouc_wen_hysteresis", "coulomb_friction", "directional_friction", "gravity_pendulum", "load_dependent_friction",
-        "periodic_disturbance", "stribeck_friction", "torque_ripple",
+        "bouc_wen_hysteresis", "coulomb_friction", "directional_friction", "encoder_eccentricity", "gravity_pendulum",
+        "load_dependent_friction", "periodic_disturbance", "power_law_stiffness", "stribeck_friction", "torque_ripple",
     }  # fmt: skip
     for others in (["coulomb_friction", "iwan_hysteresis"], ["coulomb_friction", "sensor_delay"]):
         assert not carries_tangents(compose(AXIS, map(effect_named, others)))
