@@ -12,7 +12,7 @@ from rigsight.diagnose.advise import advise
 from rigsight.diagnose.candidates.grow import Prepare
 from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.detect import AT_REST, noise_floors
-from rigsight.diagnose.examination import Examination, examine
+from rigsight.diagnose.examination import Examination, examine, windowing_of
 from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
@@ -27,7 +27,7 @@ from rigsight.diagnose.result import (
     Trace,
 )
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.windows import WINDOW, Windowing, window_length
+from rigsight.diagnose.windows import WINDOW
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
@@ -99,7 +99,7 @@ def diagnose(
     say("noise floor")
 
     rng = np.random.default_rng(seed)
-    windowing = Windowing(window_length(task.rig, task.estimation) if task.drifts else None)
+    windowing = windowing_of(task, {floor.output: floor.std for floor in floors}, n_jobs)
     found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
     if any(floor.method == AT_REST for floor in floors) and _least_left(found) < _REFUTES:
         notes.append(
@@ -108,6 +108,12 @@ def diagnose(
         )
         floors = noise_floors(task.rig, task.records, drifts=task.drifts, at_rest=False)
         found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
+    if found.windowing.bandwidth is not None:
+        notes.append(
+            "Nothing brings the rig back, so that every model drifts in free run. Models are compared as observers: each follows "
+            f"the measured motion up to {found.windowing.bandwidth:.3g} rad/s, and its errors are those that build up within "
+            f"{1.0 / found.windowing.bandwidth:.2g} s."
+        )
     if found.windowing.cycles is not None:
         notes.append(
             "In free run a disturbance no larger than the noise would change the motion much more than the noise does: the "
@@ -212,6 +218,7 @@ def _assembled(
         notes=tuple(notes),
         windows=found.windowing.length,
         window_cycles=found.windowing.cycles,
+        bandwidth=found.windowing.bandwidth,
         scored_on=scored_on,
         advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
         if is_effect

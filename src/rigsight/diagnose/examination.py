@@ -17,6 +17,7 @@ from rigsight.diagnose.candidates.one_law import told_apart
 from rigsight.diagnose.data.data_quality import data_quality, with_best_model
 from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.main_cause import main_cause
+from rigsight.diagnose.observer import Observer, sensors_of_motion
 from rigsight.diagnose.places.search import Search, search_places
 from rigsight.diagnose.plausibility import doubts, plausible_first
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
@@ -24,7 +25,7 @@ from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, MOST_LEFT, Judgement, judge, most_left
-from rigsight.diagnose.windows import Windowing, leading_output
+from rigsight.diagnose.windows import Windowing, leading_output, typical_period, window_length
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest, until_rest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
@@ -293,6 +294,53 @@ def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
     """Return True if one of the models explains the records in windows and the equations without an effect do not."""
     best = min((model.excess for model in models), default=float("inf"))
     return bool(cut.linear.residuals) and best <= at_floor < cut.linear.excess
+
+
+_CLOSE, _LOOSE = 6.0, 0.1
+"""Bandwidths of the closest and the loosest observer, in units of the typical frequency of the velocity.
+
+At six the harmonics of friction that turns with the velocity still show; at a tenth errors add up for ten periods, as long as
+drift stays small against motion.
+"""
+_LOOSER = 2.0
+_OF_SAMPLING = 0.2
+"""Largest bandwidth times sample time: an observer that is closer follows the noise of single samples."""
+_CLEAR = 10.0
+"""Gap, in units of the noise floor, that shows its cause: benches of the catalogue are judged from ten floors on."""
+
+
+def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowing:
+    """Return how the records of a task are compared with models: by free runs, or where the rig drifts by an observer.
+
+    The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
+    it. Where no sensor shows the motion by itself, records are cut into windows.
+
+    Parameters
+    ----------
+    task
+        Records and the simulation in question.
+    noise
+        Noise floor of each output.
+    n_jobs
+        Threads that help with the records of a fit.
+    """
+    if not task.drifts and not __import__("os").environ.get("OBS"):
+        return Windowing()
+    shown = {name for record in task.records for name in record.signals}
+    sensors = tuple(name for name in sensors_of_motion(task.rig) if name in shown)
+    if not sensors:
+        return Windowing(window_length(task.rig, task.estimation))
+    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
+    bandwidth = min(_CLOSE * typical, _OF_SAMPLING / max(record.dt for record in task.records))
+    values: Mapping[str, float] | None = None
+    while True:
+        windowing = Windowing(observer=Observer(sensors, bandwidth))
+        bench = workbench_of(task, noise, windowing, None, IdleThreads(n_jobs))
+        linear = fit_linear(bench, values or bench.start)
+        if linear.excess >= _CLEAR or bandwidth <= _LOOSE * typical:
+            return windowing
+        values = linear.fit.values if linear.residuals else None
+        bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
 
 
 def workbench_of(

@@ -224,6 +224,8 @@ class Diagnosis:
         Length [s] of the windows scored with their own initial states, None where whole records are.
     window_cycles
         Cycles of motion in such a window where chance has a part in longer ones, else None.
+    bandwidth
+        Angular frequency [rad/s] up to which an observer follows the measured motion of a rig that drifts, else None.
     scored_on
         ``"validation"``, or ``"estimation"`` where the campaign has no validation records.
     data_quality
@@ -260,6 +262,7 @@ class Diagnosis:
     notes: tuple[str, ...]
     windows: float | None = None
     window_cycles: int | None = None
+    bandwidth: float | None = None
     scored_on: str = "validation"
     advice: tuple[Advice, ...] = ()
     data_quality: DataQuality | None = None
@@ -316,6 +319,7 @@ class Diagnosis:
             "missing_force": None if self.missing_force is None else self.missing_force.to_json(),
             "window": self.windows,
             "window_cycles": self.window_cycles,
+            "observer_bandwidth": self.bandwidth,
             "scored_on": self.scored_on,
             "data_quality": [] if self.data_quality is None else self.data_quality.to_json(),
             "advice": [advice.to_json() for advice in self.advice],

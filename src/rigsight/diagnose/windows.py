@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigsight.diagnose.observer import Observer
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -39,12 +40,15 @@ class Windowing:
         Cycles of motion in a window, whatever they take: the fast part of a sweep is cut finer than the slow one.
     output, noise
         Whose cycles, and its noise floor.
+    observer
+        What models follow along whole records; None for a free run.
     """
 
     length: float | None = None
     cycles: int | None = None
     output: str = ""
     noise: float = 0.0
+    observer: Observer | None = None
 
     @classmethod
     def by_cycles(cls, output: str, noise: float) -> Windowing:
@@ -54,10 +58,17 @@ class Windowing:
     @property
     def whole(self) -> bool:
         """True where records are not cut."""
-        return self.length is None and self.cycles is None
+        return self.length is None and self.cycles is None and self.observer is None
+
+    @property
+    def bandwidth(self) -> float | None:
+        """Angular frequency [rad/s] up to which models follow the measured motion; None where they do not."""
+        return None if self.observer is None else self.observer.bandwidth
 
     def cut(self, records: Sequence[Record]) -> tuple[Record, ...]:
-        """Return the windows of all records, in order; they join to the records."""
+        """Return the records to compare with: windows in order, which join to the records, or those that are followed."""
+        if self.observer is not None:
+            return self.observer.following(records)
         if self.cycles is None:
             return cut(records, self.length)
         windows: list[Record] = []
@@ -90,6 +101,14 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
 
     An axis without a spring integrates every error of the force twice; a window keeps that drift small against the motion.
     """
+    dt = max(record.dt for record in records)
+    longest = max(record.n_samples * record.dt for record in records)
+    wished = max(_PERIODS * typical_period(rig, records), _MIN_SAMPLES * dt, longest / _MAX_WINDOWS)
+    return min(wished, longest)
+
+
+def typical_period(rig: Rig, records: Sequence[Record]) -> float:
+    """Return the reciprocal of the middle frequency of the velocity [s]."""
     periods = []
     output = leading_output(rig, records)
     for record in records:
@@ -99,10 +118,7 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
         frequency = np.fft.rfftfreq(velocity.size, record.dt)
         power[0] = 0.0
         periods.append(1.0 / max(float(np.sum(power * frequency) / np.sum(power)), 1e-12))
-    dt = max(record.dt for record in records)
-    longest = max(record.n_samples * record.dt for record in records)
-    wished = max(_PERIODS * float(np.median(periods)), _MIN_SAMPLES * dt, longest / _MAX_WINDOWS)
-    return min(wished, longest)
+    return float(np.median(periods))
 
 
 def cut(records: Sequence[Record], length: float | None) -> tuple[Record, ...]:

@@ -49,6 +49,8 @@ class Record:
         What was found or repaired while reading, one sentence each.
     constants
         Known numbers of the rig that differ from record to record (a payload), by name; they replace the campaign's.
+    observed
+        Bandwidth [rad/s], by sensor, of the observer that pulls a simulation towards what was measured while it is fitted.
 
     Raises
     ------
@@ -68,6 +70,7 @@ class Record:
     source: Path | None = None
     notes: tuple[str, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict)
+    observed: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.dt) and self.dt > 0.0):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast, get_args
@@ -25,7 +24,6 @@ from rigsight.identify.transfer.record_response import Method
 from rigsight.records import Record
 from rigsight.records.record import Hold, Kind
 from rigsight.report.declared import rig_of
-from rigsight.report.windowed_responses import windowed_response
 from rigsight.report.wording import stage_names
 
 _METHOD: Method = "local_rational"
@@ -58,7 +56,7 @@ class PathResponse:
 def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, ...]:
     """Return the responses of one record, path by path; none of a step, of an element, or where nothing stands out.
 
-    Records that are scored in windows are read in windows too, see `windowed_response`.
+    There are none of a rig that drifts: what follows the measured motion has the measured response.
 
     Parameters
     ----------
@@ -69,7 +67,7 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
     """
     rig = rig_of(diagnosis)
     signals = {*trace.inputs, *trace.measured}
-    if rig is None or not rig.is_driven or not rig.has_one_motion:
+    if rig is None or not rig.is_driven or not rig.has_one_motion or diagnosis.bandwidth is not None:
         return ()
     if not {rig.inputs[0].name, rig.outputs[0].name} <= signals:
         return ()
@@ -100,15 +98,7 @@ def _measured(
     diagnosis: Diagnosis, trace: Trace, paths: tuple[SignalPath, ...]
 ) -> Mapping[str, FrequencyResponse]:
     record = _record(diagnosis, trace, trace.measured)
-    if diagnosis.windows is None:
-        return measured_responses(record, paths, _METHOD)[0]
-    found = {}
-    for path in paths:
-        if trace.kind == "step" or path.response not in record:
-            continue
-        with contextlib.suppress(InputError):
-            found[path.name] = windowed_response(record, diagnosis.windows, path, _METHOD, clear=True)
-    return found
+    return measured_responses(record, paths, _METHOD)[0]
 
 
 def _simulated(
@@ -119,10 +109,7 @@ def _simulated(
     measured: FrequencyResponse,
 ) -> FrequencyResponse:
     record = _record(diagnosis, trace, outputs)
-    if diagnosis.windows is None:
-        return simulated_response(record, path, _METHOD, measured)
-    whole = windowed_response(record, diagnosis.windows, path, _METHOD, clear=False)
-    return whole.at(np.isin(whole.omega, measured.omega), "of those measured")
+    return simulated_response(record, path, _METHOD, measured)
 
 
 def _record(diagnosis: Diagnosis, trace: Trace, outputs: Mapping[str, NDArray[np.float64]]) -> Record:

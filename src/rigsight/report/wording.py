@@ -268,6 +268,8 @@ def basis_sentence(diagnosis: Diagnosis) -> str:
         windows = f", scored in windows of {diagnosis.windows:.3g} s, each with its own initial state"
     elif diagnosis.window_cycles is not None:
         windows = f", scored in windows of {diagnosis.window_cycles} cycles, each with its own initial state"
+    elif diagnosis.bandwidth is not None:
+        windows = f", of models that follow the measured motion up to {diagnosis.bandwidth:.3g} rad/s"
     if diagnosis.scored_on == "validation":
         return f"Errors are those of validation records, which were not fitted{windows}."
     return f"There is no validation record: errors are those of the fitted records{windows}, and too good."

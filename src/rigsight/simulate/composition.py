@@ -13,10 +13,15 @@ from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
 from rigsight.rigs import MOST_COUPLED, RIGS, Rig, joint_of
 from rigsight.simulate.signal_path import equation_tree
-from rigsight.simulate.structure import Structure, unique_names
+from rigsight.simulate.structure import Structure, bandwidth_name, unique_names
 
 
-def compose(rig: Rig, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
+def compose(
+    rig: Rig,
+    effects: Iterable[Effect] = (),
+    fixed: Mapping[str, float] | None = None,
+    observed: Iterable[str] = (),
+) -> Structure:
     """Put effects into a rig's equations.
 
     Parameters
@@ -27,6 +32,9 @@ def compose(rig: Rig, effects: Iterable[Effect] = (), fixed: Mapping[str, float]
         Effects in any order; they are sorted along the signal path.
     fixed
         Values of effect parameters to write into the equations as numbers (an exponent of 1 saves a power).
+    observed
+        Sensors of an observer, which pull the motion towards their measured readings. These are inputs behind those of the rig,
+        and its bandwidths are parameters behind all others, zero if they are not given.
 
     Raises
     ------
@@ -38,7 +46,25 @@ def compose(rig: Rig, effects: Iterable[Effect] = (), fixed: Mapping[str, float]
     A parameter name that occurs twice is qualified by its effect (``stribeck_friction.T_c`` beside Coulomb friction).
     """
     chosen = tuple(sorted(effects, key=lambda e: (e.place.value, len(e.states), e.name)))
-    return _compose(_Key(rig), _Key(chosen), tuple(sorted((fixed or {}).items())))
+    asked = set(observed)
+    sensors = tuple(sensor.name for sensor in rig.mechanism.sensors if sensor.name in asked)
+    return _compose(_Key(rig), _Key(chosen), tuple(sorted((fixed or {}).items())), sensors)
+
+
+def with_observer(structure: Structure, sensors: Iterable[str]) -> Structure:
+    """Return a structure whose motion is pulled towards readings, see `compose`; the same one where no sensor is named.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    sensors
+        Names of sensors.
+    """
+    observed = set(sensors)
+    return (
+        compose(structure.rig, structure.effects, dict(structure.fixed), observed) if observed else structure
+    )
 
 
 class _Key:
@@ -56,13 +82,15 @@ class _Key:
 
 
 @lru_cache(maxsize=1024)
-def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], ...]) -> Structure:
+def _compose(
+    rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], ...], observed: tuple[str, ...]
+) -> Structure:
     rig, effects = rig_key.value, effects_key.value
     assert isinstance(rig, Rig)
     assert isinstance(effects, tuple)
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
-    parameters = _parameters(rig, effects, unique, dict(fixed))
+    parameters = (*_parameters(rig, effects, unique, dict(fixed)), *map(_bandwidth, observed))
     symbols = {p.name: sp.Symbol(f"parameter {p.name}", real=True) for p in parameters}
     return Structure(
         rig=rig,
@@ -70,7 +98,8 @@ def _compose(rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], .
         fixed=fixed,
         parameters=parameters,
         parameter_symbols=tuple(symbols[p.name] for p in parameters),
-        tree=equation_tree(rig, effects, symbols, unique, dict(fixed)),
+        tree=equation_tree(rig, effects, symbols, unique, dict(fixed), observed),
+        observed=observed,
     )
 
 
@@ -102,6 +131,12 @@ def _parameters(
         for parameter in effect.parameters
     ]
     return (*rig.constants, *rig.parameters, *(p for p in of_effects if p.name not in fixed))
+
+
+def _bandwidth(sensor: str) -> Parameter:
+    return Parameter(
+        bandwidth_name(sensor), f"bandwidth of the observer of {sensor}", unit="rad/s", default=0.0
+    )
 
 
 def structure_named(

@@ -23,7 +23,7 @@ from rigsight.simulate.equation_tree import (
     late,
     shifted,
 )
-from rigsight.simulate.structure import TIME, input_symbols
+from rigsight.simulate.structure import TIME, bandwidth_name, input_symbols
 from rigsight.units import size_of
 
 
@@ -33,6 +33,7 @@ def equation_tree(
     symbols: Mapping[str, sp.Symbol],
     unique: Mapping[tuple[str, str], str],
     fixed: Mapping[str, float],
+    observed: tuple[str, ...] = (),
 ) -> EquationTree:
     """Return the equations of a rig with effects.
 
@@ -48,8 +49,11 @@ def equation_tree(
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
         Values of parameters that stand in the equations as numbers.
+    observed
+        Sensors of an observer, towards whose measured readings the motion is pulled.
     """
-    return _Path(_Binder(rig, symbols, unique, fixed), rig, effects).tree()
+    bandwidths = {sensor: symbols[bandwidth_name(sensor)] for sensor in observed}
+    return _Path(_Binder(rig, symbols, unique, fixed), rig, effects, bandwidths).tree()
 
 
 def bound_to(
@@ -116,10 +120,19 @@ class _Binder:
 class _Path:
     """Collects definitions and states while it follows the signals from the inputs to the sensors."""
 
-    def __init__(self, binder: _Binder, rig: Rig, effects: tuple[Effect, ...]) -> None:
+    def __init__(
+        self,
+        binder: _Binder,
+        rig: Rig,
+        effects: tuple[Effect, ...],
+        bandwidths: Mapping[str, sp.Symbol] | None = None,
+    ) -> None:
         self._binder = binder
         self._rig = rig
         self._effects = effects
+        self._bandwidths = bandwidths or {}
+        self._shown: dict[str, tuple[sp.Expr, sp.Expr]] = {}
+        """Reading of each sensor of the observer, and the time by which it is late."""
         self._definitions: list[Definition] = []
         self._values: dict[sp.Symbol, sp.Expr] = {}
         """What signals, drives and sensors are, by the symbols under which others read them."""
@@ -149,11 +162,12 @@ class _Path:
         followers = self._followers()
         for name in last:
             readings[name] = self._sensor(sensors[name], resisting, of_sensors)
+        states = (*followers, *memories, *lags, *of_sensors)
         return EquationTree(
             inputs=self._inputs(),
             definitions=tuple(self._definitions),
-            motion=self._motion(resisting) if mechanism.free else EquationsOfMotion(),
-            states=(*followers, *memories, *lags, *of_sensors),
+            motion=self._motion(resisting, states) if mechanism.free else EquationsOfMotion(),
+            states=states,
             outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
         )
 
@@ -177,9 +191,13 @@ class _Path:
         for index, name in enumerate(mechanism.inputs):
             value, rate, _ = input_symbols(index)
             found += [value, rate] if name in prescribing else [value]
+        for index in range(len(self._bandwidths)):
+            found += input_symbols(len(mechanism.inputs) + index)
         return tuple(found)
 
-    def _motion(self, resisting: Mapping[str, tuple[sp.Expr, ...]]) -> EquationsOfMotion:
+    def _motion(
+        self, resisting: Mapping[str, tuple[sp.Expr, ...]], states: Sequence[FirstOrderState]
+    ) -> EquationsOfMotion:
         """Return Lagrange's equations with the forces of drives and joints by virtual work."""
         mechanism, free = self._rig.mechanism, self._rig.mechanism.free
         terms: list[list[sp.Expr]] = [[] for _ in free]
@@ -190,16 +208,48 @@ class _Path:
         for own, force in zip(terms, mechanism.generalized_forces, strict=True):
             if force != 0:
                 own.append(self._bound(force))
+        mass = mechanism.mass_matrix.applyfunc(self._bound)
+        if self._bandwidths:
+            for own, force in zip(terms, mass * self._observer(states), strict=True):
+                own.append(force)
         return EquationsOfMotion(
             coordinates=tuple(c.symbol for c in free),
             velocities=tuple(c.rate for c in free),
-            mass=sp.ImmutableMatrix(mechanism.mass_matrix.applyfunc(self._bound)),
+            mass=sp.ImmutableMatrix(mass),
             terms=tuple(map(tuple, terms)),
             dimensions=("x",) if mechanism.has_one_motion else tuple(size_of(c.name) for c in free),
             rate_dimensions=("x time^-1",)
             if mechanism.has_one_motion
             else tuple(size_of(c.rate.name) for c in free),
         )
+
+    def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
+        """Return the accelerations by which an observer follows what sensors showed, shape (n_degrees, 1).
+
+        Accelerations and not forces, so that how closely it follows does not depend on the parameters of the rig. An error e of
+        a reading dies away by ``e'' + sqrt(2) w e' + w^2 e = 0``: the optimal observer of a free mass on which white noise acts
+        as a force. What a delayed sensor showed is moved back in time by its Taylor series.
+        """
+        mechanism = self._rig.mechanism
+        sensors = {sensor.name: sensor for sensor in mechanism.sensors}
+        tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
+        rates = {c.symbol: c.rate for c in mechanism.free} | {state.symbol: state.rate for state in states}
+        found = sp.zeros(len(mechanism.free), 1)
+        for place, (name, bandwidth) in enumerate(self._bandwidths.items(), len(mechanism.inputs)):
+            value, rate, curvature = input_symbols(place)
+            reading, delay = self._shown[name]
+            value, rate = value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature
+            reads = self._bound(sensors[name].reads)
+            slopes = sp.Matrix([sp.diff(reads, c.rate) for c in mechanism.free])
+            if any(slope != 0 for slope in slopes):
+                wanted = bandwidth * (value - reading)
+            else:
+                slopes = sp.Matrix([sp.diff(reads, c.symbol) for c in mechanism.free])
+                shown = tree.flattened(reading)
+                own = sp.Add(*(sp.diff(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
+                wanted = bandwidth**2 * (value - reading) + sp.sqrt(2) * bandwidth * (rate - own)
+            found += slopes * (wanted / slopes.dot(slopes))
+        return found
 
     def _add(self, terms: Sequence[list[sp.Expr]], along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
         for own, coordinate in zip(terms, self._rig.mechanism.free, strict=True):
@@ -375,6 +425,8 @@ class _Path:
             for effect in effects
             if effect.measured_late is not None
         ]
+        if sensor.name in self._bandwidths:
+            self._shown[sensor.name] = (reading, sp.Add(*(delay for _, delay in delays)))
         for effect, delay in delays:
             if not effect.shifts_the_record:
                 reading = self._define(Kind.READING, effect, late(reading, delay))

@@ -16,7 +16,7 @@ from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, tog
 from rigsight.simulate.prescribed_motion import smooth_motion
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
-from rigsight.simulate.structure import Structure
+from rigsight.simulate.structure import Structure, bandwidth_name
 
 DEFAULT_ACCURACY = 1e-6
 """Relative RMS error of the first output that `simulate` aims for."""
@@ -39,7 +39,7 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
     Where the motion is prescribed, it is the smoothing spline through the measured displacement.
     """
     mechanism = structure.rig.mechanism
-    if not mechanism.inputs:
+    if not structure.n_inputs:
         # What only decays reads nothing, but pieces of time it needs all the same.
         return hold_input(np.zeros(record.n_samples), record.dt, "zoh")
     prescribing = {coordinate.prescribed_by for coordinate in mechanism.prescribed}
@@ -50,7 +50,15 @@ def record_input(structure: Structure, record: Record) -> HeldInput:
             else hold_input(record[name], record.dt, record.hold)
             for name in mechanism.inputs
         ]
+        + [_observed(record, sensor) for sensor in structure.observed]
     )
+
+
+def _observed(record: Record, sensor: str) -> HeldInput:
+    """Return the measured motion that an observer follows, which is none where it was not measured."""
+    if sensor not in record:
+        return hold_input(np.zeros(record.n_samples), record.dt, "foh")
+    return hold_motion(*smooth_motion(record[sensor], record.dt), record.dt)
 
 
 def simulate(
@@ -139,7 +147,7 @@ def _before(
 
 
 def record_values(structure: Structure, values: Mapping[str, float], record: Record) -> dict[str, float]:
-    """Return values with the constants that are a record's own in the place of those of all records.
+    """Return values with the constants that are a record's own in the place of those of all records, and its observer's.
 
     Raises
     ------
@@ -149,7 +157,8 @@ def record_values(structure: Structure, values: Mapping[str, float], record: Rec
     known = [constant.name for constant in structure.rig.constants]
     for name in record.constants:
         check_option(f"Record '{record.name}': constant", name, known)
-    return {**values, **record.constants}
+    bandwidths = {bandwidth_name(sensor): record.observed.get(sensor, 0.0) for sensor in structure.observed}
+    return {**values, **record.constants, **bandwidths}
 
 
 def parameter_vector(structure: Structure, values: Mapping[str, float]) -> NDArray[np.float64]:

@@ -79,6 +79,8 @@ class Structure:
         Constants, rig parameters and effect parameters with units, and their symbols; names are unique.
     tree
         The equations: named definitions, motion, states and outputs. What follows from it here holds no definitions.
+    observed
+        Sensors of an observer, towards whose measured readings the motion is pulled; these are inputs behind those of the rig.
     """
 
     rig: Rig
@@ -87,6 +89,12 @@ class Structure:
     parameters: tuple[Parameter, ...]
     parameter_symbols: tuple[sp.Symbol, ...]
     tree: EquationTree
+    observed: tuple[str, ...] = ()
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of the rig's inputs and of the readings that an observer takes in."""
+        return len(self.rig.inputs) + len(self.observed)
 
     @cached_property
     def equations(self) -> tuple[StateEquation, ...]:
@@ -212,7 +220,7 @@ class Structure:
         if self.histories:
             shown = tuple(self.tree.remembering(sp.Add(*output.terms)) for output in self.tree.outputs)
         rates = {equation.symbol: equation.rate for equation in self.remembering_equations}
-        for index in range(len(self.rig.inputs)):
+        for index in range(self.n_inputs):
             value, rate, curvature = input_symbols(index)
             rates |= {value: rate, rate: curvature}
         slopes = [
@@ -253,6 +261,11 @@ class Structure:
         """Return an effect's own values by their own names, out of values of this structure."""
         names = {p.name: self.parameter_name(effect, p.name) for p in effect.parameters}
         return {own: values[name] for own, name in names.items() if name in values}
+
+
+def bandwidth_name(sensor: str) -> str:
+    """Return the name of the bandwidth with which an observer follows a sensor."""
+    return f"bandwidth of {sensor}"
 
 
 def _slope(reading: sp.Expr, symbol: sp.Symbol) -> sp.Expr:

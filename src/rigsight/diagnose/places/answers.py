@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.observer import observed_sensors
 from rigsight.diagnose.places.measured_motion import Corrections
 from rigsight.diagnose.places.probes import PUSH_SIZE, motion_columns, push, signal_columns, with_probes
 from rigsight.diagnose.workbench import Workbench
@@ -22,7 +23,7 @@ from rigsight.effects import Effect
 from rigsight.identify import FitResult
 from rigsight.identify.start.place_scales import scales_at_places
 from rigsight.records.record import Record
-from rigsight.simulate import compose, record_input, simulate_sets
+from rigsight.simulate import compose, parameter_vector, record_input, record_values, simulate_sets
 from rigsight.units import characteristic_value
 
 Floats = NDArray[np.float64]
@@ -69,9 +70,11 @@ class Answers:
         self.fit = fit
         self.free = tuple(free)
         rig = bench.rig
-        self.structure = compose(with_probes(rig), (*bench.modelled, *effects))
+        self.structure = compose(
+            with_probes(rig), (*bench.modelled, *effects), observed=observed_sensors(records)
+        )
         self.values = {**fit.values, **dict(fit.structure.fixed), PUSH_SIZE: 1.0}
-        self._p = np.array([self.values[name] for name in self.structure.names])
+        self._p = parameter_vector(self.structure, self.values)
         own = fit.structure.states
         order = [own.index(state) for state in self.structure.states]
         self.initial_states = [state[order] for state in fit.initial_states]
@@ -242,7 +245,7 @@ class Answers:
     def _with_own_constants(self, record: Record, p: Floats) -> Floats:
         """Return parameter sets, shape (n_parameters, n_sets), with the constants that a record has of its own."""
         own = p.copy()
-        for name, value in record.constants.items():
+        for name, value in record_values(self.structure, {}, record).items():
             own[self.structure.names.index(name)] = value
         return own
 

@@ -29,6 +29,7 @@ def record_digest(record: Record) -> str:
     told: list[Any] = [record.n_samples, record.dt, record.hold, sorted(record.signals)]
     # Without any of its own, what was remembered before there were such constants stays known.
     told += [sorted(record.constants.items())] if record.constants else []
+    told += [sorted(record.observed.items())] if record.observed else []
     digest.update(json.dumps(told).encode())
     for name in sorted(record.signals):
         digest.update(np.ascontiguousarray(record[name]).tobytes())

@@ -36,6 +36,7 @@ from rigsight.simulate import (
     record_input,
     record_values,
     simulate_outputs,
+    with_observer,
 )
 from rigsight.units import characteristic_value
 
@@ -74,7 +75,8 @@ class GreyBoxFit:
     structure
         Rig and effects.
     records
-        Records to fit; a record may lack sensors, of a rig of one motion any but the first.
+        Records to fit; a record may lack sensors, of a rig of one motion any but the first. An observer
+        (`Record.observed`) acts in the fit, and is no part of its result.
     scales
         Size of each base quantity, see `characteristic_scales`.
     output_noise
@@ -102,10 +104,11 @@ class GreyBoxFit:
         self.scales = dict(scales)
         sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
         names = [signal.name for signal in structure.rig.outputs]
+        simulated = with_observer(structure, {sensor for record in records for sensor in record.observed})
         self.data = FitData(
-            structure=structure,
-            records=tuple(self._prepared(record, names, output_noise) for record in records),
-            limited=np.array([equation.limit is not None for equation in structure.equations], dtype=bool),
+            structure=simulated,
+            records=tuple(_prepared(simulated, record, names, output_noise) for record in records),
+            limited=np.array([equation.limit is not None for equation in simulated.equations], dtype=bool),
             unlimited_sizes=np.array(sizes).reshape(-1, 1),
             accuracy=accuracy,
             threads=threads or IdleThreads(),
@@ -117,7 +120,7 @@ class GreyBoxFit:
                 dict(structure.rig.declaration),
                 [
                     str(equation)
-                    for equation in (*structure.equations, *structure.outputs, *structure.steps.items())
+                    for equation in (*simulated.equations, *simulated.outputs, *simulated.steps.items())
                 ],
                 list(structure.names),
                 sorted(self.scales.items()),
@@ -126,16 +129,6 @@ class GreyBoxFit:
                 accuracy,
             ]
         self.n_samples = int(sum(np.count_nonzero(np.isfinite(d.measured)) for d in self.data.records))
-
-    def _prepared(
-        self, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
-    ) -> RecordData:
-        missing = np.full(record.n_samples, np.nan)
-        measured = np.column_stack([record.signals.get(n, missing) for n in names])
-        weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
-        own = record_values(self.structure, {}, record)
-        places = tuple((self.structure.names.index(name), value) for name, value in own.items())
-        return RecordData(record, record_input(self.structure, record), measured, weights, places)
 
     def fit(
         self,
@@ -302,7 +295,7 @@ class GreyBoxFit:
         free: Sequence[str],
         initial_states: Sequence[NDArray[np.float64]] | None,
     ) -> _Begin:
-        coordinates = Coordinates.of(self.structure, free, start, self.scales)
+        coordinates = Coordinates.of(self.data.structure, free, start, self.scales)
         states = list(initial_states) if initial_states is not None else guessed_states(self.data, start)
         own = coordinates.from_values(start)
         sizes = self.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
@@ -336,7 +329,7 @@ class GreyBoxFit:
             structure=self.structure,
             success=False,
             message=message,
-            values=dict(zip(self.structure.names, map(float, p), strict=True)),
+            values=self._values(p),
             standard_errors=dict.fromkeys(coordinates.free, float("inf")),
             initial_states=tuple(problem.states(theta)),
             cost=float("inf"),
@@ -378,7 +371,7 @@ class GreyBoxFit:
             structure=self.structure,
             success=success,
             message=message,
-            values=dict(zip(self.structure.names, map(float, p), strict=True)),
+            values=self._values(p),
             standard_errors=dict(zip(coordinates.free, map(float, errors), strict=True)),
             initial_states=tuple(states),
             cost=cost,
@@ -390,9 +383,24 @@ class GreyBoxFit:
             substeps=tuple(problem.substeps),
         )
 
+    def _values(self, p: NDArray[np.float64]) -> dict[str, float]:
+        # The bandwidths of an observer stand behind all other parameters.
+        return dict(zip(self.structure.names, map(float, p), strict=False))
+
     def _left(self, index: int, p: NDArray[np.float64], state: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return measured minus accurately simulated outputs of a record."""
         d = self.data.records[index]
         return d.measured - simulate_outputs(
-            self.structure, d.held, d.parameters(p), state, d.record.n_samples, self.data.accuracy
+            self.data.structure, d.held, d.parameters(p), state, d.record.n_samples, self.data.accuracy
         )
+
+
+def _prepared(
+    structure: Structure, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
+) -> RecordData:
+    missing = np.full(record.n_samples, np.nan)
+    measured = np.column_stack([record.signals.get(n, missing) for n in names])
+    weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
+    own = record_values(structure, {}, record)
+    places = tuple((structure.names.index(name), value) for name, value in own.items())
+    return RecordData(record, record_input(structure, record), measured, weights, places)

@@ -99,8 +99,8 @@ class KernelEquations:
             "SIZE_STATES": max(1, n_states),
             "N_MODES": n_modes,
             "SIZE_MODES": max(1, n_modes),
-            "N_INPUTS": len(structure.rig.inputs),
-            "SIZE_INPUTS": max(1, len(structure.rig.inputs)),
+            "N_INPUTS": structure.n_inputs,
+            "SIZE_INPUTS": max(1, structure.n_inputs),
             "SIZE_CONSTANTS": max(1, len(self.constants)),
             "N_COMPUTED": len(structure.computed_outputs),
             "N_DEGREES": len(structure.tree.motion.coordinates),
@@ -173,7 +173,7 @@ class KernelEquations:
         others = {i: limit for i, limit in self.limits.items() if i not in followers}
         frictions, several = self.frozen.frictions, self.has_several_frictions
         speeds, slopes = self._groups["speeds"], self._groups["speed_slopes"]
-        curvatures = {input_symbols(i)[2] for i in range(len(structure.rig.inputs))}
+        curvatures = {input_symbols(i)[2] for i in range(structure.n_inputs)}
         read = set().union(
             *(e.free_symbols for e in (*rates, *self.outputs, *slopes, *self.lane_steps.values()))
         )
@@ -258,7 +258,7 @@ class KernelEquations:
         }
         inputs = {
             symbol: f"now->{array}[{i}]"
-            for i in range(len(self.structure.rig.inputs))
+            for i in range(self.structure.n_inputs)
             for symbol, array in zip(input_symbols(i), ("u", "du", "ddu"), strict=True)
         }
         return {
@@ -303,7 +303,7 @@ class KernelEquations:
             **dict(zip(self.structure.states, self._rate_symbols, strict=True)),
             TIME: sp.Integer(1),
         }
-        for i in range(len(self.structure.rig.inputs)):
+        for i in range(self.structure.n_inputs):
             value, rate, curvature = input_symbols(i)
             along |= {value: rate, rate: curvature}
         along |= {h.symbol: rate for h, rate in zip(self.structure.histories, self._late_rates, strict=True)}
@@ -345,8 +345,7 @@ class KernelEquations:
     def _followed(self) -> dict[int, tuple[str, str]]:
         """States with a range whose rate is that of a motion: how C writes the motion before and after."""
         motions: dict[sp.Expr, tuple[str, str]] = {
-            input_symbols(i)[1]: (f"from->u[{i}]", f"now->u[{i}]")
-            for i in range(len(self.structure.rig.inputs))
+            input_symbols(i)[1]: (f"from->u[{i}]", f"now->u[{i}]") for i in range(self.structure.n_inputs)
         }
         for i, equation in enumerate(self.structure.remembering_equations):
             if equation.limit is None:
