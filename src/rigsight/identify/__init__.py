@@ -21,6 +21,11 @@ from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
 from rigsight.identify.joint import fit_jointly as fit_jointly
+from rigsight.identify.record_offsets import OFFSETS_MEND as OFFSETS_MEND
+from rigsight.identify.record_offsets import DifferingMeans as DifferingMeans
+from rigsight.identify.record_offsets import differing_means as differing_means
+from rigsight.identify.record_offsets import swallowed_by_offsets as swallowed_by_offsets
+from rigsight.identify.record_offsets import without_offsets as without_offsets
 from rigsight.identify.start.effect_start import EffectRegression as EffectRegression
 from rigsight.identify.start.linear_start import linear_start as linear_start
 from rigsight.identify.start.scales import characteristic_scales as characteristic_scales
@@ -39,9 +44,11 @@ from rigsight.identify.transfer.transfer_step import fit_step as fit_step
 
 __all__ = [
     "DEFAULT_ACCURACY",
+    "OFFSETS_MEND",
     "Calibration",
     "ConicityEstimate",
     "DerivedQuantities",
+    "DifferingMeans",
     "EffectRegression",
     "FitMemory",
     "FitResult",
@@ -63,6 +70,7 @@ __all__ = [
     "characteristic_scales",
     "creep_error_of_sine",
     "derived_quantities",
+    "differing_means",
     "driven_offsets",
     "estimate_conicity",
     "fit_frequency_response",
@@ -73,5 +81,7 @@ __all__ = [
     "loop_area",
     "offsets",
     "open_factor",
+    "swallowed_by_offsets",
+    "without_offsets",
     "yaw_parameters",
 ]

@@ -45,7 +45,7 @@ def helpful_sensors(
     try:
         shown = [
             simulate(structure, record_values(structure, result.values, record), record, state)
-            for record, state in zip(records, result.initial_states, strict=True)
+            for record, state in zip(records, result.rig_states, strict=True)
         ]
     except SimulationError:
         return ()

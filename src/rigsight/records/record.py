@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -51,6 +51,8 @@ class Record:
         Known numbers of the rig that differ from record to record (a payload), by name; they replace the campaign's.
     observed
         Bandwidth [rad/s], by sensor, of the observer that pulls a simulation towards what was measured while it is fitted.
+    free_offsets
+        Outputs whose sensor has an offset of its own in this record: a fit estimates it as it does the state at the beginning.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class Record:
     notes: tuple[str, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict)
     observed: Mapping[str, float] = field(default_factory=dict)
+    free_offsets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.dt) and self.dt > 0.0):
@@ -173,6 +176,16 @@ class Record:
         """
         added = {signal: np.asarray(samples, dtype=np.float64) for signal, samples in signals.items()}
         return replace(self, signals={**self.signals, **added})
+
+    def with_free_offsets(self, sensors: Iterable[str]) -> Record:
+        """Return a copy in which the sensors that it holds have an offset of their own.
+
+        Parameters
+        ----------
+        sensors
+            Names of outputs.
+        """
+        return replace(self, free_offsets=tuple(name for name in sensors if name in self))
 
     def slice(self, start: int | None, stop: int | None) -> Record:
         """Return a stretch of the record; its time stamps stay.

@@ -4,7 +4,7 @@ from rigsight.simulate.compiled.kernel import FittedRecord as FittedRecord
 from rigsight.simulate.compiled.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.composition import compose as compose
 from rigsight.simulate.composition import structure_named as structure_named
-from rigsight.simulate.composition import with_observer as with_observer
+from rigsight.simulate.composition import structure_of_fit as structure_of_fit
 from rigsight.simulate.rest import rest_state as rest_state
 from rigsight.simulate.side_by_side import carries_tangents as carries_tangents
 from rigsight.simulate.side_by_side import choose_substeps as choose_substeps
@@ -45,5 +45,5 @@ __all__ = [
     "state_limits",
     "structure_named",
     "tangent_equations",
-    "with_observer",
+    "structure_of_fit",
 ]

@@ -11,6 +11,7 @@ import sympy as sp
 from rigsight.effects import Effect, placed_dimension
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
+from rigsight.records.record import Record
 from rigsight.rigs import MOST_COUPLED, RIGS, Rig, joint_of
 from rigsight.simulate.signal_path import equation_tree
 from rigsight.simulate.structure import Structure, bandwidth_name, unique_names
@@ -20,6 +21,7 @@ def compose(
     rig: Rig,
     effects: Iterable[Effect] = (),
     fixed: Mapping[str, float] | None = None,
+    offsets: Iterable[str] = (),
     observed: Iterable[str] = (),
 ) -> Structure:
     """Put effects into a rig's equations.
@@ -32,6 +34,8 @@ def compose(
         Effects in any order; they are sorted along the signal path.
     fixed
         Values of effect parameters to write into the equations as numbers (an exponent of 1 saves a power).
+    offsets
+        Names of sensors whose readings are shifted: each by a state behind all others that never changes.
     observed
         Sensors of an observer, which pull the motion towards their measured readings. These are inputs behind those of the rig,
         and its bandwidths are parameters behind all others, zero if they are not given.
@@ -46,25 +50,37 @@ def compose(
     A parameter name that occurs twice is qualified by its effect (``stribeck_friction.T_c`` beside Coulomb friction).
     """
     chosen = tuple(sorted(effects, key=lambda e: (e.place.value, len(e.states), e.name)))
-    asked = set(observed)
-    sensors = tuple(sensor.name for sensor in rig.mechanism.sensors if sensor.name in asked)
-    return _compose(_Key(rig), _Key(chosen), tuple(sorted((fixed or {}).items())), sensors)
+    return _compose(
+        _Key(rig),
+        _Key(chosen),
+        tuple(sorted((fixed or {}).items())),
+        _in_order(rig, offsets),
+        _in_order(rig, observed),
+    )
 
 
-def with_observer(structure: Structure, sensors: Iterable[str]) -> Structure:
-    """Return a structure whose motion is pulled towards readings, see `compose`; the same one where no sensor is named.
+def _in_order(rig: Rig, sensors: Iterable[str]) -> tuple[str, ...]:
+    asked = set(sensors)
+    return tuple(sensor.name for sensor in rig.mechanism.sensors if sensor.name in asked)
+
+
+def structure_of_fit(structure: Structure, records: Iterable[Record]) -> Structure:
+    """Return the structure that is simulated while one is fitted to records; the same one for records without wishes.
 
     Parameters
     ----------
     structure
         Rig and effects.
-    sensors
-        Names of sensors.
+    records
+        Their free offsets and observers are added, see `compose`; those of sensors that the rig does not have are passed over.
     """
-    observed = set(sensors)
-    return (
-        compose(structure.rig, structure.effects, dict(structure.fixed), observed) if observed else structure
-    )
+    offsets, observed = set[str](), set[str]()
+    for record in records:
+        offsets.update(record.free_offsets)
+        observed.update(record.observed)
+    if not offsets and not observed:
+        return structure
+    return compose(structure.rig, structure.effects, dict(structure.fixed), offsets, observed)
 
 
 class _Key:
@@ -83,7 +99,11 @@ class _Key:
 
 @lru_cache(maxsize=1024)
 def _compose(
-    rig_key: _Key, effects_key: _Key, fixed: tuple[tuple[str, float], ...], observed: tuple[str, ...]
+    rig_key: _Key,
+    effects_key: _Key,
+    fixed: tuple[tuple[str, float], ...],
+    offsets: tuple[str, ...],
+    observed: tuple[str, ...],
 ) -> Structure:
     rig, effects = rig_key.value, effects_key.value
     assert isinstance(rig, Rig)
@@ -98,7 +118,8 @@ def _compose(
         fixed=fixed,
         parameters=parameters,
         parameter_symbols=tuple(symbols[p.name] for p in parameters),
-        tree=equation_tree(rig, effects, symbols, unique, dict(fixed), observed),
+        tree=equation_tree(rig, effects, symbols, unique, dict(fixed), offsets, observed),
+        offsets=offsets,
         observed=observed,
     )
 

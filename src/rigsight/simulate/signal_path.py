@@ -24,7 +24,7 @@ from rigsight.simulate.equation_tree import (
     shifted,
 )
 from rigsight.simulate.structure import TIME, bandwidth_name, input_symbols
-from rigsight.units import size_of
+from rigsight.units import at_place, size_of
 
 
 def equation_tree(
@@ -33,6 +33,7 @@ def equation_tree(
     symbols: Mapping[str, sp.Symbol],
     unique: Mapping[tuple[str, str], str],
     fixed: Mapping[str, float],
+    offsets: tuple[str, ...] = (),
     observed: tuple[str, ...] = (),
 ) -> EquationTree:
     """Return the equations of a rig with effects.
@@ -49,11 +50,13 @@ def equation_tree(
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
         Values of parameters that stand in the equations as numbers.
+    offsets
+        Sensors whose readings are shifted, each by a state that never changes.
     observed
         Sensors of an observer, towards whose measured readings the motion is pulled.
     """
     bandwidths = {sensor: symbols[bandwidth_name(sensor)] for sensor in observed}
-    return _Path(_Binder(rig, symbols, unique, fixed), rig, effects, bandwidths).tree()
+    return _Path(_Binder(rig, symbols, unique, fixed), rig, effects, offsets, bandwidths).tree()
 
 
 def bound_to(
@@ -125,6 +128,7 @@ class _Path:
         binder: _Binder,
         rig: Rig,
         effects: tuple[Effect, ...],
+        offsets: tuple[str, ...] = (),
         bandwidths: Mapping[str, sp.Symbol] | None = None,
     ) -> None:
         self._binder = binder
@@ -133,6 +137,7 @@ class _Path:
         self._bandwidths = bandwidths or {}
         self._shown: dict[str, tuple[sp.Expr, sp.Expr]] = {}
         """Reading of each sensor of the observer, and the time by which it is late."""
+        self._offsets = {name: sp.Symbol(f"offset of {name}", real=True) for name in offsets}
         self._definitions: list[Definition] = []
         self._values: dict[sp.Symbol, sp.Expr] = {}
         """What signals, drives and sensors are, by the symbols under which others read them."""
@@ -162,7 +167,7 @@ class _Path:
         followers = self._followers()
         for name in last:
             readings[name] = self._sensor(sensors[name], resisting, of_sensors)
-        states = (*followers, *memories, *lags, *of_sensors)
+        states = (*followers, *memories, *lags, *of_sensors, *self._shifts())
         return EquationTree(
             inputs=self._inputs(),
             definitions=tuple(self._definitions),
@@ -170,6 +175,12 @@ class _Path:
             states=states,
             outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
         )
+
+    def _shifts(self) -> list[FirstOrderState]:
+        return [
+            FirstOrderState(symbol, (sp.Integer(0),), at_place("x", name), None, None)
+            for name, symbol in self._offsets.items()
+        ]
 
     def bound(self, expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
         """Return expressions with what drives and sensors are in front of any joint."""
@@ -408,9 +419,10 @@ class _Path:
         """Chain the sensor effects: the delays come last, as nothing inside the simulation waits for them."""
         effects = self._at(sensor.name, Place.SENSOR)
         forces = {force_symbol(name): terms for name, terms in resisting.items()}
+        shift = self._offsets.get(sensor.name, sp.Integer(0))
         if not effects and sensor.reads in forces:
-            return forces[sensor.reads]
-        reading = self._bound(sensor.reads).xreplace(
+            return (*forces[sensor.reads], *([shift] if shift != 0 else []))
+        reading = shift + self._bound(sensor.reads).xreplace(
             {force: sp.Add(*terms) for force, terms in forces.items()}
         )
         for effect in effects:

@@ -79,6 +79,8 @@ class Structure:
         Constants, rig parameters and effect parameters with units, and their symbols; names are unique.
     tree
         The equations: named definitions, motion, states and outputs. What follows from it here holds no definitions.
+    offsets
+        Sensors whose readings are shifted by the last states, in their order.
     observed
         Sensors of an observer, towards whose measured readings the motion is pulled; these are inputs behind those of the rig.
     """
@@ -89,6 +91,7 @@ class Structure:
     parameters: tuple[Parameter, ...]
     parameter_symbols: tuple[sp.Symbol, ...]
     tree: EquationTree
+    offsets: tuple[str, ...] = ()
     observed: tuple[str, ...] = ()
 
     @property

@@ -47,7 +47,7 @@ def first_state(structure: Structure, record: Record, values: Mapping[str, float
     """
     rig = structure.rig
     if rig.has_one_motion:
-        return _of_one_motion(structure, record)
+        return _of_one_motion(structure, record, values)
     equations = equations_of(rig)
     return _with_effects(structure, record, equations, values, rig_state(equations, record, values))
 
@@ -76,6 +76,9 @@ def state_at_rest(structure: Structure, record: Record, guess: Floats, values: M
         own = rig_state(equations, record, values, resting=count)
         state[: own.size] = own
         return state
+    record = _without(
+        record, dict(zip(structure.offsets, guess[guess.size - len(structure.offsets) :], strict=True))
+    )
     state[0], state[1] = float(np.mean(record[rig.outputs[0].name][:count])), 0.0
     for i, name in enumerate(structure.state_names):
         if name in record and i > 1:
@@ -155,10 +158,13 @@ def _rig_state(
     return full(least_squares(left, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
 
 
-def _of_one_motion(structure: Structure, record: Record) -> Floats:
+def _of_one_motion(structure: Structure, record: Record, values: Mapping[str, float]) -> Floats:
     state = np.zeros(len(structure.states))
+    offsets = _guessed_offsets(structure, record, values)
+    state[state.size - len(offsets) :] = list(offsets.values())
     if not structure.rig.is_driven:
         return state
+    record = _without(record, offsets)
     count = min(_FIRST_SAMPLES, record.n_samples)
     time = np.arange(count) * record.dt
     displacement = record[structure.rig.outputs[0].name][:count]
@@ -173,6 +179,37 @@ def _of_one_motion(structure: Structure, record: Record) -> Floats:
         elif dimension == "input":
             state[i] = record[structure.rig.inputs[0].name][0]
     return state
+
+
+def _guessed_offsets(structure: Structure, record: Record, values: Mapping[str, float]) -> dict[str, float]:
+    """Return by how much each sensor that may have an offset reads more on average than the rig rests at under the mean input.
+
+    Sensors may have been zeroed anywhere, farther off than a descent finds back.
+    """
+    if not structure.offsets:
+        return {}
+    rig = structure.rig
+    motion, mean = rig.motion, {name: float(np.mean(signal)) for name, signal in record.signals.items()}
+    stiffness, rest, bias = (evaluated(e, values) for e in (motion.stiffness, motion.rest, motion.bias))
+    response, source = rig.outputs[0].name, rig.inputs[0].name
+    if not rig.is_driven:
+        levels = {response: stiffness * (mean[source] - rest) + bias}
+    elif stiffness > 0.0:
+        levels = {response: rest + (evaluated(motion.drive_gain, values) * mean[source] + bias) / stiffness}
+    else:
+        return dict.fromkeys(structure.offsets, 0.0)  # nothing tells it from where the mass lies
+    if rig.follower is not None:
+        follower = rig.follower
+        own = {**values, follower.symbol.name: 0.0}
+        away = evaluated(follower.static_gain, values) * levels[response]
+        levels[follower.symbol.name] = away - evaluated(follower.displacement, own)
+    return {name: mean[name] - levels[name] if name in mean else 0.0 for name in structure.offsets}
+
+
+def _without(record: Record, offsets: Mapping[str, float]) -> Record:
+    """Return a record as its sensors would have shown it without these offsets."""
+    own = {name: record[name] - offset for name, offset in offsets.items() if name in record and offset}
+    return record.with_signals(**own) if own else record
 
 
 def _equilibrium(equations: RigEquations, u: Floats, p: Floats) -> Floats:

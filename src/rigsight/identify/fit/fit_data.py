@@ -63,7 +63,7 @@ class FitData:
     Attributes
     ----------
     structure
-        Rig and effects.
+        Rig and effects, and behind all other states the offsets of sensors that are free.
     records
         The records.
     limited

@@ -25,7 +25,9 @@ class FitResult:
     standard_errors
         Of the fitted parameters by name, allowing for colored residuals; infinite where the records do not determine one.
     initial_states
-        Per record, shape (n_states,).
+        Per record, shape (n_states + n_offsets,): behind the states of the structure stand the offsets that were free.
+    offset_names
+        Sensors whose offsets were free in each record, in that order.
     cost
         Sum of squared weighted residuals.
     n_samples
@@ -54,6 +56,26 @@ class FitResult:
     residuals: tuple[NDArray[np.float64], ...]
     """Measured minus simulated per record, shape (n_samples, n_outputs), NaN where an output was not measured."""
     substeps: tuple[Substeps, ...] = ()
+    offset_names: tuple[str, ...] = ()
+
+    @property
+    def rig_states(self) -> tuple[NDArray[np.float64], ...]:
+        """Initial states of the structure per record, shape (n_states,), without offsets of sensors."""
+        count = len(self.offset_names)
+        return tuple(state[: state.size - count] for state in self.initial_states)
+
+    def offsets(self, index: int) -> dict[str, float]:
+        """Return the offset of each sensor in a record, by name; empty where none was free.
+
+        Parameters
+        ----------
+        index
+            Place of the record in the fit.
+        """
+        if not self.offset_names:
+            return {}
+        own = self.initial_states[index][-len(self.offset_names) :]
+        return dict(zip(self.offset_names, map(float, own), strict=True))
 
     @property
     def weighted_rms(self) -> float:

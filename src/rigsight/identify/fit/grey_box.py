@@ -36,7 +36,7 @@ from rigsight.simulate import (
     record_input,
     record_values,
     simulate_outputs,
-    with_observer,
+    structure_of_fit,
 )
 from rigsight.units import characteristic_value
 
@@ -75,8 +75,8 @@ class GreyBoxFit:
     structure
         Rig and effects.
     records
-        Records to fit; a record may lack sensors, of a rig of one motion any but the first. An observer
-        (`Record.observed`) acts in the fit, and is no part of its result.
+        Records to fit; a record may lack sensors, of a rig of one motion any but the first. Offsets that one of them leaves free
+        (`Record.free_offsets`) are estimated in each; an observer (`Record.observed`) acts in the fit, and is no part of its result.
     scales
         Size of each base quantity, see `characteristic_scales`.
     output_noise
@@ -102,9 +102,9 @@ class GreyBoxFit:
         self.structure = structure
         self.memory = memory
         self.scales = dict(scales)
-        sizes = [characteristic_value(dimension, scales) for dimension in structure.state_dimensions]
+        simulated = structure_of_fit(structure, records)
+        sizes = [characteristic_value(dimension, scales) for dimension in simulated.state_dimensions]
         names = [signal.name for signal in structure.rig.outputs]
-        simulated = with_observer(structure, {sensor for record in records for sensor in record.observed})
         self.data = FitData(
             structure=simulated,
             records=tuple(_prepared(simulated, record, names, output_noise) for record in records),
@@ -149,7 +149,7 @@ class GreyBoxFit:
         free
             Names of those to fit; may be empty, then only initial states are.
         initial_states
-            Start values per record, shape (n_states,) each; default from the first samples.
+            Start values per record, as in `FitResult`; default from the first samples.
         max_evaluations
             Limit for the optimizer.
         tolerance
@@ -339,6 +339,7 @@ class GreyBoxFit:
             covariance=np.full((n, n), np.inf),
             residuals=(),
             substeps=(Substeps(MOST_SUBSTEPS),) * len(self.data.records),
+            offset_names=self.data.structure.offsets,
         )
 
     def _result(
@@ -381,6 +382,7 @@ class GreyBoxFit:
             covariance=covariance,
             residuals=residuals,
             substeps=tuple(problem.substeps),
+            offset_names=self.data.structure.offsets,
         )
 
     def _values(self, p: NDArray[np.float64]) -> dict[str, float]:

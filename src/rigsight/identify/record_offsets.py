@@ -1,0 +1,181 @@
+"""Does an offset differ from record to record, and which numbers of a rig say the same as offsets that do?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from rigsight.identify.fit.covariance import SMOOTHED
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.records.record import Record
+from rigsight.simulate import Structure
+
+Floats = NDArray[np.float64]
+
+_CHANCE = 1e-3
+"""Probability of means as far apart by chance below which they are said to differ: with ten outputs one campaign in a hundred."""
+_WORTH_TELLING = 0.1
+"""Share of what is left, as power, from which differing means are what keeps a model from the records, and not a trifle of it."""
+_LEAST_TOLD = 1e-6
+_NOTHING = 1e-6
+"""Share of what records say of a parameter that is rounding: squares of derivatives that are known to a thousandth of this."""
+
+
+@dataclass(frozen=True)
+class DifferingMeans:
+    """Means of what a model leaves that differ from record to record.
+
+    Attributes
+    ----------
+    output
+        Name of the output.
+    means
+        Record -> mean of measured minus simulated.
+    share
+        Share of what is left, as power, that goes with the means.
+    probability
+        Chance of means as far apart if the offset is the same everywhere.
+    """
+
+    output: str
+    means: dict[str, float]
+    share: float
+    probability: float
+
+    def sentence(self, unit: str) -> str:
+        """Return what was found, in words.
+
+        Parameters
+        ----------
+        unit
+            Of the output.
+        """
+        lowest, highest = (choose(self.means, key=self.means.__getitem__) for choose in (min, max))
+        chance = f"{self.probability:.1g}" if self.probability > _LEAST_TOLD else f"below {_LEAST_TOLD:g}"
+        return (
+            f"What the model leaves of {self.output} lies at another mean in each record, from {self.means[lowest]:.3g} {unit} "
+            f"in '{lowest}' to {self.means[highest]:.3g} {unit} in '{highest}': {self.share:.0%} of all that it leaves, and "
+            f"further apart than chance makes them (probability {chance}), as if the offset of the sensor, or a constant force, "
+            "differed from record to record."
+        )
+
+
+OFFSETS_MEND = (
+    'If the sensor was zeroed anew in between, write offsets = "per_record" at the top of campaign.toml.'
+)
+
+
+def differing_means(
+    names: Sequence[str], records: Sequence[Record], residuals: Sequence[Floats], outputs: Sequence[str]
+) -> list[DifferingMeans]:
+    """Return the outputs of which a model leaves other means in each record than chance makes.
+
+    The variance of a mean comes from the lowest lines of the residual's own spectrum, so that slow disturbances count.
+
+    Parameters
+    ----------
+    names
+        What each record is called; those of one name are stretches of one record.
+    records
+        What was fitted or scored.
+    residuals
+        Measured minus simulated per record, shape (n_samples, n_outputs).
+    outputs
+        Names of the columns.
+    """
+    found = []
+    for column, output in enumerate(outputs):
+        own: dict[str, list[Floats]] = {}
+        for name, record, residual in zip(names, records, residuals, strict=False):
+            if output in record and output not in record.free_offsets:
+                own.setdefault(name, []).append(residual[:, column])
+        joined = {name: np.concatenate(parts) for name, parts in own.items()}
+        if len(joined) > 1:
+            differing = _differing(output, joined)
+            if differing.probability < _CHANCE and differing.share >= _WORTH_TELLING:
+                found.append(differing)
+    return found
+
+
+def _differing(output: str, residuals: Mapping[str, Floats]) -> DifferingMeans:
+    means = {name: float(np.mean(left)) for name, left in residuals.items()}
+    values = np.array(list(means.values()))
+    variances = np.array([_variance_of_mean(left) for left in residuals.values()])
+    weights = 1.0 / np.maximum(variances, 1e-300)
+    middle = float(weights @ values / np.sum(weights))
+    degrees = len(means) - 1
+    statistic = float(weights @ (values - middle) ** 2) / degrees
+    sizes = np.array([left.size for left in residuals.values()])
+    squares = sum(float(left @ left) for left in residuals.values())
+    return DifferingMeans(
+        output=output,
+        means=means,
+        share=min(float(sizes @ (values - middle) ** 2) / max(squares, 1e-300), 1.0),
+        probability=float(f_distribution.sf(statistic, degrees, 2 * SMOOTHED)),
+    )
+
+
+def _variance_of_mean(left: Floats) -> float:
+    """Return the variance of the mean of a colored residual: its power per line close to zero frequency over its length."""
+    lines = np.abs(np.fft.rfft(left - np.mean(left))[1 : SMOOTHED + 1]) ** 2
+    return float(np.mean(lines)) / left.size**2
+
+
+def without_offsets(records: Sequence[Record], fit: FitResult) -> list[Record]:
+    """Return records from which the offsets that a fit found in each of them are taken away.
+
+    Parameters
+    ----------
+    records
+        What was fitted.
+    fit
+        The result.
+    """
+    return [
+        record.with_signals(
+            **{name: record[name] - own for name, own in fit.offsets(index).items() if name in record}
+        )
+        for index, record in enumerate(records)
+    ]
+
+
+def swallowed_by_offsets(
+    structure: Structure,
+    records: Sequence[Record],
+    scales: Mapping[str, float],
+    noise: Mapping[str, float],
+    values: Mapping[str, float],
+    free: Sequence[str],
+) -> tuple[str, ...]:
+    """Return the parameters of which records say nothing once the offsets of their sensors are free: a rest, a sensor's own zero.
+
+    Parameters
+    ----------
+    structure
+        Rig and effects.
+    records
+        What is fitted.
+    scales, noise
+        As of `GreyBoxFit`.
+    values
+        Value of every parameter.
+    free
+        Those that are in question.
+    """
+    if not any(record.free_offsets for record in records):
+        return ()
+    without = [replace(record, free_offsets=()) for record in records]
+    said, before = (
+        np.diag(GreyBoxFit(structure, own, scales, noise).information(values, free))
+        for own in (records, without)
+    )
+    return tuple(
+        name
+        for name, now, then in zip(free, said, before, strict=True)
+        if now <= _NOTHING * then and then > 0.0
+    )
