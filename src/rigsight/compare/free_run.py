@@ -71,13 +71,14 @@ def free_run(
     found = GreyBoxFit(structure, windows, scales, output_noise, _STATE_ACCURACY).fit(
         model.values, [], max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False
     )
-    runs = [
-        simulate(structure, model.values, window, state)
-        for window, state in zip(windows, found.initial_states, strict=True)
-    ]
-    whole = (
-        runs[0] if len(windows) == 1 else simulate(structure, model.values, record, found.initial_states[0])
-    )
+    states = found.rig_states
+
+    def run(window: Record, index: int) -> Record:
+        ran = simulate(structure, model.values, window, states[index])
+        return ran.with_signals(**{name: ran[name] + own for name, own in found.offsets(index).items()})
+
+    runs = [run(window, index) for index, window in enumerate(windows)]
+    whole = runs[0] if len(windows) == 1 else run(record, 0)
     errors = {}
     for signal in rig.outputs:
         if signal.name in record:

@@ -91,6 +91,8 @@ def _noise_floor(
     repeated = _repeated(sources, output, records)
     if drifts:
         repeated = [(_without_drift(group), dt) for group, dt in repeated]
+    if any(output in record.free_offsets for record in records):
+        repeated = [(group - np.mean(group, axis=1, keepdims=True), dt) for group, dt in repeated]
     if repeated:
         squares = [np.var(group, axis=0, ddof=1) for group, _ in repeated]
         left = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]

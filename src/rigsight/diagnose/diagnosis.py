@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rigsight.diagnose.advise import advise
 from rigsight.diagnose.candidates.grow import Prepare
 from rigsight.diagnose.candidates.placed import candidates_on
-from rigsight.diagnose.detect import AT_REST, noise_floors
-from rigsight.diagnose.examination import Examination, examine, windowing_of
+from rigsight.diagnose.detect import AT_REST
+from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
@@ -27,7 +27,7 @@ from rigsight.diagnose.result import (
     Trace,
 )
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.windows import WINDOW
+from rigsight.diagnose.windows import WINDOW, readings
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
@@ -95,19 +95,14 @@ def diagnose(
         )
     if task.open_factor is not None:
         notes.append(task.open_factor.sentence)
-    floors = noise_floors(task.rig, task.records, drifts=task.drifts)
-    say("noise floor")
-
     rng = np.random.default_rng(seed)
-    windowing = windowing_of(task, {floor.output: floor.std for floor in floors}, n_jobs)
-    found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
-    if any(floor.method == AT_REST for floor in floors) and _least_left(found) < _REFUTES:
+    found = examine(task, effects, rng, n_jobs, say, prepare, memory)
+    if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < _REFUTES:
         notes.append(
             f"A model leaves {_least_left(found):.2g} of what the rig does while its input rests, so that was motion and no "
             "noise (a loose rig wanders, what pulsates goes on): the noise floor is taken from the top of the spectrum instead."
         )
-        floors = noise_floors(task.rig, task.records, drifts=task.drifts, at_rest=False)
-        found = examine(task, floors, effects, windowing, rng, n_jobs, say, prepare, memory)
+        found = examine(task, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
     if found.windowing.bandwidth is not None:
         notes.append(
             "Nothing brings the rig back, so that every model drifts in free run. Models are compared as observers: each follows "
@@ -133,7 +128,7 @@ def diagnose(
             f"Together {' and '.join(nearest.names)} leave {nearest.excess:.3g} times the noise floor, but as one law: many "
             "another form of it would come as near, so they are not named."
         )
-    diagnosis = _assembled(task, found, floors, notes, scored_on, rng)
+    diagnosis = _assembled(task, found, notes, scored_on, rng)
     lacking = None
     if found.judgement.verdict == "unknown":
         lacking = _missing_force(found.bench, found.linear, task.absent_spring is not None, rng)
@@ -157,13 +152,12 @@ def _missing_force(
 def _assembled(
     task: Task,
     found: Examination,
-    floors: Sequence[NoiseFloor],
     notes: Sequence[str],
     scored_on: str,
     rng: np.random.Generator,
 ) -> Diagnosis:
     rig, bench, before, linear = task.rig, found.bench, found.before, found.linear
-    ranking, judgement = found.ranking, found.judgement
+    ranking, judgement, floors = found.ranking, found.judgement, found.floors
     is_effect = judgement.verdict == "effect"
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else linear)
     noise = {floor.output: floor for floor in floors}
@@ -198,7 +192,7 @@ def _assembled(
         where = _evidence(found)
     left = None
     if found.adequacy is not None and found.adequacy.adequate:
-        floors = [_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors]
+        floors = tuple(_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors)
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
         left = remainder_of(linear, judgement.model, found.adequacy, lower_bound)
@@ -211,7 +205,7 @@ def _assembled(
         ambiguous_with=tied,
         candidates=candidates,
         gap=gap,
-        noise_floors=tuple(floors),
+        noise_floors=floors,
         traces=traces,
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
         model=Model.of(after.fit.structure, after.fit.values, task.records[0].hold).to_json(),
@@ -260,12 +254,8 @@ def _column(rig: Rig, model: Scored, output: str) -> NDArray[np.float64]:
 
 
 def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, NDArray[np.float64]]:
-    measured = {}
-    for signal in rig.outputs:
-        parts = [record[signal.name] for record in records if signal.name in record]
-        if parts:
-            measured[signal.name] = np.concatenate(parts)
-    return measured
+    shown = {signal.name: list(readings(records, signal.name).values()) for signal in rig.outputs}
+    return {name: np.concatenate(parts) for name, parts in shown.items() if parts}
 
 
 def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate:
@@ -321,7 +311,7 @@ def _joined(
     for name, indices in groups.items():
         parts = [records[i] for i in indices]
         first = parts[0]
-        measured = {n: np.concatenate([p[n] for p in parts]) for n in names if n in first}
+        measured = {n: readings(parts, n)[name] for n in names if n in first}
 
         def simulated(
             residuals: Sequence[NDArray[np.float64]],

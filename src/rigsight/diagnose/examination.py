@@ -14,8 +14,10 @@ from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candida
 from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
 from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.candidates.one_law import told_apart
-from rigsight.diagnose.data.data_quality import data_quality, with_best_model
+from rigsight.diagnose.data.data_quality import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.data.offset_question import asked_offsets, with_offsets_free
+from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.main_cause import main_cause
 from rigsight.diagnose.observer import Observer, sensors_of_motion
 from rigsight.diagnose.places.search import Search, search_places
@@ -29,9 +31,15 @@ from rigsight.diagnose.windows import Windowing, leading_output, typical_period,
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest, until_rest
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitMemory, IdleThreads, characteristic_scales, linear_start
+from rigsight.identify import (
+    FitMemory,
+    IdleThreads,
+    characteristic_scales,
+    linear_start,
+    swallowed_by_offsets,
+)
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure
+from rigsight.simulate import Structure, compose, structure_of_fit
 
 _SIGNIFICANT = 3.0
 """Standard errors from zero at which a constant force counts as needed."""
@@ -43,6 +51,8 @@ class Examination:
 
     Attributes
     ----------
+    floors
+        Noise floor of each output.
     bench
         Records, scales and noise.
     windowing
@@ -67,6 +77,7 @@ class Examination:
         For an unknown cause the joint, drive or sensor with whose signals the gap goes most; empty where none is known.
     """
 
+    floors: tuple[NoiseFloor, ...]
     bench: Workbench
     windowing: Windowing
     before: Scored
@@ -83,14 +94,13 @@ class Examination:
 
 def examine(
     task: Task,
-    floors: Sequence[NoiseFloor],
     effects: Sequence[Effect],
-    windowing: Windowing,
     rng: np.random.Generator,
     n_jobs: int,
     say: Callable[[str], None],
     prepare: Prepare | None,
     memory: FitMemory | None,
+    at_rest: bool = True,
 ) -> Examination:
     """Fit the simulation in question, its equations and every candidate; rank and judge them.
 
@@ -98,16 +108,14 @@ def examine(
     ----------
     task
         Records and the simulation in question.
-    floors
-        Noise floor of each output.
     effects
         Candidates.
-    windowing
-        How to cut records; whole ones are cut in the end where the motion cannot be predicted for as long as they last.
     rng
         Source of the resampling behind probabilities.
     n_jobs, say, prepare, memory
         As of `diagnose`.
+    at_rest
+        As of `noise_floors`.
 
     Raises
     ------
@@ -116,12 +124,22 @@ def examine(
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
+    floors = noise_floors(task.rig, task.records, task.drifts, at_rest)
+    say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
+    windowing = windowing_of(task, noise, n_jobs)
+    prepare = _preparing(prepare, windowing.cut(task.records))
     models = _singly(task, noise, effects, windowing, n_jobs, say, prepare, memory)
-    pairs: list[Scored] = []
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
+    asked = asked_offsets(models.bench, models.linear, models.singles, allowed) if windowing.whole else None
+    if asked is not None:
+        say("offsets by record")
+        freed = with_offsets_free(task)
+        again = examine(freed, effects, rng, n_jobs, say, prepare, memory, at_rest)
+        return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
+    pairs: list[Scored] = []
     cut, in_windows = None, False
     forms = OtherForms(models.bench, lower_bound)
     if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
@@ -164,9 +182,11 @@ def examine(
     else:
         judgement = Judgement("unknown", linear, "No candidate could be fitted.")
     quality = with_best_model(models.quality, bench, judgement.model)
+    quality = with_offsets_told(quality, bench, judgement.model)
     left = checks.of(judgement.model) if judgement.model.residuals else None
     say("adequacy")
     return Examination(
+        floors,
         models.bench,
         models.windowing,
         before,
@@ -343,6 +363,13 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowi
         bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
 
 
+def _preparing(prepare: Prepare | None, records: Sequence[Record]) -> Prepare | None:
+    """Return how structures are compiled that are fitted to records: with their free offsets and observers."""
+    if prepare is None:
+        return None
+    return lambda structures: prepare([structure_of_fit(structure, records) for structure in structures])
+
+
 def workbench_of(
     task: Task,
     noise: Mapping[str, float],
@@ -367,14 +394,18 @@ def workbench_of(
     fitted = windowing.cut(task.estimation)
     output = leading_output(task.rig, task.estimation)
     moving = until_rest(fitted, [signal.name for signal in task.rig.inputs], output)
+    held = _held(task)
+    asked = [p.name for p in task.rig.parameters if p.name not in held]
+    scales = characteristic_scales(task.rig, task.estimation, start)
+    held |= frozenset(swallowed_by_offsets(compose(task.rig), task.estimation, scales, noise, start, asked))
     return Workbench(
         rig=task.rig,
         estimation=fitted,
         look=liveliest(moving, output),
         scoring=windowing.cut(task.validation or task.estimation),
-        scales=characteristic_scales(task.rig, task.estimation, start),
+        scales=scales,
         noise=noise,
-        held=_held(task),
+        held=held,
         start=start,
         given=task.given,
         modelled=task.modelled,

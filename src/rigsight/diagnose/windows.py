@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigsight.diagnose.observer import Observer
 from rigsight.records.record import Record
@@ -87,6 +88,20 @@ class Windowing:
             if min(crossing - edges[-1], record.n_samples - crossing) >= _FEWEST_SAMPLES:
                 edges.append(crossing)
         return [*edges, record.n_samples]
+
+
+def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.float64]]:
+    """Return what a sensor shows in each record that holds it, windows joined, by the name of the record.
+
+    Where the sensor has an offset in each record its level says nothing: it is shown about its mean.
+    """
+    parts: dict[str, list[NDArray[np.float64]]] = {}
+    for record in records:
+        if sensor in record:
+            parts.setdefault(record.name.split(WINDOW)[0], []).append(record[sensor])
+    free = any(sensor in record.free_offsets for record in records)
+    joined = {name: np.concatenate(part) for name, part in parts.items()}
+    return {name: whole - np.mean(whole) for name, whole in joined.items()} if free else joined
 
 
 def leading_output(rig: Rig, records: Sequence[Record]) -> str:

@@ -149,7 +149,7 @@ class Workbench:
         names = {p.name for p in self.rig.parameters} - self.held
         if self.rig.has_one_motion and self.rig.is_driven:
             rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
-            if not self._has_spring and not any(_sees_position(e) for e in structure.effects):
+            if not self.has_stiffness and not any(_sees_position(e) for e in structure.effects):
                 names -= rest
             elif rest:
                 # A linear spring cannot tell a constant force from a shifted rest position.
@@ -171,7 +171,7 @@ class Workbench:
         return held
 
     def _known_constant_forces(self, effect: Effect) -> dict[str, float] | None:
-        has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self._has_spring
+        has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
         return known_constant_forces(self.rig, effect, self.given, has_spring)
 
     def releasable_parameters(self, structure: Structure) -> list[str]:
@@ -181,7 +181,7 @@ class Workbench:
         """
         bent = any(_sees_position(e) and not e.signature.even_harmonics for e in structure.effects)
         even = any(_sees_position(e) and e.signature.even_harmonics for e in structure.effects)
-        if not (self.rig.has_one_motion and self.rig.is_driven and self._has_spring and bent and not even):
+        if not (self.rig.has_one_motion and self.rig.is_driven and self.has_stiffness and bent and not even):
             return []
         return sorted(self._bias - self.held)
 
@@ -190,7 +190,8 @@ class Workbench:
         return {symbol.name for symbol in self.rig.motion.bias.free_symbols}
 
     @property
-    def _has_spring(self) -> bool:
+    def has_stiffness(self) -> bool:
+        """True where a spring holds a rig of one motion."""
         return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
 
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
@@ -211,7 +212,7 @@ class Workbench:
             for effect in offered
             if effect not in self.modelled
             and (effect.lateral is None or not self.rig.downstream_parameters <= self.held)
-            and (self._has_spring or (effect.spring is None and effect.deflection is None))
+            and (self.has_stiffness or (effect.spring is None and effect.deflection is None))
         ]
 
     def _can_show(self, effect: Effect) -> bool:
@@ -236,7 +237,7 @@ class Workbench:
         else:
             result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
         excess = result.weighted_rms if result.residuals else float("inf")
-        return Scored(effects, fit, result.residuals, result.initial_states, excess)
+        return Scored(effects, fit, result.residuals, result.rig_states, excess)
 
 
 def _sees_position(effect: Effect) -> bool:

@@ -44,6 +44,6 @@ __all__ = [
     "simulate_tangents",
     "state_limits",
     "structure_named",
-    "tangent_equations",
     "structure_of_fit",
+    "tangent_equations",
 ]

@@ -137,4 +137,4 @@ def scored_in_windows(bench: Workbench, model: Scored, values: Mapping[str, floa
     """
     result = bench.problem(model.fit.structure, bench.scoring).fit_windows(values, ())
     excess = result.weighted_rms if result.residuals else float("inf")
-    return replace(model, residuals=result.residuals, initial_states=result.initial_states, excess=excess)
+    return replace(model, residuals=result.residuals, initial_states=result.rig_states, excess=excess)

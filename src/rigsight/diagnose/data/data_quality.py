@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigsight.diagnose.data.amplitude_response import amplitude_dependence
-from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.data.finding import DataQuality, Finding
 from rigsight.diagnose.data.input_timing import input_timing
+from rigsight.diagnose.data.offset_question import levels_apart, means_of
 from rigsight.diagnose.data.sensor_faults import sensor_faults
 from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.identify import OFFSETS_MEND
 from rigsight.records.record import Record
 
 
@@ -37,9 +39,35 @@ def data_quality(bench: Workbench, records: Sequence[Record], linear: Scored) ->
     # A channel at fault distorts as an effect would.
     healthy = [record for record in records if record.name not in faulty]
     return DataQuality(
-        findings=(*(timing.findings() if timing is not None else ()), *faults),
+        findings=(
+            *levels_apart(bench, records),
+            *(timing.findings() if timing is not None else ()),
+            *faults,
+        ),
         amplitude=amplitude_dependence(bench.rig, healthy),
     )
+
+
+def with_offsets_told(quality: DataQuality, bench: Workbench, model: Scored) -> DataQuality:
+    """Ask whether what the best model leaves has another mean in each record, as offsets that differ make it.
+
+    Parameters
+    ----------
+    quality
+        What was found before.
+    bench
+        Records as they were fitted and scored.
+    model
+        The best model.
+    """
+    units = {signal.name: signal.unit for signal in bench.rig.outputs}
+    known = {finding.signal for finding in quality.findings if finding.kind == "offset"}
+    found = [
+        Finding("offset", told.sentence(units[told.output]), OFFSETS_MEND, serious=False, signal=told.output)
+        for told in means_of(bench, model)
+        if told.output not in known
+    ]
+    return replace(quality, findings=(*found, *quality.findings)) if found else quality
 
 
 def with_best_model(quality: DataQuality, bench: Workbench, model: Scored) -> DataQuality:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-FindingKind = Literal["hold", "time_shift", "clipping", "stuck", "quantization", "jump"]
+FindingKind = Literal["hold", "time_shift", "clipping", "stuck", "quantization", "jump", "offset"]
 Answer = Literal["yes", "no", "cannot tell"]
 
 

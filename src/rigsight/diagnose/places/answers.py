@@ -77,7 +77,9 @@ class Answers:
         self._p = parameter_vector(self.structure, self.values)
         own = fit.structure.states
         order = [own.index(state) for state in self.structure.states]
-        self.initial_states = [state[order] for state in fit.initial_states]
+        self.initial_states = [state[order] for state in fit.rig_states]
+        offsets = [list(fit.offsets(index).values()) for index in range(len(records))]
+        self.fitted_states = [np.append(*own) for own in zip(self.initial_states, offsets, strict=True)]
         self._n_outputs = len(rig.outputs)
         # A rig with one motion is searched in sizes of its own kind; a push needs those of its place.
         self.scales = scales_at_places(rig, records, self.values) if rig.has_one_motion else bench.scales
@@ -194,8 +196,12 @@ class Answers:
         found = []
         for change, weights in zip(self._changes, self._weights, strict=True):
             by_state = change[:, :, len(self.free) :] * weights[None, :, None]
-            columns = by_state.reshape(change.shape[0] * change.shape[1], by_state.shape[2])
-            found.append(orthonormal(columns))
+            shifts = np.zeros((change.shape[0], self._n_outputs, len(self.fit.offset_names)))
+            for column, name in enumerate(self.fit.offset_names):
+                place = [signal.name for signal in self.bench.rig.outputs].index(name)
+                shifts[:, place, column] = weights[place]
+            own = np.concatenate([by_state, shifts], axis=2)
+            found.append(orthonormal(own.reshape(change.shape[0] * change.shape[1], own.shape[2])))
         return found
 
     @cached_property

@@ -107,7 +107,7 @@ class Lineup:
         fit = self._bench.problem(self._answers.structure, records).fit(
             start,
             [*self._fit.free, PUSH_SIZE],
-            self._answers.initial_states,
+            self._answers.fitted_states,
             _EVALUATIONS,
             _TOLERANCE,
             False,

@@ -1,0 +1,164 @@
+"""Do the records ask for an offset of each sensor in each record? Asked before any second effect is believed.
+
+A sensor that was zeroed anew shifts a whole record. A memory that begins each record where it likes does nearly the same, and a
+second effect with a memory takes the credit. So models without a memory are asked first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.data.finding import Finding
+from rigsight.diagnose.task import Task
+from rigsight.diagnose.windows import WINDOW
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import Effect, Place
+from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+_LARGER_PART = 0.5
+"""Share of what a model leaves above the floor, as power, that must go with the offsets: else something else is the cause."""
+_EVALUATIONS = 40
+_TOLERANCE = 1e-5
+_KEPT = 'Write offsets = "per_record" at the top of campaign.toml to have it so in every command.'
+
+
+def asked_offsets(
+    bench: Workbench, linear: Scored, singles: Sequence[Scored], allowed: float
+) -> Finding | None:
+    """Return what speaks for an offset in each record, None where nothing does.
+
+    With offsets free a model must explain the records: an effect that pulls to one side, the more the larger the motion, shifts
+    records as well, and leaves more than shifts.
+
+    Parameters
+    ----------
+    bench
+        Records as they were fitted, without free offsets.
+    linear, singles
+        The re-identified equations, and every effect by itself.
+    allowed
+        What a named cause may leave, in units of the noise floor.
+    """
+    models = [linear, *(m for m in singles if m.fit.residuals and np.isfinite(m.excess))]
+    forgetful = [m for m in models if not _remembers(m.effects)]
+    # With the means gone they come nearest.
+    nearest = [min(some, key=lambda m: _cost_without_means(bench, m)) for some in (forgetful, models)]
+    for model in nearest[:1] if nearest[0] is nearest[1] else nearest:
+        told = means_of(bench, model)
+        if not told:
+            continue
+        freed = _with_free_offsets(bench, model)
+        gained = model.excess**2 - freed.excess**2
+        if freed.excess <= allowed and gained > _LARGER_PART * (model.excess**2 - 1.0):
+            worst = max(told, key=lambda one: one.share)
+            unit = next(signal.unit for signal in bench.rig.outputs if signal.name == worst.output)
+            return Finding(
+                "offset",
+                f"{worst.sentence(unit)} With an offset of each sensor in each record the nearest model leaves "
+                f"{freed.excess:.3g} times the noise floor instead of {model.excess:.3g}: such offsets are estimated here, "
+                "and no part of the model.",
+                _KEPT,
+                signal=worst.output,
+            )
+    return None
+
+
+def levels_apart(bench: Workbench, records: Sequence[Record]) -> list[Finding]:
+    """Return the sensors whose level differs between records by more than they move in any: no fit begins well from there.
+
+    A spring brings a rig back to one place where its input has one mean; nothing is said where it has not, or of another rig.
+
+    Parameters
+    ----------
+    bench
+        The rig and what is known of it.
+    records
+        All records of the campaign, whole.
+    """
+    rig = bench.rig
+    if not (rig.has_one_motion and bench.has_stiffness) or _apart(records, rig.inputs[0].name)[0] > 1.0:
+        return []
+    found = []
+    for signal in rig.outputs:
+        holding = [r for r in records if signal.name in r and signal.name not in r.free_offsets]
+        moves, lowest, highest = _apart(holding, signal.name)
+        if moves > 1.0:
+            found.append(
+                Finding(
+                    "offset",
+                    f"{signal.name} lies {moves:.3g} times as far apart in '{lowest}' and '{highest}' as it moves in any record.",
+                    OFFSETS_MEND,
+                    signal=signal.name,
+                )
+            )
+    return found
+
+
+def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
+    """Return how far apart the levels of a signal lie in units of its largest motion, and the records between which they do."""
+    levels = {record.name: float(np.mean(record[name])) for record in records}
+    if len(levels) < 2:
+        return 0.0, "", ""
+    lowest, highest = (choose(levels, key=levels.__getitem__) for choose in (min, max))
+    apart, motion = levels[highest] - levels[lowest], max(float(np.ptp(record[name])) for record in records)
+    return apart / motion if motion > 0.0 else float("inf") if apart > 0.0 else 0.0, lowest, highest
+
+
+def means_of(bench: Workbench, model: Scored) -> list[DifferingMeans]:
+    """Return the outputs of which a model leaves other means in each record.
+
+    Parameters
+    ----------
+    bench
+        Records as they were fitted and scored.
+    model
+        The model.
+    """
+    records, residuals = list(bench.estimation), list(model.fit.residuals)
+    if bench.scoring != bench.estimation:
+        records, residuals = [*records, *bench.scoring], [*residuals, *model.residuals]
+    if not (model.residuals and model.fit.residuals):
+        return []
+    names = [record.name.split(WINDOW)[0] for record in records]
+    return differing_means(names, records, residuals, [signal.name for signal in bench.rig.outputs])
+
+
+def with_offsets_free(task: Task) -> Task:
+    """Return a task in which each sensor has an offset of its own in each record."""
+    return replace(task, records=_freed(task.rig, task.records))
+
+
+def _remembers(effects: Iterable[Effect]) -> bool:
+    """Return True for effects of the motion with states of their own."""
+    return any(effect.states and effect.place is Place.DYNAMICS for effect in effects)
+
+
+def _cost_without_means(bench: Workbench, model: Scored) -> float:
+    """Return the sum of squared weighted residuals about their mean in each record."""
+    noise = np.array([bench.noise.get(signal.name, np.inf) for signal in bench.rig.outputs])
+    parts = [residual / noise for residual in model.fit.residuals]
+    return float(sum(np.nansum((part - np.mean(part, axis=0)) ** 2) for part in parts))
+
+
+def _freed(rig: Rig, records: Iterable[Record]) -> tuple[Record, ...]:
+    outputs = [signal.name for signal in rig.outputs]
+    return tuple(record.with_free_offsets(outputs) for record in records)
+
+
+def _with_free_offsets(bench: Workbench, model: Scored) -> Scored:
+    """Fit and score a model with free offsets, from where it ended without them."""
+    own = replace(
+        bench, estimation=_freed(bench.rig, bench.estimation), scoring=_freed(bench.rig, bench.scoring)
+    )
+    structure, values = model.fit.structure, model.fit.values
+    swallowed = swallowed_by_offsets(
+        structure, own.estimation, bench.scales, bench.noise, values, model.fit.free
+    )
+    free = [name for name in model.fit.free if name not in swallowed]
+    fit = own.problem(structure, own.estimation).fit(values, free, None, _EVALUATIONS, _TOLERANCE)
+    return own.score(model.effects, fit) if fit.residuals else replace(model, excess=float("inf"))
