@@ -43,7 +43,9 @@ def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Fou
     output = rig.outputs[0].name
     structure = final.structure
     constants = {p.name for p in rig.constants}
-    numbers = {n: v for n, v in final.values.items() if n not in final.free and n not in constants}
+    # A number that is held is written only where it makes the equation shorter.
+    held = {n: v for n, v in final.values.items() if n not in final.free and n not in constants}
+    numbers = {name: value for name, value in held.items() if value in (0.0, 1.0)}
     text, latex = equations(structure, numbers)
     own = {p.name for p in rig.parameters}
     units = {p.name: p.unit for p in structure.parameters}

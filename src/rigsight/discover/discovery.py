@@ -25,7 +25,15 @@ from rigsight.discover.terms.library import Candidate, candidates, offered_effec
 from rigsight.discover.weak_form import Rows
 from rigsight.effects import Place
 from rigsight.errors import InputError, SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start
+from rigsight.identify import (
+    FitResult,
+    GreyBoxFit,
+    IdleThreads,
+    characteristic_scales,
+    linear_start,
+    swallowed_by_offsets,
+    without_offsets,
+)
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -86,8 +94,11 @@ def discover(
     values = _linear_values(task, estimation)
     scales = characteristic_scales(task.rig, estimation, values)
     output = task.rig.outputs[0].name
+    # What the motion knows nothing of would be simulated in every fit.
+    alone = tuple(_without_downstream(task.rig, record) for record in estimation)
+    swallowed, centered = _offsets_found(task, alone, values, scales, _held(task))
     motions = threads.results(
-        lambda index: motion_of(task.rig, estimation[index], values, task.noise[output]),
+        lambda index: motion_of(task.rig, centered[index], values, task.noise[output]),
         [record.n_samples for record in estimation],
     )
     say("motion smoothed")
@@ -97,14 +108,13 @@ def discover(
     library, same = _distinct(library, projected)
     say("library")
     bench = Bench(
-        # What the motion knows nothing of would be simulated in every fit.
         rig=task.rig.motion_alone(),
-        estimation=tuple(_without_downstream(task.rig, record) for record in estimation),
+        estimation=alone,
         held_out=tuple(_without_downstream(task.rig, record) for record in held_out),
         values=values,
         scales=scales,
         noise=task.noise,
-        held=_held(task),
+        held=_held(task) | swallowed,
         candidates={candidate.name: candidate for candidate in library},
         projected=projected,
         own_terms=own_terms(task.rig, task.no_spring, projected) if method == "full" else {},
@@ -145,6 +155,25 @@ def _held(task: Task) -> frozenset[str]:
     if task.no_spring:
         held.add(motion.stiffness.name)
     return frozenset(held)
+
+
+def _offsets_found(
+    task: Task,
+    records: Sequence[Record],
+    values: Mapping[str, float],
+    scales: Mapping[str, float],
+    held: frozenset[str],
+) -> tuple[frozenset[str], Sequence[Record]]:
+    """Return parameters that offsets of the records' own make up for, and the records without the offsets of a first fit."""
+    if not any(record.free_offsets for record in records):
+        return frozenset(), records
+    structure = compose(task.rig.motion_alone())
+    asked = [p.name for p in task.rig.parameters if p.name in structure.names and p.name not in held]
+    known = {name: values[name] for name in structure.names}
+    swallowed = frozenset(swallowed_by_offsets(structure, records, scales, task.noise, known, asked))
+    free = [name for name in asked if name not in swallowed]
+    fit = GreyBoxFit(structure, records, scales, task.noise).fit(known, free, finish=False)
+    return swallowed, without_offsets(records, fit)
 
 
 def _without_downstream(rig: Rig, record: Record) -> Record:
@@ -218,7 +247,13 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
     free = set(chosen.fit.free)
     measured = {name for record in records for name in record.signals}
     if any(symbol.name in measured for symbol in rig.downstream):
+        start = {p: bench.values[p] for p in compose(rig).names}
         free |= rig.downstream_parameters
+        free -= set(
+            swallowed_by_offsets(
+                compose(rig), records, bench.scales, bench.noise, start, sorted(free & start.keys())
+            )
+        )
 
     def fitted(structure: Structure, start: Mapping[str, float], moved: set[str]) -> FitResult:
         return GreyBoxFit(structure, records, bench.scales, bench.noise, threads=bench.threads).fit(

@@ -15,6 +15,7 @@ from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
+from rigsight.simulate import with_offsets
 from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
 from rigsight.workflow.files.fit_journal import FitJournal
 from rigsight.workflow.files.model_file import MODEL_FILE
@@ -124,7 +125,9 @@ def diagnose_campaign(
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
     ]
     candidates = candidates_on(campaign.rig, named, campaign.modelled)
-    prepare_kernels(structures_to_try(campaign.rig, candidates, campaign.modelled), n_jobs, listener)
+    tried = structures_to_try(campaign.rig, candidates, campaign.modelled)
+    offsets = {name for record in campaign.records for name in record.free_offsets}
+    prepare_kernels([with_offsets(structure, offsets) for structure in tried], n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     journal = (
         contextlib.nullcontext()

@@ -31,6 +31,7 @@ from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identification.warnings import (
     beyond_identified_amplitudes,
     campaign_warnings,
+    offsets_of_records,
     out_of_band,
 )
 from rigsight.workflow.kernels import checked_jobs, prepare_kernels
@@ -159,6 +160,7 @@ def identify_campaign(
         warnings=(
             *campaign_warnings(campaign, found, joint, no_spring),
             *beyond_identified_amplitudes(campaign, joint),
+            *([] if no_spring else offsets_of_records(campaign, joint, {})),
         ),
     )
     stage.finished("amplitudes")

@@ -178,7 +178,7 @@ def _estimated_state(model: Model, record: Record) -> NDArray[np.float64]:
     result = GreyBoxFit(model.structure, [record], scales, noise).fit(model.values, [])
     if not result.residuals:
         raise InputError(f"The initial state cannot be estimated: {result.message}")
-    return result.initial_states[0]
+    return result.rig_states[0]
 
 
 def _csv_text(record: Record, names: list[str]) -> str:

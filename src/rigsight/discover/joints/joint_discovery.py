@@ -24,7 +24,15 @@ from rigsight.discover.terms.equations import equations
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
 from rigsight.errors import SimulationError
-from rigsight.identify import FitResult, GreyBoxFit, IdleThreads, characteristic_scales, linear_start
+from rigsight.identify import (
+    FitResult,
+    GreyBoxFit,
+    IdleThreads,
+    characteristic_scales,
+    linear_start,
+    swallowed_by_offsets,
+    without_offsets,
+)
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
@@ -85,7 +93,8 @@ def discover_at_joints(
         )
     say("re-identified")
     known = {**task.constants, **alone.fit.values}
-    joints = missing_forces(task.rig, polisher.estimation, known, task.noise, np.random.default_rng(seed))
+    centered = without_offsets(polisher.estimation, alone.fit)
+    joints = missing_forces(task.rig, centered, known, task.noise, np.random.default_rng(seed))
     say("missing forces")
     least = min(force.error_over_noise for force in joints)
     found = [alone]
@@ -141,6 +150,10 @@ class _Polisher:
         self.estimation, self.held_out, self.how = split(task)
         self.start = {**task.constants, **linear_start(task.rig, self.estimation, task.constants, task.held)}
         self._scales = characteristic_scales(task.rig, self.estimation, self.start)
+        structure, asked = compose(task.rig), sorted(self._free)
+        self._free -= set(
+            swallowed_by_offsets(structure, self.estimation, self._scales, self.noise, self.start, asked)
+        )
 
     def polished(self, terms: Sequence[LawTerm], values: Mapping[str, float]) -> _Polished:
         structure = compose(self.rig, [term.effect for term in terms])

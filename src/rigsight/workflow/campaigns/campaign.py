@@ -147,6 +147,9 @@ def read_campaign(
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
         for stretch in read_listed_record(path, rig, number, record, file)
     ]
+    if table.offsets == "per_record":
+        outputs = [signal.name for signal in rig.outputs]
+        read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
     records = tuple(record for _, record in read)
     constants, differing = of_first_record(given, records)
     notes = [

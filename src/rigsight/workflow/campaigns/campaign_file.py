@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -13,6 +13,8 @@ from rigsight.records import Hold, Kind, Role
 from rigsight.records.formats.ordinary_file import file_size
 
 MOST_RECORDS = 1000
+Offsets = Literal["shared", "per_record"]
+"""Whether the offset of a sensor is the same in all records."""
 WHICH_RIG = 'model = "NAME" for a rig that rigsight rigs lists, or file = "my_rig.toml" for one of your own.'
 LARGEST_FILE = 10_000_000
 _LISTS = ("records", "withheld")
@@ -74,6 +76,7 @@ class CampaignTable(FileTable):
     """The whole file."""
 
     title: str = ""
+    offsets: Offsets = "shared"
     rig: RigTable
     records: Annotated[list[RecordTable], Field(min_length=1, max_length=MOST_RECORDS)]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import get_args
 
 from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, check_option
@@ -14,6 +15,7 @@ from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaigns.campaign import NO_VALIDATION, Campaign, of_first_record
+from rigsight.workflow.campaigns.campaign_file import Offsets
 from rigsight.workflow.campaigns.given_simulation import checked_numbers, checked_simulation
 from rigsight.workflow.own.effect_names import effects_on
 
@@ -26,6 +28,7 @@ def make_campaign(
     parameters: Mapping[str, float] | None = None,
     effects: Sequence[str | Effect] = (),
     title: str = "",
+    offsets: Offsets = "shared",
 ) -> Campaign:
     """Make a campaign of records in memory.
 
@@ -44,6 +47,8 @@ def make_campaign(
         Effects that this simulation has already, by name or as declarations.
     title
         What a report calls the campaign; by default the name of the rig.
+    offsets
+        ``"per_record"`` where each sensor has an offset of its own in each record: it is estimated and no part of a model.
 
     Raises
     ------
@@ -82,7 +87,12 @@ def make_campaign(
             f"{called}: records: several are called '{twice[0]}'. Give every record a name of its own."
         )
     judged = any(record.role == "validation" for record in records)
+    check_option("offsets", offsets, get_args(Offsets))
     checked = tuple(_checked(called, record, found) for record in records)
+    if offsets == "per_record":
+        checked = tuple(
+            record.with_free_offsets(signal.name for signal in found.outputs) for record in checked
+        )
     constants, differing = of_first_record(given, checked)
     return Campaign(
         title=called,

@@ -17,6 +17,7 @@ from rigsight.identify import (
     OpenFactor,
     characteristic_scales,
     linear_start,
+    swallowed_by_offsets,
 )
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.helpful_sensors import helpful_sensors
@@ -40,7 +41,11 @@ from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaigns.campaign import Campaign
 from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
-from rigsight.workflow.identification.warnings import any_rig_warnings, beyond_identified_amplitudes
+from rigsight.workflow.identification.warnings import (
+    any_rig_warnings,
+    beyond_identified_amplitudes,
+    offsets_of_records,
+)
 from rigsight.workflow.kernels import prepare_kernels
 from rigsight.workflow.progress import Listener, Stage
 
@@ -56,10 +61,10 @@ def has_transfer_forms(campaign: Campaign) -> bool:
     """Return True for the built-in rigs of one motion, whose transfer functions are fitted record by record.
 
     A rig of the same shape from a file has names of its own; records of different constants have no such form together, and one
-    in which nothing drives the rig has none.
+    in which nothing drives the rig has none. Offsets that differ from record to record are found over time alone.
     """
     rig = campaign.rig
-    if not _is_built_in(rig) or any(record.constants for record in campaign.records):
+    if not _is_built_in(rig) or any(record.constants or record.free_offsets for record in campaign.records):
         return False
     return not any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
 
@@ -102,6 +107,8 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
         factor = campaign.open_factor
         held = _held(campaign, records, factor)
         start, length = _begin(campaign, structure, records, held)
+        swallowed = _swallowed(structure, cut(records, length), {**campaign.constants, **start}, held)
+        held |= {name: start[name] for name in swallowed}
         joint = fit_any_rig_jointly(campaign, structure, found, start, held, length)
         stage.finished("one set for all records")
         known, joint = _with_errors(joint, structure, cut(records, length), factor)
@@ -130,6 +137,7 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
         warnings=(
             *([] if factor is None else [factor.sentence]),
             *any_rig_warnings(campaign, views, joint),
+            *offsets_of_records(campaign, joint, {name: start[name] for name in swallowed}, length),
             *(beyond_identified_amplitudes(campaign, joint) if len(rig.inputs) <= 1 else ()),
         ),
         views=views,
@@ -189,16 +197,30 @@ def _begin(
     return starts[best], lengths[best]
 
 
+def _swallowed(
+    structure: Structure, windows: Sequence[Record], values: Mapping[str, float], held: Mapping[str, float]
+) -> tuple[str, ...]:
+    """Return the parameters that say the same as offsets of sensors that are free in each record."""
+    scales = characteristic_scales(structure.rig, windows, values)
+    asked = [p.name for p in structure.rig.parameters if p.name not in held]
+    return swallowed_by_offsets(structure, windows, scales, _sizes(structure, windows), values, asked)
+
+
 def _cost(structure: Structure, values: Mapping[str, float], records: Sequence[Record]) -> float:
     scales = characteristic_scales(structure.rig, records, values)
-    sizes = {
+    fit = GreyBoxFit(structure, records, scales, _sizes(structure, records))
+    return fit.fit(values, (), finish=False).cost
+
+
+def _sizes(structure: Structure, records: Sequence[Record]) -> dict[str, float]:
+    """Return how much each output that was measured moves."""
+    return {
         signal.name: max(
             float(np.std(np.concatenate([r[signal.name] for r in records if signal.name in r]))), 1e-300
         )
         for signal in structure.rig.outputs
         if any(signal.name in record for record in records)
     }
-    return GreyBoxFit(structure, records, scales, sizes).fit(values, (), finish=False).cost
 
 
 def _window_length(

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from rigsight.diagnose.windows import cut
+from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.identification import JointIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.record_identification import MISFIT, measured_amplitude
@@ -13,6 +17,7 @@ from rigsight.identify.transfer.record_response import driven_band
 from rigsight.records import Record
 from rigsight.rigs import evaluated
 from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.identification.joint import parent
 
 _TOLERANCE = 0.02
 """Share by which an amplitude may lie outside the identified ones and still count as one of them."""
@@ -102,6 +107,47 @@ def any_rig_warnings(
     if not joint.fit.fit.success:
         told.append(joint.statement)
     return list(dict.fromkeys(told))
+
+
+def offsets_of_records(
+    campaign: Campaign, joint: JointIdentification, held: Mapping[str, float], length: float | None = None
+) -> list[str]:
+    """Return the offsets of sensors that were estimated in each record, or that they should be where they were not.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    joint
+        The fit.
+    held
+        Parameters that say the same as such offsets, and the values at which they were held.
+    length
+        Of the windows into which records were cut [s]; None where they were fitted whole.
+    """
+    fit, rig = joint.fit.fit, campaign.rig
+    fitted = cut([r for r in campaign.estimation if r.name not in joint.left_out], length)
+    units = {signal.name: signal.unit for signal in rig.outputs}
+    names = [parent(record) for record in fitted]
+    if not fit.offset_names:
+        found = differing_means(names, fitted, fit.residuals, list(units))
+        return [f"{told.sentence(units[told.output])} {OFFSETS_MEND}" for told in found]
+    told = []
+    for output in fit.offset_names:
+        own: dict[str, list[float]] = {}
+        for index, record in enumerate(fitted):
+            if output in record:
+                own.setdefault(names[index], []).append(fit.offsets(index)[output])
+        listed = ", ".join(f"'{name}' {np.mean(values):.4g}" for name, values in own.items())
+        told.append(
+            f"Offset of {output} by record [{units[output]}], estimated and no part of the model: {listed}."
+        )
+    if held:
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in held.items())
+        told.append(
+            f"{values} {'are' if len(held) > 1 else 'is'} held: with an offset in each record nothing tells it."
+        )
+    return told
 
 
 def _of_view(view: LinearView) -> list[str]:
