@@ -19,7 +19,7 @@ from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.data.offset_question import asked_offsets, with_offsets_free
 from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.main_cause import main_cause
-from rigsight.diagnose.observer import Observer, sensors_of_motion
+from rigsight.diagnose.observer import Observer, followed_sensors, structures_to_fit
 from rigsight.diagnose.places.search import Search, search_places
 from rigsight.diagnose.plausibility import doubts, plausible_first
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
@@ -39,7 +39,7 @@ from rigsight.identify import (
     swallowed_by_offsets,
 )
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose, structure_of_fit
+from rigsight.simulate import Structure, compose
 
 _SIGNIFICANT = 3.0
 """Standard errors from zero at which a constant force counts as needed."""
@@ -130,8 +130,8 @@ def examine(
     lower_bound = any(floor.lower_bound for floor in floors)
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
     windowing = windowing_of(task, noise, n_jobs)
-    prepare = _preparing(prepare, windowing.cut(task.records))
-    models = _singly(task, noise, effects, windowing, n_jobs, say, prepare, memory)
+    ready = None if prepare is None else lambda own: prepare(structures_to_fit(task, own))
+    models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
     asked = asked_offsets(models.bench, models.linear, models.singles, allowed) if windowing.whole else None
     if asked is not None:
@@ -147,7 +147,7 @@ def examine(
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
     if not in_windows:
-        pairs = _grown(models, effects, forms, lower_bound, task.rig.is_driven, prepare)
+        pairs = _grown(models, effects, forms, lower_bound, task.rig.is_driven, ready)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
         if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
@@ -344,10 +344,9 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowi
     n_jobs
         Threads that help with the records of a fit.
     """
-    if not task.drifts and not __import__("os").environ.get("OBS"):
+    if not task.drifts:
         return Windowing()
-    shown = {name for record in task.records for name in record.signals}
-    sensors = tuple(name for name in sensors_of_motion(task.rig) if name in shown)
+    sensors = followed_sensors(task)
     if not sensors:
         return Windowing(window_length(task.rig, task.estimation))
     typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
@@ -361,13 +360,6 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowi
             return windowing
         values = linear.fit.values if linear.residuals else None
         bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
-
-
-def _preparing(prepare: Prepare | None, records: Sequence[Record]) -> Prepare | None:
-    """Return how structures are compiled that are fitted to records: with their free offsets and observers."""
-    if prepare is None:
-        return None
-    return lambda structures: prepare([structure_of_fit(structure, records) for structure in structures])
 
 
 def workbench_of(

@@ -12,12 +12,13 @@ D. G. Luenberger, IEEE Trans. Automatic Control 16 (1971) 596, for observers. L.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from rigsight.diagnose.task import Task
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import compose
+from rigsight.simulate import Structure, compose, structure_of_fit
 
 
 @dataclass(frozen=True)
@@ -48,14 +49,28 @@ def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
     return frozenset(sensor for record in records for sensor in record.observed)
 
 
-def sensors_of_motion(rig: Rig) -> tuple[str, ...]:
-    """Return the sensors that show nothing but the motion of a rig.
+def followed_sensors(task: Task) -> tuple[str, ...]:
+    """Return the sensors that models of a task follow: none where the rig does not drift, or no sensor shows its motion alone.
 
     Parameters
     ----------
-    rig
-        The rig.
+    task
+        Records and the simulation in question.
     """
+    if not task.drifts:
+        return ()
+    shown = {name for record in task.records for name in record.signals}
+    return tuple(name for name in _sensors_of_motion(task.rig) if name in shown)
+
+
+def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Structure]:
+    """Return structures as they are simulated in fits to the records of a task: with free offsets and with an observer."""
+    any_bandwidth = Observer(followed_sensors(task), 0.0)
+    records = any_bandwidth.following(task.records)
+    return [structure_of_fit(structure, records) for structure in structures]
+
+
+def _sensors_of_motion(rig: Rig) -> tuple[str, ...]:
     structure = compose(rig)
     motion = structure.tree.motion
     moving = {*motion.coordinates, *motion.velocities}

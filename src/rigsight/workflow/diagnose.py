@@ -11,11 +11,10 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose
+from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose, structures_to_fit
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
-from rigsight.simulate import with_offsets
 from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
 from rigsight.workflow.files.fit_journal import FitJournal
 from rigsight.workflow.files.model_file import MODEL_FILE
@@ -126,8 +125,8 @@ def diagnose_campaign(
     ]
     candidates = candidates_on(campaign.rig, named, campaign.modelled)
     tried = structures_to_try(campaign.rig, candidates, campaign.modelled)
-    offsets = {name for record in campaign.records for name in record.free_offsets}
-    prepare_kernels([with_offsets(structure, offsets) for structure in tried], n_jobs, listener)
+    task = task_of(campaign)
+    prepare_kernels(structures_to_fit(task, tried), n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     journal = (
         contextlib.nullcontext()
@@ -137,7 +136,7 @@ def diagnose_campaign(
     # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
         diagnosis = diagnose(
-            task_of(campaign),
+            task,
             candidates,
             seed=seed,
             n_jobs=n_jobs,

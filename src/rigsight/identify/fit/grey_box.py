@@ -76,7 +76,8 @@ class GreyBoxFit:
         Rig and effects.
     records
         Records to fit; a record may lack sensors, of a rig of one motion any but the first. Offsets that one of them leaves free
-        (`Record.free_offsets`) are estimated in each; an observer (`Record.observed`) acts in the fit, and is no part of its result.
+        (`Record.free_offsets`) are estimated in each. Its observer (`Record.observed`) acts in the fit, not in the
+        result.
     scales
         Size of each base quantity, see `characteristic_scales`.
     output_noise
