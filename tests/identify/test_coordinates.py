@@ -8,7 +8,7 @@ import pytest
 from rigsight.effects import effect_named
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.rigs import AXIS, RUNNING_GEAR
-from rigsight.simulate import compose, parameter_vector
+from rigsight.simulate import compose, parameter_vector, special_values
 
 STRUCTURE = compose(AXIS, [effect_named("bouc_wen_hysteresis")], {"n": 1.0})
 SCALES = {"x": 0.02, "force": 3.0, "drive": 2.0, "input": 2.0, "time": 0.1, "length": 1.0}
@@ -169,3 +169,26 @@ def test_derivatives_are_those_of_the_parameters(fixed: dict[str, float]) -> Non
     size = np.max(np.abs(expected), axis=0) + 1e-300
     np.testing.assert_allclose(found.T / size, np.array(expected) / size, atol=1e-8)
     np.testing.assert_array_equal(coordinates.jacobian(theta), found[coordinates.index])
+
+
+def test_a_pair_and_its_exponent_are_known_by_their_names_in_the_structure() -> None:
+    """The exponent of a power law is called n too, so that both are qualified."""
+    effects = [effect_named("bouc_wen_hysteresis"), effect_named("power_law_stiffness")]
+    structure = compose(AXIS, effects)
+    values = {
+        **VALUES, "bouc_wen_hysteresis.n": 1.7, "power_law_stiffness.n": 2.5, "k_p": 30.0, "x_r": 0.01,
+    }  # fmt: skip
+    free = [name for name in structure.names if name not in ("gain", "A", "x_r")]
+    coordinates = Coordinates.of(structure, free, values, SCALES)
+    (pair,) = coordinates.pairs
+    assert pair.exponent == "bouc_wen_hysteresis.n"
+    back = coordinates.to_parameters(coordinates.from_values(values))
+    np.testing.assert_allclose(back, parameter_vector(structure, values), rtol=1e-12)
+
+
+def test_special_values_go_by_the_names_of_the_structure() -> None:
+    effects = [effect_named("bouc_wen_hysteresis"), effect_named("power_law_stiffness")]
+    structure = compose(AXIS, effects, special_values(AXIS, effects))
+    assert dict(structure.fixed) == {"bouc_wen_hysteresis.n": 1.0}
+    assert "power_law_stiffness.n" in structure.names
+    assert structure.special_cases == {"n"}

@@ -269,12 +269,12 @@ def _singly(
     if search.places:
         say("places")
     if search.places and prepare is not None:
-        prepare([bench.composed((effect,), effect.special_cases) for effect in search.effects])
+        prepare([bench.simplest((effect,)) for effect in search.effects])
     singles = fit_candidates(bench, linear, search.effects, say)
     if search.others and min((model.excess for model in singles), default=np.inf) > AT_FLOOR:
         # Nothing right may be lost where the places were ranked wrongly.
         if prepare is not None:
-            prepare([bench.composed((effect,), effect.special_cases) for effect in search.others])
+            prepare([bench.simplest((effect,)) for effect in search.others])
         singles = refine(bench, [*singles, *fit_candidates(bench, linear, search.others, say)])
     return _Singly(windowing, bench, before, linear, quality, singles, search)
 

@@ -18,7 +18,7 @@ from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure, compose, special_values
 
 _PIECE = 4.0
 """Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
@@ -143,6 +143,10 @@ class Workbench:
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
         """Return the equations of the simulation in question with effects added."""
         return compose(self.rig, (*self.modelled, *effects), fixed)
+
+    def simplest(self, effects: Sequence[Effect]) -> Structure:
+        """Return the same with parameters of these effects at the values that make the equations shorter."""
+        return self.composed(effects, special_values(self.rig, effects, self.modelled))
 
     def free_parameters(self, structure: Structure) -> list[str]:
         """Return what a fit of this structure moves from the start."""

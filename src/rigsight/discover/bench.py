@@ -14,7 +14,7 @@ from rigsight.discover.terms.library import Candidate
 from rigsight.identify import FitResult, GreyBoxFit, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, carried_over, compose
+from rigsight.simulate import Structure, carried_over, compose, unique_names
 
 Support = frozenset[str]
 Progress = Callable[[Support], None]
@@ -180,11 +180,12 @@ class Bench:
     def structure(self, support: Support, release: frozenset[str] = frozenset()) -> Structure:
         """Return the equations of a support; special values of its effects are written in unless released."""
         effects = [self.candidates[name].effect for name in sorted(support)]
+        names = unique_names(self.rig, tuple(effects))
         fixed = {
-            name: value
+            names[effect.name, own]: value
             for effect in effects
-            for name, value in effect.special_cases.items()
-            if name not in release and self.candidates[effect.name].inner.get(name, value) == value
+            for own, value in effect.special_cases.items()
+            if own not in release and self.candidates[effect.name].inner.get(own, value) == value
         }
         return compose(self.rig, effects, fixed)
 
@@ -220,7 +221,7 @@ class Bench:
 
     def shortened(self, supports: Sequence[Support], longer: Trial) -> list[Trial]:
         """Polish supports once more from the values that a longer one ended at, and keep the better of both."""
-        kept = {name for name, _ in longer.fit.structure.fixed}
+        kept = longer.fit.structure.special_cases
         before = self.trials_of([Attempt(support) for support in supports])
         attempts = []
         for support, first in zip(supports, before, strict=True):

@@ -37,7 +37,7 @@ from rigsight.identify import (
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure, compose, special_values
 
 Method = Literal["full", "discrepancy"]
 METHODS: tuple[Method, ...] = ("discrepancy", "full")
@@ -226,7 +226,7 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
     without = bench.trial(
         Attempt(
             chosen.support,
-            release=frozenset(special - set(dict(chosen.fit.structure.fixed))),
+            release=frozenset(special - chosen.fit.structure.special_cases),
             start={**dict(chosen.fit.structure.fixed), **chosen.fit.values, damping: 0.0},
             left_out=frozenset({damping}),
         )
@@ -260,7 +260,7 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
             start, [name for name in structure.names if name in moved], max_evaluations=_FINAL_EVALUATIONS
         )
 
-    special = {name: value for e in chosen.fit.structure.effects for name, value in e.special_cases.items()}
+    special = special_values(rig, chosen.fit.structure.effects)
     start = {**special, **dict(chosen.fit.structure.fixed), **chosen.fit.values}
     effects = chosen.fit.structure.effects
     fit = fitted(compose(rig, effects), start, free | set(special))

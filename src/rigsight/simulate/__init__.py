@@ -21,6 +21,8 @@ from rigsight.simulate.simulation import simulate_outputs as simulate_outputs
 from rigsight.simulate.state_limits import state_limits as state_limits
 from rigsight.simulate.structure import Structure as Structure
 from rigsight.simulate.structure import carried_over as carried_over
+from rigsight.simulate.structure import special_values as special_values
+from rigsight.simulate.structure import unique_names as unique_names
 from rigsight.simulate.substeps import Substeps as Substeps
 
 __all__ = [
@@ -42,8 +44,10 @@ __all__ = [
     "simulate_outputs",
     "simulate_sets",
     "simulate_tangents",
+    "special_values",
     "state_limits",
     "structure_named",
     "structure_of_fit",
     "tangent_equations",
+    "unique_names",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -260,6 +260,14 @@ class Structure:
         """Return the name that a parameter of one of the effects has in this structure."""
         return unique_names(self.rig, self.effects)[effect.name, own_name]
 
+    @property
+    def special_cases(self) -> frozenset[str]:
+        """Own names of the effects' parameters that stand in the equations at their special values."""
+        fixed = dict(self.fixed)
+        return frozenset(
+            own for e in self.effects for own in e.special_cases if self.parameter_name(e, own) in fixed
+        )
+
     def values_of(self, effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
         """Return an effect's own values by their own names, out of values of this structure."""
         names = {p.name: self.parameter_name(effect, p.name) for p in effect.parameters}
@@ -291,6 +299,15 @@ def carried_over(values: Mapping[str, float], source: Structure, target: Structu
                 if name in values:
                     carried[target.parameter_name(effect, parameter.name)] = values[name]
     return carried
+
+
+def special_values(rig: Rig, effects: Iterable[Effect], beside: Iterable[Effect] = ()) -> dict[str, float]:
+    """Return the values at which parameters of effects shorten the equations, by their names beside other effects."""
+    effects = tuple(effects)
+    names = unique_names(rig, (*effects, *beside))
+    return {
+        names[effect.name, own]: value for effect in effects for own, value in effect.special_cases.items()
+    }
 
 
 def unique_names(rig: Rig, effects: tuple[Effect, ...]) -> dict[tuple[str, str], str]:

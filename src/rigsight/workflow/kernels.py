@@ -11,7 +11,7 @@ from rigsight.diagnose import candidates_on, structures_of_lineup
 from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure, compose, special_values
 from rigsight.simulate.compiled.precompile import compile_kernels, compiled
 from rigsight.workflow.progress import Listener, Stage, silent
 
@@ -46,7 +46,7 @@ def structures_to_try(
         return [compose(rig, modelled), *structures_of_lineup(rig, offered, modelled)]
     return [
         compose(rig, modelled),
-        *(compose(rig, (*modelled, effect), effect.special_cases) for effect in offered),
+        *(compose(rig, (*modelled, effect), special_values(rig, [effect], modelled)) for effect in offered),
     ]
 
 

@@ -208,10 +208,11 @@ def finished(bench: Workbench, scored: Scored) -> Scored:
     """Fit on from elsewhere, and with exponents and constant forces free that were fixed so far, where that helps."""
     scored = restarted(bench, scored)
     fixed = scored.fit.structure.fixed
-    special = scored.effects[-1].special_cases
+    newest = scored.effects[-1]
+    special = [scored.fit.structure.parameter_name(newest, own) for own in newest.special_cases]
     if special:
         structure = bench.composed(scored.effects, {n: v for n, v in fixed if n not in special})
-        scored = _released(bench, scored, structure, list(special))
+        scored = _released(bench, scored, structure, special)
     structure = scored.fit.structure
     return _released(bench, scored, structure, bench.releasable_parameters(structure))
 

@@ -102,8 +102,7 @@ def look_at(
     substeps
         Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
     """
-    special = {name: value for effect in effects for name, value in effect.special_cases.items()}
-    structure = bench.composed(effects, special)
+    structure = bench.simplest(effects)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
     starts = list(start_values(bench, structure, effects[-1], base, parents))
     regressed = regression.start(effects[-1]) if regression is not None else None

@@ -203,7 +203,7 @@ def _more_general(
                 and not _known_pair(known, alone[other.name], child)
             ]
     if prepare is not None:
-        prepare([_structure(bench, (other, child)) for other, child, _ in swaps])
+        prepare([bench.simplest((other, child)) for other, child, _ in swaps])
 
     def one(swap: tuple[Effect, Effect, Effect]) -> Scored:
         other, child, member = swap
@@ -235,7 +235,7 @@ def _pairs(
 ) -> list[Scored]:
     base = parent.fit
     if prepare is not None:
-        prepare([_structure(bench, (*parent.effects, effect)) for effect in partners])
+        prepare([bench.simplest((*parent.effects, effect)) for effect in partners])
 
     alone = {model.names[0]: model.fit for model in singles}
 
@@ -280,8 +280,3 @@ def _pairs(
 
 def _cost(found: Look) -> float:
     return found.cost
-
-
-def _structure(bench: Workbench, effects: tuple[Effect, ...]) -> Structure:
-    special = {name: value for effect in effects for name, value in effect.special_cases.items()}
-    return bench.composed(effects, special)

@@ -46,7 +46,7 @@ def pairs_in_windows(
 def _fitted(bench: Workbench, windows: Workbench, linear: Scored, pair: Scored) -> Scored:
     structure = pair.fit.structure
     first, second = pair.effects
-    alone = bench.composed((first,), first.special_cases)
+    alone = bench.simplest((first,))
     bases = [
         replace(linear.fit, structure=alone, values=values)
         for values in start_values(bench, alone, first, linear.fit, {})

@@ -154,7 +154,7 @@ class Lineup:
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
         """Return values of the effect's own parameters from which it is worth trying, with the stiffness of its joint."""
         bench = self._bench
-        composed = bench.composed((effect,), effect.special_cases)
+        composed = bench.simplest((effect,))
         declared = [
             composed.values_of(effect, start)
             for start in start_values(bench, composed, effect, self._fit, {})

@@ -89,12 +89,15 @@ class Coordinates:
         lower = np.array([b[0] for b in bounds], dtype=np.float64)
         upper = np.array([b[1] for b in bounds], dtype=np.float64)
         pairs = []
-        for pair in (pair for effect in structure.effects for pair in effect.searched_as):
-            if pair.first in free and pair.second in free:
-                first, second = free.index(pair.first), free.index(pair.second)
+        searched = [(effect, pair) for effect in structure.effects for pair in effect.searched_as]
+        for effect, pair in searched:
+            names = [structure.parameter_name(effect, own) for own in (pair.first, pair.second)]
+            if set(names) <= set(free):
+                first, second = map(free.index, names)
                 lower[first], upper[first] = pair.sum_range
                 lower[second], upper[second] = pair.difference_range
-                pairs.append(_Pair(first, second, pair.exponent))
+                exponent = None if pair.exponent is None else structure.parameter_name(effect, pair.exponent)
+                pairs.append(_Pair(first, second, exponent))
         split = _split(structure, free)
         if split is not None:
             stiffness = chosen[split.stiffness]
