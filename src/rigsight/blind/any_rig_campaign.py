@@ -54,6 +54,7 @@ class Run:
     kind: Kind
     hold: Hold
     waveforms: Mapping[str, Waveform]
+    duration: float = DURATION
 
     def record(
         self,
@@ -72,7 +73,7 @@ class Run:
         disturbances
             What is added to inputs.
         """
-        t = dt * np.arange(round(DURATION / dt), dtype=np.float64)
+        t = dt * np.arange(round(self.duration / dt), dtype=np.float64)
         inputs = {name: samples(waveform, t) for name, waveform in self.waveforms.items()}
         first = next(iter(inputs.values()), np.zeros(1))
         signals = {
@@ -107,18 +108,42 @@ def draw_runs(rig: Rig, values: Mapping[str, float], rng: np.random.Generator) -
     SimulationError
         If the rig cannot be simulated with inputs of any size.
     """
+    amplitudes, band = draw_amplitudes(rig, values, rng)
+    return _campaign(rig, amplitudes, band, rng)
+
+
+def draw_amplitudes(
+    rig: Rig, values: Mapping[str, float], rng: np.random.Generator
+) -> tuple[dict[str, float], tuple[float, float]]:
+    """Draw how far a rig moves, and return the amplitude of each input and the ends of the band [rad/s] in which they move.
+
+    Parameters
+    ----------
+    rig, values, rng
+        As of `draw_runs`.
+
+    Raises
+    ------
+    SimulationError
+        As `draw_runs`.
+    """
     structure, band = compose(rig), _band(rig, values)
     shares = {name: _unit(rig, structure, values, name, band) for name in rig.mechanism.inputs}
-    size = math.exp(rng.uniform(*np.log(_MOTION)))
+    size = draw_motion(rng)
     amplitudes = {name: size / max(share, 1e-300) for name, share in shares.items()}
-    largest = [Run("trial", "estimation", "multisine", "band_limited", _multisines(amplitudes, band, rng))]
-    largest.append(Run("trial", "estimation", "sweep", "band_limited", _sweeps(amplitudes, band, rng)))
+    largest = [Run("trial", "estimation", "multisine", "band_limited", multisines(amplitudes, band, rng))]
+    largest.append(Run("trial", "estimation", "sweep", "band_limited", sweeps(amplitudes, band, rng)))
     for _ in range(_TRIES):
         if all(_bent(structure, values, run) <= _MOST_BENT for run in largest):
             break
         amplitudes = {name: _LESS * a for name, a in amplitudes.items()}
-        largest = [replace(run, waveforms=_scaled(run.waveforms, _LESS)) for run in largest]
-    return _campaign(rig, amplitudes, band, rng)
+        largest = [replace(run, waveforms=in_proportion(run.waveforms, _LESS)) for run in largest]
+    return amplitudes, band
+
+
+def draw_motion(rng: np.random.Generator) -> float:
+    """Draw the largest deviation of a coordinate from rest [rad, m]."""
+    return math.exp(rng.uniform(*np.log(_MOTION)))
 
 
 def _campaign(
@@ -127,18 +152,18 @@ def _campaign(
     prescribing = {c.prescribed_by for c in rig.mechanism.prescribed}
 
     def sweep(name: str, role: Role | None, share: float) -> Run:
-        return Run(name, role, "sweep", "band_limited", _scaled(_sweeps(amplitudes, band, rng), share))
+        return Run(name, role, "sweep", "band_limited", in_proportion(sweeps(amplitudes, band, rng), share))
 
     def multisine(name: str, role: Role | None, share: float) -> Run:
         return Run(
-            name, role, "multisine", "band_limited", _scaled(_multisines(amplitudes, band, rng), share)
+            name, role, "multisine", "band_limited", in_proportion(multisines(amplitudes, band, rng), share)
         )
 
     def step(name: str, role: Role | None, share: float) -> Run:
         # No machine prescribes a motion that jumps.
         if prescribing & set(rig.mechanism.inputs):
             return multisine(name, role, share)
-        return Run(name, role, "step", "zoh", _scaled(_doublets(amplitudes, band, rng), share))
+        return Run(name, role, "step", "zoh", in_proportion(doublets(amplitudes, band, rng), share))
 
     return (
         sweep("record_1", "estimation", 0.4),
@@ -179,7 +204,7 @@ def _unit(
 
 def _bent(structure: Structure, values: Mapping[str, float], run: Run) -> float:
     """Return by how much the motion differs from that under small inputs, relative to itself; endless where there is none."""
-    small = replace(run, waveforms=_scaled(run.waveforms, _FRACTION))
+    small = replace(run, waveforms=in_proportion(run.waveforms, _FRACTION))
     try:
         whole, little = (simulate(structure, values, r.record()) for r in (run, small))
     except SimulationError:
@@ -194,21 +219,25 @@ def _bent(structure: Structure, values: Mapping[str, float], run: Run) -> float:
     return max(shares, default=0.0)
 
 
-def _sweeps(
-    amplitudes: Mapping[str, float], band: tuple[float, float], rng: np.random.Generator
+def sweeps(
+    amplitudes: Mapping[str, float],
+    band: tuple[float, float],
+    rng: np.random.Generator,
+    duration: float = DURATION,
 ) -> dict[str, Waveform]:
     """Return a sweep for each input: every other one downwards, and none at the frequency of another for long."""
     waves: dict[str, Waveform] = {}
     for i, (name, amplitude) in enumerate(amplitudes.items()):
         low, high = (end * math.exp(rng.uniform(-0.1, 0.1)) for end in band)
         ends = (low, high) if i % 2 == 0 else (high, low)
-        waves[name] = Sweep(amplitude, *ends, DURATION)
+        waves[name] = Sweep(amplitude, *ends, duration)
     return waves
 
 
-def _multisines(
+def multisines(
     amplitudes: Mapping[str, float], band: tuple[float, float], rng: np.random.Generator
 ) -> dict[str, Waveform]:
+    """Return a multisine for each input, of lines spread evenly over the logarithm of the frequency."""
     fundamental = 2.0 * math.pi / DURATION
     lines = np.unique(
         np.round(np.geomspace(max(band[0] / fundamental, 1.0), band[1] / fundamental, _N_LINES))
@@ -221,7 +250,7 @@ def _multisines(
     return waves
 
 
-def _doublets(
+def doublets(
     amplitudes: Mapping[str, float], band: tuple[float, float], rng: np.random.Generator
 ) -> dict[str, Waveform]:
     """Return a doublet for each input, one after the other, each as long as a slow period."""
@@ -235,7 +264,8 @@ def _doublets(
     }
 
 
-def _scaled(waveforms: Mapping[str, Waveform], share: float) -> dict[str, Waveform]:
+def in_proportion(waveforms: Mapping[str, Waveform], share: float) -> dict[str, Waveform]:
+    """Return waveforms of this share of their size."""
     found: dict[str, Waveform] = {}
     for name, wave in waveforms.items():
         if isinstance(wave, Multisine):

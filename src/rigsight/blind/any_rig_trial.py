@@ -6,6 +6,7 @@ Unlike the trials of one mass, whose plant has an integrator of its own, a rig o
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,16 +14,15 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from rigsight.blind.any_rig_campaign import DT, DURATION, Run, draw_runs
 from rigsight.blind.any_rig_numbers import draw_numbers, draw_offsets
 from rigsight.blind.any_rig_subjects import PlacedSubject, draw_effects, placed_subject_of
 from rigsight.blind.campaign import LinearRig
 from rigsight.blind.draw import Trial
-from rigsight.blind.strength import draw_shape, scaled, strength_for
+from rigsight.blind.strength import draw_shape, sized
 from rigsight.blind.subjects import NOISE_SIZES, TIERS
-from rigsight.blind.waveforms import Disturbance
+from rigsight.blind.waveforms import Disturbance, low_pass_noise
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales
@@ -42,14 +42,10 @@ _DISTURBED = (0.2, 0.5)
 """What a disturbance leaves in the sensors, in units of their noise."""
 _CORNER = 5.0
 """Angular frequency above which the disturbance falls [rad/s]."""
-_SPACING = 0.02
-"""Distance of the disturbance's values [s]."""
 _FIRST = 1e-3
 """Disturbance of an input, in units of the input, from whose effect its size follows."""
 _OFF = (0.05, 0.2)
 """How far wrong parameters are off."""
-_LEAST_OF_WISHED = 0.5
-"""Share of the wished gap that an effect must leave; one that cannot at its place is drawn again."""
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
 _EVALUATIONS = 25
@@ -161,24 +157,9 @@ class _Bench:
         for effect in effects:
             assert wished is not None
             shape = draw_shape(effect, self.scales, rng)
-            reached: dict[float, float] = {}
-
-            def gap(
-                strength: float,
-                effect: Effect = effect,
-                shape: Mapping[str, float] = shape,
-                reached: dict[float, float] = reached,
-            ) -> float:
-                reached[strength] = self._gap_of(effect, scaled(effect, shape, strength, self.scales))
-                return reached[strength]
-
-            strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
-            if reached.get(strength, 0.0) < _LEAST_OF_WISHED * wished:
-                raise SimulationError(
-                    f"{effect.name} leaves {reached.get(strength, 0.0):.2g} noise floors at most."
-                )
-            strengths.append(strength)
-            for name, value in scaled(effect, shape, strength, self.scales).items():
+            own = sized(effect, shape, self.scales, functools.partial(self._gap_of, effect), wished)
+            strengths.append(own.strength)
+            for name, value in own.values.items():
                 values[structure.parameter_name(effect, name)] = value
         return values, strengths
 
@@ -206,7 +187,9 @@ class _Bench:
         records = []
         passed: dict[str, list[Floats]] = {name: [] for name in self.noise}
         for run in self.runs:
-            disturbances = {name: _disturbance(size, of_disturbance) for name, size in sizes.items()}
+            disturbances = {
+                name: low_pass_noise(size, _CORNER, DURATION, of_disturbance) for name, size in sizes.items()
+            }
             calm, clean = plant.readings(run), plant.readings(run, disturbances)
             seen = {
                 name: clean[name] + of_noise.normal(scale=noise, size=clean[name].size)
@@ -226,7 +209,9 @@ class _Bench:
         }
         wanted = rng.uniform(*_DISTURBED)
         same = np.random.default_rng(0)
-        disturbed = plant.readings(run, {name: _disturbance(size, same) for name, size in first.items()})
+        disturbed = plant.readings(
+            run, {name: low_pass_noise(size, _CORNER, DURATION, same) for name, size in first.items()}
+        )
         calm = plant.readings(run)
         most = max(
             math.sqrt(float(np.mean((disturbed[name] - calm[name]) ** 2))) / noise
@@ -278,11 +263,3 @@ class _Plant:
         record = run.record(dt=DT / _FINER, disturbances=disturbances)
         shown = simulate(self._structure, self._values, record, accuracy=_ACCURACY)
         return {s.name: shown[s.name][::_FINER] for s in self._structure.rig.outputs}
-
-
-def _disturbance(size: float, rng: np.random.Generator) -> Disturbance:
-    """Return a random signal of this standard deviation, white up to a corner, from rest at the begin of a record."""
-    n_values = math.ceil(DURATION / _SPACING) + 4
-    pole = math.exp(-_CORNER * _SPACING)
-    white = rng.normal(scale=size * math.sqrt(1.0 - pole**2), size=n_values)
-    return Disturbance(lfilter([1.0], [1.0, -pole], np.r_[0.0, white[1:]]), 0.0, _SPACING)

@@ -8,10 +8,13 @@ from rigsight.blind import draw, subjects
 from rigsight.blind.any_rig_subjects import placed_cells
 from rigsight.blind.any_rig_trial import draw_placed_trial
 from rigsight.blind.draw import Trial
+from rigsight.blind.laboratory.subjects import laboratory_cells
+from rigsight.blind.laboratory.trial import draw_laboratory_trial
 from rigsight.errors import check_option
 
-Design = Literal["small", "standard", "joints", "rigs"]
-"""Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every built-in rig."""
+Design = Literal["small", "standard", "joints", "rigs", "laboratory"]
+"""Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every built-in rig,
+one with records as laboratories take them."""
 
 
 def n_trials(design: Design) -> int:
@@ -23,7 +26,9 @@ def n_trials(design: Design) -> int:
         If there is no such design.
     """
     check_option("The design", design, get_args(Design))
-    return len(placed_cells()) if design == "rigs" else subjects.n_trials(design)
+    if design == "rigs":
+        return len(placed_cells())
+    return len(laboratory_cells()) if design == "laboratory" else subjects.n_trials(design)
 
 
 def draw_trial(design: Design, seed: int, trial: int) -> Trial:
@@ -46,4 +51,8 @@ def draw_trial(design: Design, seed: int, trial: int) -> Trial:
         If no rig that was drawn can be integrated and re-identified.
     """
     check_option("The design", design, get_args(Design))
-    return draw_placed_trial(seed, trial) if design == "rigs" else draw.draw_trial(design, seed, trial)
+    if design == "rigs":
+        return draw_placed_trial(seed, trial)
+    if design == "laboratory":
+        return draw_laboratory_trial(seed, trial)
+    return draw.draw_trial(design, seed, trial)

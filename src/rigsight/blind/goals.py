@@ -38,13 +38,23 @@ GOALS: dict[str, Goal] = {
     "held_out_median": Goal(1.1, at_most=True),
 }
 """For gaps of at least five times the noise floor; controls have none."""
+LABORATORY_GOALS: dict[str, Goal] = {
+    "laboratory_right": Goal(0.90),
+    "laboratory_wrong_name": Goal(0.02, at_most=True),
+    "laboratory_sure_unknown": Goal(0.0, at_most=True),
+}
+"""For records as laboratories take them: effect and place right, another effect named, and `unknown` although it is known."""
+SURE = 0.9
+"""Probability from which an `unknown` is called sure."""
 
 
 def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Return the figures for which there are goals, and those that stand beside them.
 
-    A gap that nobody has measured counts as a large one, or a failed diagnosis would not count at all.
+    A gap that nobody has measured counts as a large one, or a failed diagnosis would not count at all. Trials of a laboratory
+    count towards its own goals alone.
     """
+    taken, outcomes = [o for o in outcomes if o.condition], [o for o in outcomes if not o.condition]
     large = [o for o in outcomes if o.gap is None or o.gap >= _LARGE_GAP]
     singles = [o for o in large if o.kind == "single"]
     pairs = [o for o in large if o.kind == "pair"]
@@ -80,17 +90,41 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "held_out_median": median(errors),
         "held_out_median_interval": list(median_interval(errors)),
         "held_out_median_total": len(errors),
-        "seconds_median": median([o.seconds for o in outcomes]),
+        "seconds_median": median([o.seconds for o in (*taken, *outcomes)]),
+        **laboratory_figures(taken),
     }
+
+
+def laboratory_figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Return the figures for which a laboratory's trials have goals."""
+    return {
+        "laboratory_right": share_of(outcomes, lambda o: o.right),
+        "laboratory_wrong_name": share_of(outcomes, names_wrong),
+        "laboratory_sure_unknown": share_of(outcomes, lambda o: o.verdict == "unknown" and o.stated > SURE),
+    }
+
+
+def names_wrong(found: Outcome) -> bool:
+    """Return True if an effect is named that is not there, not at that place, or not the main one of several."""
+    return bool(found.named) and not found.right
 
 
 def targets(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return every goal beside its figure; `reached` is None where nothing was tried.
 
+    The goals for a laboratory's records stand there where such were tried, and alone where nothing else was.
+
     `decided` says that the interval of 95 % lies on one side of the goal: so many trials are enough to tell.
     """
     rows = []
-    for name, goal in GOALS.items():
+    goals = GOALS
+    if found["laboratory_right"]["total"]:
+        others = any(
+            found[name]["total"]
+            for name in ("singles_right", "pairs_right", "controls_right", "outside_unknown")
+        )
+        goals = {**GOALS, **LABORATORY_GOALS} if others else LABORATORY_GOALS
+    for name, goal in goals.items():
         figure = found[name]
         counted = isinstance(figure, Mapping)
         value = figure["share"] if counted else figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,6 +16,8 @@ from rigsight.rigs import Rig, declared_rig
 
 _BY_PLACE = 2
 """Schema of keys from which on `where` holds the place of each effect; before, it was the set of places."""
+SEVERAL = "several"
+"""Kind of a trial with more effects than a verdict names; the first of its key is the main one, which leaves the largest gap."""
 FAILED = "failed"
 """Verdict of a diagnosis that ended with an error."""
 BELOW = "below"
@@ -68,13 +71,15 @@ class Outcome:
         Verdict, named effects, and the place of each; verdict "failed" where the diagnosis ended with an error.
     right
         The verdict is the truth: the very effects, each at its place, or none, or parameters; for an effect from outside
-        unknown, or a relative at its place that is said to leave a remainder.
+        unknown, or a relative at its place that is said to leave a remainder; for several effects the main one, alone or with
+        others that are hidden too.
     effect_right
         The same, wherever the diagnosis puts the effects.
     right_within_set
         Right, or the truth is among those that the diagnosis cannot tell from what it names.
     place_right
-        The places named are those of the hidden effects; None where nothing is hidden or the key does not say where.
+        The places named are those of the hidden effects, of several that of the main one and no place of none; None where
+        nothing is hidden or the key does not say where.
     looked_at
         All these places are among those at which the diagnosis tried effects; None as above, and where it did not have to choose.
     probability
@@ -92,6 +97,8 @@ class Outcome:
         Time of the diagnosis.
     message
         Why it failed.
+    condition
+        Under which the records of a laboratory were taken; empty elsewhere.
     """
 
     design: str
@@ -121,6 +128,7 @@ class Outcome:
     parameters: tuple[ParameterError, ...]
     seconds: float
     message: str = ""
+    condition: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Return the outcome for ``blind.json``."""
@@ -165,14 +173,16 @@ def outcome(
     verdict = str(found["verdict"])
     expected = {"none": "none", "parameters": "parameters", "outside": "unknown"}.get(kind, "effect")
     honest = kind == "outside" and _is_relative_at_its_place(key, found)
-    right = honest or (verdict == expected and (expected != "effect" or named == truth))
+    needed = _needed(key, by_place)
+    right = honest or (verdict == expected and (expected != "effect" or needed <= named <= truth))
     effect_right = honest or (
-        verdict == expected and (expected != "effect" or _kinds(named) == _kinds(truth))
+        verdict == expected and (expected != "effect" or _are_kinds_of(named, needed, truth))
     )
-    within = expected == "effect" and _is_among(truth, found["ambiguous_with"])
+    within = expected == "effect" and _is_among(needed, truth, found["ambiguous_with"])
     candidates = {_at_places(c, by_place): float(c["probability"] or 0.0) for c in found["candidates"]}
     left = max(0.0, 1.0 - sum(candidates.values()))
-    probability = left if kind == "outside" else candidates.get(truth, 0.0)
+    known = math.fsum(p for effects, p in candidates.items() if needed <= effects <= truth)
+    probability = left if kind == "outside" else known
     stated = left if verdict == "unknown" else candidates.get(named, 0.0)
     if verdict == FAILED:
         probability = stated = 0.0
@@ -197,7 +207,7 @@ def outcome(
         right=right,
         effect_right=effect_right,
         right_within_set=right or within,
-        place_right=frozenset(found["where"]) == frozenset(key["where"]) if hides_a_place else None,
+        place_right=_is_place_right(key, found, needed) if hides_a_place else None,
         looked_at=_looked_at(key, found) if hides_a_place else None,
         probability=probability,
         stated=stated,
@@ -206,6 +216,7 @@ def outcome(
         parameters=_parameter_errors(key, found) if right and kind != "outside" else (),
         seconds=seconds,
         message=message,
+        condition=str(key.get("condition", "")),
     )
 
 
@@ -236,11 +247,48 @@ def _places(effects: frozenset[tuple[str, str]]) -> tuple[str, ...]:
     return tuple(place for _, place in sorted(effects) if place)
 
 
-def _is_among(truth: frozenset[tuple[str, str]], rivals: Sequence[Sequence[str]]) -> bool:
-    """Return True if the truth is one of the sets of names; a rig with several places has them in its names."""
-    plain = frozenset(name for name, _ in truth)
-    named = frozenset(f"{name}{AT}{place}" for name, place in truth)
-    return any(frozenset(rival) in (plain, named) for rival in rivals)
+def _needed(key: Mapping[str, Any], by_place: bool) -> frozenset[tuple[str, str]]:
+    """Return the effects without which no verdict is right: all that are hidden, of several the main one."""
+    if key["kind"] != SEVERAL:
+        return _at_places(key, by_place)
+    return frozenset({(str(key["effects"][0]), str(key["where"][0]))})
+
+
+def _are_kinds_of(
+    named: frozenset[tuple[str, str]], needed: frozenset[tuple[str, str]], truth: frozenset[tuple[str, str]]
+) -> bool:
+    """Return True if the effects named are right wherever they are put."""
+    kinds, least, most = (Counter(_kinds(effects)) for effects in (named, needed, truth))
+    return least <= kinds <= most
+
+
+def _is_among(
+    needed: frozenset[tuple[str, str]],
+    truth: frozenset[tuple[str, str]],
+    rivals: Sequence[Sequence[str]],
+) -> bool:
+    """Return True if a right verdict is one of the sets of names; a rig with several places has them in its names."""
+
+    def plain(effects: frozenset[tuple[str, str]]) -> frozenset[str]:
+        return frozenset(name for name, _ in effects)
+
+    def whole(effects: frozenset[tuple[str, str]]) -> frozenset[str]:
+        return frozenset(f"{name}{AT}{place}" for name, place in effects)
+
+    return any(
+        spelled(needed) <= frozenset(rival) <= spelled(truth)
+        for rival in rivals
+        for spelled in (plain, whole)
+    )
+
+
+def _is_place_right(
+    key: Mapping[str, Any], found: Mapping[str, Any], needed: frozenset[tuple[str, str]]
+) -> bool:
+    where, there = frozenset(found["where"]), frozenset(key["where"])
+    if key["kind"] != SEVERAL:
+        return where == there
+    return frozenset(_places(needed)) <= where <= there
 
 
 def _is_relative_at_its_place(key: Mapping[str, Any], found: Mapping[str, Any]) -> bool:

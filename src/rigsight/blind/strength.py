@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +25,8 @@ _NEVER = 1e300
 _TRIALS = 7
 _CLOSE = 0.15
 _SMALLEST = 1e-5
+_LEAST_OF_WISHED = 0.5
+"""Share of the wished gap that an effect must leave; one that cannot at its place is drawn again."""
 
 
 def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
@@ -110,3 +113,51 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
             step if inside else (high if high == _STRONGEST and reached < wished else math.sqrt(low * high))
         )
     return best[1]
+
+
+@dataclass(frozen=True)
+class Sized:
+    """An effect of a wished size: its strength, the gap that it leaves alone, and its parameters by their own names."""
+
+    strength: float
+    gap: float
+    values: dict[str, float]
+
+
+def sized(
+    effect: Effect,
+    shape: Mapping[str, float],
+    scales: Mapping[str, float],
+    gap_of: Callable[[dict[str, float]], float],
+    wished: float,
+    least: float | None = None,
+) -> Sized:
+    """Return an effect with the strength at which it leaves a gap near the wished size.
+
+    Parameters
+    ----------
+    effect, shape, scales
+        As of `scaled`.
+    gap_of
+        Gap, in units of the noise, over the parameters of the effect.
+    wished
+        Gap to reach together with the noise, in units of the noise.
+    least
+        Least gap that will do; default is half of the wished one.
+
+    Raises
+    ------
+    SimulationError
+        If the effect cannot leave that.
+    """
+    reached: dict[float, float] = {}
+
+    def gap(strength: float) -> float:
+        reached[strength] = gap_of(scaled(effect, shape, strength, scales))
+        return reached[strength]
+
+    strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
+    most = reached.get(strength, 0.0)
+    if most < (_LEAST_OF_WISHED * wished if least is None else least):
+        raise SimulationError(f"{effect.name} leaves {most:.2g} noise floors at most.")
+    return Sized(strength, most, scaled(effect, shape, strength, scales))

@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.blind.goals import figures, targets
+from rigsight.blind.goals import figures, laboratory_figures, targets
+from rigsight.blind.laboratory.subjects import CONDITIONS
 from rigsight.blind.parameter_errors import OF_RIG, ParameterError
-from rigsight.blind.score import FAILED, Outcome, WithheldError
+from rigsight.blind.score import FAILED, SEVERAL, Outcome, WithheldError
 from rigsight.blind.shares import mean, median, quantile, share_of
 
+ALL = "all"
+"""Of the conditions together."""
 WRONG_PLACE = "wrong place"
 """Verdict that names the effects that are hidden, one at least at another place."""
 _BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0)
@@ -38,6 +41,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "reliability": reliability(outcomes),
         "held_out": held_out(outcomes),
         "parameters": parameters(outcomes),
+        "conditions": conditions(outcomes),
         "by": {name: _grouped(outcomes, label) for name, label in _GROUPINGS.items()},
         "seconds": {
             "median": median([o.seconds for o in outcomes]),
@@ -58,6 +62,9 @@ def verdict_label(found: Outcome) -> str:
     """Return what a diagnosis said, in words."""
     if found.named and found.effect_right and not found.right:
         return WRONG_PLACE
+    if found.kind == SEVERAL and found.right:
+        # The main one of several is as right as all of them.
+        return truth_label(found)
     return " + ".join(found.named) or found.verdict
 
 
@@ -68,6 +75,26 @@ _GROUPINGS: dict[str, Callable[[Outcome], str]] = {
     "rig": lambda o: o.rig,
     "effect": truth_label,
 }
+
+
+def conditions(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
+    """Return what a laboratory's trials add up to under each condition and under all; nothing where there are no such trials."""
+    taken = [o for o in outcomes if o.condition]
+    groups: dict[str, list[Outcome]] = {
+        name: [o for o in taken if o.condition == name] for name in CONDITIONS
+    }
+    rows = {name: _under(found) for name, found in groups.items() if found}
+    return {**rows, ALL: _under(taken)} if taken else {}
+
+
+def _under(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    unknown = [o for o in outcomes if o.verdict == "unknown"]
+    return {
+        **laboratory_figures(outcomes),
+        "unknown": share_of(outcomes, lambda o: o.verdict == "unknown"),
+        "largest_unknown": max((o.stated for o in unknown), default=None),
+        "seconds_median": median([o.seconds for o in outcomes]),
+    }
 
 
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, int]]:

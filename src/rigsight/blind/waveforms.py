@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 Signal = Callable[[float], float]
 
@@ -143,6 +144,24 @@ class Multisine:
         return rising if index == 1 else steady
 
 
+@dataclass(frozen=True)
+class Release:
+    """`amplitude` until the time `at` [s], nothing from it on: what holds a rig away from its rest lets go."""
+
+    amplitude: float
+    at: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The moment of letting go."""
+        return (self.at,)
+
+    def piece(self, index: int) -> Signal:
+        """Return the level before or after it."""
+        level = 0.0 if index else self.amplitude
+        return lambda _: level
+
+
 class Disturbance:
     """Colored noise as a smooth function of time, from `start` [s] on.
 
@@ -166,3 +185,27 @@ class Disturbance:
         c3, c2, c1, c0 = self._rows[index]
         tau = t - self._start - index * self._spacing
         return float(c0 + tau * (c1 + tau * (c2 + tau * c3)))
+
+
+def low_pass_noise(
+    size: float, corner: float, duration: float, rng: np.random.Generator, spacing: float = 0.02
+) -> Disturbance:
+    """Return a random signal of this standard deviation, white up to a corner, from rest at t = 0.
+
+    Parameters
+    ----------
+    size
+        Standard deviation.
+    corner
+        Angular frequency above which it falls [rad/s].
+    duration
+        How long it lasts [s].
+    rng
+        Source of randomness.
+    spacing
+        Distance of its values [s], small beside the reciprocal of the corner.
+    """
+    n_values = math.ceil(duration / spacing) + 4
+    pole = math.exp(-corner * spacing)
+    white = rng.normal(scale=size * math.sqrt(1.0 - pole**2), size=n_values)
+    return Disturbance(lfilter([1.0], [1.0, -pole], np.r_[0.0, white[1:]]), 0.0, spacing)

@@ -29,10 +29,10 @@ def blind(
         ),
     ] = None,
     design: Annotated[
-        Literal["small", "standard", "joints", "rigs"],
+        Literal["small", "standard", "joints", "rigs", "laboratory"],
         typer.Option(
             help="Which list of cells is drawn from; joints has the effects of servo and robot joints, rigs every built-in rig "
-            "with effects at all its places."
+            "with effects at all its places, laboratory records as laboratories take them (filters, feedback, stiction, ...)."
         ),
     ] = "standard",
     seed: Seed = 0,

@@ -11,12 +11,14 @@ from rich.table import Table
 from rich.text import Text
 
 from rigsight.report.blind_bench.views import (
+    CONDITION_HEADS,
     NUMBERS,
-    SHARES,
     bench_text,
+    condition_rows,
     hidden_text,
     named_text,
     number,
+    screen_shares,
     trial_text,
 )
 
@@ -37,12 +39,13 @@ class BlindSummary:
             "bold",
         )
         table = Table.grid(padding=(0, 2))
-        for name, words in SHARES.items():
+        for name, words in screen_shares(content).items():
             share = content["goals"][name]
             table.add_row(Text(words), *map(Text, _share_cells(share)))
         for name, words in NUMBERS.items():
             table.add_row(Text(words), Text(number(content["goals"][name])), Text(""), Text(""))
         yield table
+        yield from _conditions(content)
         yield Text("\nStated probability against what was right", "bold")
         bins = Table.grid(padding=(0, 2))
         for row in content["reliability"]:
@@ -57,6 +60,15 @@ def _share_cells(share: Mapping[str, Any]) -> tuple[str, str, str]:
         return "-", "", ""
     low, high = share["interval"]
     return f"{share['share']:.0%}", f"{share['count']} of {share['total']}", f"({low:.0%} to {high:.0%})"
+
+
+def _conditions(content: Mapping[str, Any]) -> RenderResult:
+    rows = condition_rows(content)
+    if rows:
+        table = Table(*CONDITION_HEADS, box=None, padding=(0, 2))
+        for row in rows:
+            table.add_row(*map(Text, row))
+        yield table
 
 
 def _wrong(content: Mapping[str, Any]) -> RenderResult:

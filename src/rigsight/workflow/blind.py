@@ -43,8 +43,8 @@ def run_blind(
     out
         Folder for the bench.
     design
-        List of cells to draw from: ``"small"``, ``"standard"``, ``"joints"`` for the effects of servo and robot joints, or
-        ``"rigs"`` for effects at all places of every built-in rig.
+        List of cells to draw from: ``"small"``, ``"standard"``, ``"joints"`` for the effects of servo and robot joints,
+        ``"rigs"`` for effects at all places of every built-in rig, or ``"laboratory"`` for records as laboratories take them.
     trials
         Number of trials; None for one of every cell.
     seed

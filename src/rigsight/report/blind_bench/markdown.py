@@ -40,6 +40,7 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         ),
         "Beside the goals:",
         _table(["Figure", "Found", "Trials", "95 % interval"], views.beside_rows(content)),
+        *_conditions(content),
         "## What was hidden, what was named",
         _table(["Hidden", "Trials", "Right", "Named instead"], _confusion_rows(content)),
     ]
@@ -71,6 +72,13 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         _wrong(content),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _conditions(content: Mapping[str, Any]) -> list[str]:
+    rows = views.condition_rows(content)
+    if not rows:
+        return []
+    return ["## By condition of the laboratory", views.CONDITION_WORDS, _table(views.CONDITION_HEADS, rows)]
 
 
 def _confusion_rows(content: Mapping[str, Any]) -> list[list[str]]:

@@ -198,10 +198,16 @@ def read_json(file: Path) -> dict[str, Any]:
 
 
 def _csv_text(trial: Trial, record: Record) -> str:
-    names = [signal.name for signal in (*trial.linear.rig.inputs, *trial.linear.rig.outputs)]
+    signals = (*trial.linear.rig.inputs, *trial.linear.rig.outputs)
+    names = [signal.name for signal in signals if signal.name in record]
     rows = np.column_stack([record.t, *(record[name] for name in names)])
     lines = [",".join(("t", *names)), *(",".join(f"{value:.9e}" for value in row) for row in rows)]
     return "\n".join(lines) + "\n"
+
+
+def _amplitude_line(record: Record) -> str:
+    """Return nothing for a record that no input drives."""
+    return "" if record.amplitude is None else f"\namplitude = {record.amplitude!r}"
 
 
 def _campaign_toml(trial: Trial) -> str:
@@ -214,8 +220,7 @@ def _campaign_toml(trial: Trial) -> str:
 [[records]]
 file = "{record.name}.csv"
 role = "{record.role}"
-kind = "{record.kind}"
-amplitude = {record.amplitude!r}
+kind = "{record.kind}"{_amplitude_line(record)}
 hold = "{record.hold}"'''
         for record in trial.records
     )

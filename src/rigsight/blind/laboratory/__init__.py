@@ -1,0 +1,1 @@
+"""Trials as laboratories measure: filters, feedback, stiction, encoders, decays, drift, offsets, and several causes at once."""
