@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigsight.blind import Outcome, WithheldError
-from rigsight.blind.goals import GOALS, figures, targets
+from rigsight.blind.goals import GOALS, LABORATORY_GOALS, figures, targets
 
 Like = Callable[..., Outcome]
 
@@ -30,6 +30,23 @@ def test_a_gap_that_nobody_measured_counts_as_large(wrong_outcome: Like) -> None
 
 def test_every_goal_stands_beside_a_figure(outcome_like: Like) -> None:
     assert [row["name"] for row in targets(figures([outcome_like()]))] == list(GOALS)
+
+
+def test_a_laboratory_has_goals_of_its_own(outcome_like: Like, wrong_outcome: Like) -> None:
+    sure = {"verdict": "unknown", "named": (), "condition": "drift"}
+    taken = [
+        outcome_like(condition="clean"),
+        wrong_outcome(condition="clean"),
+        wrong_outcome(stated=0.95, **sure),
+        wrong_outcome(stated=0.85, **sure),
+    ]
+    rows = {row["name"]: row for row in targets(figures(taken))}
+    assert list(rows) == list(LABORATORY_GOALS)
+    assert [rows[name]["value"] for name in LABORATORY_GOALS] == [0.25, 0.25, 0.25]
+    assert not any(row["reached"] for row in rows.values())
+    both = targets(figures([*taken, outcome_like()]))
+    assert [row["name"] for row in both] == [*GOALS, *LABORATORY_GOALS]
+    assert next(row for row in both if row["name"] == "singles_right")["total"] == 1
 
 
 def test_what_was_not_tried_is_neither_reached_nor_missed(outcome_like: Like) -> None:

@@ -174,6 +174,42 @@ def test_an_effect_is_right_at_its_own_place_alone(
     assert sorted(zip(got.effects, got.places, strict=True)) == sorted(truth)
 
 
+THIRD = ("input_delay", "motor")
+
+
+@pytest.mark.parametrize(
+    ("found", "right", "effect_right", "place_right"),
+    [
+        ((FRICTION,), True, True, True),
+        ((FRICTION, PLAY), True, True, True),
+        ((FRICTION, PLAY, THIRD), True, True, True),
+        ((AT_THE_MOTOR,), False, True, False),
+        ((PLAY,), False, False, False),
+        ((PLAY, THIRD), False, False, False),
+        ((FRICTION, ("free_play", "shaft")), False, False, True),
+        ((), False, False, False),
+    ],
+)
+def test_of_several_effects_the_main_one_must_be_named_and_none_that_is_not_there(
+    found: tuple[tuple[str, str], ...], right: bool, effect_right: bool, place_right: bool
+) -> None:
+    truth = placed_key(FRICTION, PLAY, THIRD) | {"kind": "several", "condition": "three_effects"}
+    said = placed_diagnosis(*found) if found else diagnosis("unknown") | {"candidates": []}
+    got = held(truth, said)
+    assert (got.right, got.effect_right, got.place_right) == (right, effect_right, place_right)
+    assert got.probability == (pytest.approx(0.9) if right else 0.0)
+    assert got.condition == "three_effects"
+
+
+def test_several_effects_are_in_the_set_with_their_main_one() -> None:
+    truth = placed_key(FRICTION, PLAY, THIRD) | {"kind": "several"}
+    found = placed_diagnosis(AT_THE_MOTOR)
+    inside = found | {"ambiguous_with": [["coulomb_friction@load_bearing", "backlash@shaft"]]}
+    without = found | {"ambiguous_with": [["backlash@shaft"]]}
+    assert held(truth, inside).right_within_set
+    assert not held(truth, without).right_within_set
+
+
 def test_the_true_place_was_looked_at_if_it_was_chosen_or_tried_in_the_end() -> None:
     chosen = held(placed_key(FRICTION), placed_diagnosis(PLAY, looked_at=("load_bearing",)))
     tried = held(placed_key(FRICTION), placed_diagnosis(FRICTION, looked_at=("shaft",)))

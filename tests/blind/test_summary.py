@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from rigsight.blind import Outcome, ParameterError, WithheldError, summary
-from rigsight.blind.summary import WRONG_PLACE, confusion, held_out, pairs, parameters, reliability
+from rigsight.blind.summary import ALL, WRONG_PLACE, confusion, held_out, pairs, parameters, reliability
 
 Like = Callable[..., Outcome]
 
@@ -70,6 +70,37 @@ def test_the_right_effects_at_a_wrong_place_are_a_verdict_of_their_own(wrong_out
     figures = summary([single, pair])["by"]["rig"]["axis"]
     assert (figures["right"]["count"], figures["effect_right"]["count"]) == (0, 2)
     assert (figures["looked_at"]["count"], figures["looked_at"]["total"]) == (1, 1)
+
+
+def test_trials_of_a_laboratory_are_counted_by_condition(outcome_like: Like, wrong_outcome: Like) -> None:
+    unknown = {"verdict": "unknown", "named": (), "condition": "drift"}
+    found = summary(
+        [
+            wrong_outcome(stated=0.6, seconds=10.0, **unknown),
+            wrong_outcome(stated=0.8, seconds=30.0, **unknown),
+            outcome_like(condition="clean", stated=0.99, seconds=5.0),
+            wrong_outcome(condition="clean", seconds=5.0),
+            outcome_like(),
+        ]
+    )["conditions"]
+    assert list(found) == ["clean", "drift", ALL]
+    assert {name: row["laboratory_right"]["total"] for name, row in found.items()} == {
+        "clean": 2, "drift": 2, ALL: 4,
+    }  # fmt: skip
+    assert [found["clean"][f]["count"] for f in ("laboratory_right", "laboratory_wrong_name", "unknown")] == [
+        1,
+        1,
+        0,
+    ]
+    assert (found["drift"]["unknown"]["count"], found["drift"]["largest_unknown"]) == (2, 0.8)
+    assert (found["clean"]["largest_unknown"], found["drift"]["seconds_median"]) == (None, 20.0)
+    assert summary([outcome_like()])["conditions"] == {}
+
+
+def test_the_main_one_of_several_effects_stands_where_all_of_them_would(outcome_like: Like) -> None:
+    three = ("backlash", "input_delay", "quadratic_damping")
+    main = outcome_like(kind="several", effects=three, named=("backlash",), condition="three_effects")
+    assert confusion([main]) == {" + ".join(three): {" + ".join(three): 1}}
 
 
 def test_withheld_records_are_grouped_by_kind_and_amplitude(outcome_like: Like) -> None:

@@ -33,6 +33,7 @@ def part(tmp_path: Path, outcome_like: Callable[..., Outcome]) -> Path:
         (["--rescore", "--trial", "3"], ["--rescore runs no trial"]),
         (["--trial", "three"], ["--trial must be a number", "'three'", "--campaigns"]),
         (["--trial", "9999", "--design", "small"], ["numbered from 0", "9999"]),
+        (["--trial", "60", "--design", "laboratory"], ["numbered from 0 to 59", "60"]),
         (["--campaigns", "gone", "--keys", "gone"], ["no folder", "--campaigns"]),
         (["--rescore"], ["no blind bench", "--out"]),
         (["--merge", "gone"], ["no scored trials", "--rescore"]),

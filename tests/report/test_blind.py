@@ -44,6 +44,16 @@ def test_trials_of_several_benches_go_with_their_seed(wrong_outcome: Like) -> No
     assert "1 of design small, seed 1 and 1 of design small, seed 2" in text
 
 
+def test_a_laboratory_is_shown_by_condition(outcome_like: Like, wrong_outcome: Like) -> None:
+    unknown = wrong_outcome(condition="free_decay", verdict="unknown", named=(), stated=0.93)
+    text = shown([outcome_like(condition="clean"), unknown])
+    line = next(line for line in text.splitlines() if line.startswith("Free decay"))
+    assert line.split()[2:6] == ["1", "0", "0", "1"]
+    assert "0.93" in line
+    assert "single effects right" not in text
+    assert "By condition" not in shown([outcome_like()])
+
+
 def test_nothing_tried_is_no_share(outcome_like: Like) -> None:
     text = shown([outcome_like()])
     line = next(line for line in text.splitlines() if line.startswith("controls right"))

@@ -57,6 +57,13 @@ def test_a_page_nests_and_its_links_lead_somewhere(page: str) -> None:
     assert [link for link in parser.links if not link.startswith("#")] == ["results/017/report.html"]
 
 
+def test_a_laboratory_has_a_table_by_condition(outcome_like: Like, page: str) -> None:
+    taken = render_blind(content_of([outcome_like(condition="antialias_filter")]))
+    assert "Table by condition" in taken
+    assert "Antialias filter" in taken
+    assert "Table by condition" not in page
+
+
 def test_a_page_needs_nothing_beside_it(page: str) -> None:
     assert "<script" not in page
     assert re.findall(r'\b(?:src|href)="(?:https?:)?//', page) == []

@@ -10,15 +10,17 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 from rich.text import Text
 
-from rigsight.report.blind_bench.views import (
+from rigsight.report.blind_bench.conditions import (
     CONDITION_HEADS,
-    NUMBERS,
-    bench_text,
     condition_rows,
+    screen_numbers,
+    screen_shares,
+)
+from rigsight.report.blind_bench.views import (
+    bench_text,
     hidden_text,
     named_text,
     number,
-    screen_shares,
     trial_text,
 )
 
@@ -42,7 +44,7 @@ class BlindSummary:
         for name, words in screen_shares(content).items():
             share = content["goals"][name]
             table.add_row(Text(words), *map(Text, _share_cells(share)))
-        for name, words in NUMBERS.items():
+        for name, words in screen_numbers(content).items():
             table.add_row(Text(words), Text(number(content["goals"][name])), Text(""), Text(""))
         yield table
         yield from _conditions(content)
@@ -64,11 +66,13 @@ def _share_cells(share: Mapping[str, Any]) -> tuple[str, str, str]:
 
 def _conditions(content: Mapping[str, Any]) -> RenderResult:
     rows = condition_rows(content)
-    if rows:
-        table = Table(*CONDITION_HEADS, box=None, padding=(0, 2))
-        for row in rows:
-            table.add_row(*map(Text, row))
-        yield table
+    if not rows:
+        return
+    yield Text("\nBy condition of the laboratory", "bold")
+    table = Table.grid(padding=(0, 2))
+    for row in (CONDITION_HEADS, *rows):
+        table.add_row(*(Text(cell, justify="right" if i else "left") for i, cell in enumerate(row)))
+    yield table
 
 
 def _wrong(content: Mapping[str, Any]) -> RenderResult:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from rigsight.report.blind_bench import views
+from rigsight.report.blind_bench import conditions, views
 from rigsight.report.blind_bench.confusion import confusion, pair_rows
 
 _MOST_WRONG = 100
@@ -75,10 +75,14 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
 
 
 def _conditions(content: Mapping[str, Any]) -> list[str]:
-    rows = views.condition_rows(content)
+    rows = conditions.condition_rows(content)
     if not rows:
         return []
-    return ["## By condition of the laboratory", views.CONDITION_WORDS, _table(views.CONDITION_HEADS, rows)]
+    return [
+        "## By condition of the laboratory",
+        conditions.CONDITION_WORDS,
+        _table(conditions.CONDITION_HEADS, rows),
+    ]
 
 
 def _confusion_rows(content: Mapping[str, Any]) -> list[list[str]]:

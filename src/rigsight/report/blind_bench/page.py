@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from rigsight.report.blind_bench import views
+from rigsight.report.blind_bench import conditions, views
 from rigsight.report.blind_bench.confusion import confusion, pair_rows
 from rigsight.report.blind_bench.figures import held_out_figure, reliability_figure
 from rigsight.report.render import environment
@@ -32,9 +32,9 @@ def render_blind(content: Mapping[str, Any]) -> str:
         sentence=views.verdict_text(content),
         goals=views.goal_rows(content),
         beside=views.beside_rows(content),
-        condition_heads=views.CONDITION_HEADS,
-        condition_words=views.CONDITION_WORDS,
-        conditions=views.condition_rows(content),
+        condition_heads=conditions.CONDITION_HEADS,
+        condition_words=conditions.CONDITION_WORDS,
+        conditions=conditions.condition_rows(content),
         held_out_median=views.number(content["goals"]["held_out_median"]),
         seconds={name: views.number(value) for name, value in content["seconds"].items()},
         hours=views.number(content["seconds"]["total"] / 3600.0),

@@ -25,11 +25,6 @@ SHARES = {
     "faint_right": "faint single effects right, 1.5 to 5 x floor",
     "faint_right_within_set": "  or among those named alike",
 }
-_LABORATORY_SHARES = {
-    "laboratory_right": "laboratory: effect and place right",
-    "laboratory_wrong_name": "  another effect or place named",
-    "laboratory_sure_unknown": "  called unknown with more than 0.9",
-}
 NUMBERS = {
     "mean_probability": "mean probability on the truth",
     "log_score": "mean log score (0 is perfect)",
@@ -125,14 +120,6 @@ def bench_text(content: Mapping[str, Any]) -> str:
         else f"{b['n_trials']} of design {b['design']}, seed {b['seed']}"
         for b in content["benches"]
     )
-
-
-def screen_shares(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the shares that a terminal shows, with their words: a laboratory's alone where nothing else was tried."""
-    if not content["conditions"]:
-        return SHARES
-    others = any(content["goals"][name]["total"] for name in SHARES)
-    return {**SHARES, **_LABORATORY_SHARES} if others else _LABORATORY_SHARES
 
 
 def verdict_text(content: Mapping[str, Any]) -> str:
@@ -269,41 +256,6 @@ def _size_cells(name: str, row: Mapping[str, Any]) -> list[str]:
 
 def _size(value: float | None) -> str:
     return "endless" if value is None else number(value)
-
-
-CONDITION_HEADS = (
-    "Condition",
-    "Trials",
-    "Right",
-    "Wrong name",
-    "Unknown",
-    "Largest stated",
-    "Seconds, median",
-)
-"""Heads of the table by condition; the largest stated probability is that of `unknown`."""
-
-
-def condition_rows(content: Mapping[str, Any]) -> list[list[str]]:
-    """Return a row for each condition of a laboratory's trials and one for all; none where there are no such trials."""
-    return [
-        [
-            sentence_case(name.replace("_", " ")),
-            str(row["laboratory_right"]["total"]),
-            *(
-                str(row[figure]["count"])
-                for figure in ("laboratory_right", "laboratory_wrong_name", "unknown")
-            ),
-            number(row["largest_unknown"]),
-            number(row["seconds_median"]),
-        ]
-        for name, row in content["conditions"].items()
-    ]
-
-
-CONDITION_WORDS = (
-    "Records as laboratories take them, by what stands between rig and record. Right is the hidden effect at its place; of three "
-    "effects the one with the largest gap, alone or with others of the three. The largest stated probability is that of unknown."
-)
 
 
 def group_views(content: Mapping[str, Any]) -> list[GroupView]:
