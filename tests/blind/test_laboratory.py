@@ -27,6 +27,7 @@ from rigsight.blind.laboratory.subjects import (
     laboratory_subject_of,
 )
 from rigsight.blind.laboratory.trial import draw_bench, draw_laboratory_trial, handed
+from rigsight.blind.waveforms import PlannedMoves, samples
 from rigsight.effects import CATALOGUE, kind_of
 from rigsight.records import Record
 from rigsight.simulate import compose, simulate
@@ -140,6 +141,25 @@ def test_feedback_is_measured_with_noise_on_the_input_and_a_force_moves_the_rig(
         noise = bench.around.input_noise * bench.sizes["u"]
         assert np.std(np.diff(record["u"] - motion["u"])) == pytest.approx(np.sqrt(2.0) * noise, rel=0.2)
         assert np.std(record["x"] - motion["x"]) > bench.noise["x"]
+
+
+def test_between_samples_the_input_of_a_loop_is_as_its_record_holds_it() -> None:
+    bench, _ = taken("feedback", "joint")
+    for motion, run in zip(quiet(bench), bench.runs, strict=True):
+        itself = bench.floor((), {}, [motion])["x"]
+        assert itself == pytest.approx(bench.noise["x"]), run.kind
+    assert {run.kind for run in bench.runs} == {"sweep", "multisine", "operation"}
+
+
+def test_a_planned_move_begins_and_ends_at_rest() -> None:
+    moves = PlannedMoves(0.2, start=1.0, length=0.5)
+    t = np.linspace(0.0, 5.0, 5001)
+    goal = samples(moves, t)
+    assert goal[[0, 1000, 1500, 2000, 2500, 3000, 3500]] == pytest.approx(
+        [0, 0, 0.2, 0.2, -0.2, -0.2, 0], abs=1e-9
+    )
+    assert np.max(np.abs(np.diff(goal, 2))) < 1e-5
+    assert np.all(goal[3501:] == 0.0)
 
 
 def test_a_loop_brings_a_joint_to_its_goal() -> None:

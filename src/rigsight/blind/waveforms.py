@@ -109,6 +109,42 @@ class Doublet:
         return lambda _: level
 
 
+@dataclass(frozen=True)
+class PlannedMoves:
+    """Rest, a move to `amplitude`, one to its opposite and one back, each of `length` [s] and with a rest as long behind it.
+
+    Each move has the least jerk that one from rest to rest can have: what a trajectory generator gives a controller.
+
+    References
+    ----------
+    T. Flash and N. Hogan, J. Neuroscience 5 (1985) 1688.
+    """
+
+    amplitude: float
+    start: float
+    length: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Begin and end of the three moves."""
+        return tuple(self.start + i * self.length for i in range(6))
+
+    def piece(self, index: int) -> Signal:
+        """Return a rest or a move."""
+        levels = (0.0, self.amplitude, -self.amplitude, 0.0)
+        moved, moving = divmod(index, 2)
+        begin, here = self.start + (index - 1) * self.length, levels[moved]
+        if not moving:
+            return lambda _: here
+        way, length = levels[moved + 1] - here, self.length
+
+        def move(t: float) -> float:
+            share = (t - begin) / length
+            return here + way * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+        return move
+
+
 @dataclass(frozen=True, eq=False)
 class Multisine:
     """A sum of sines that fades in over `rise` [s], as a generator that protects a rig does it.

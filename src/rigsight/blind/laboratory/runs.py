@@ -19,7 +19,7 @@ from rigsight.blind.any_rig_campaign import (
 )
 from rigsight.blind.laboratory.stands import GOAL, PUSH, STANDS, Law, wired_rig
 from rigsight.blind.laboratory.subjects import LaboratorySubject
-from rigsight.blind.waveforms import Release, Sweep
+from rigsight.blind.waveforms import PlannedMoves, Release, Sweep, Waveform
 from rigsight.records import Hold, Role
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import linearize
@@ -30,6 +30,10 @@ HELD_BEFORE = 0.2
 """Time [s] for which it is held before it is let go."""
 _LOOP_BAND = (0.1, 1.5)
 """Of a goal, in units of the loop's bandwidth: beyond, it is not followed."""
+_MOVE = 6.0
+"""Time of a move in units of the reciprocal of the loop's bandwidth: one period of it."""
+_REST_BEFORE_MOVES = (1.0, 3.0)
+"""Time of rest before the first of them [s]: what somebody takes to press start."""
 _LET_GO: tuple[tuple[Role, float], ...] = (
     ("estimation", 1.0), ("estimation", 0.7), ("estimation", 0.45), ("estimation", 0.3),
     ("validation", 0.85), ("validation", 0.55),
@@ -79,8 +83,10 @@ def draw_laboratory_runs(
         return Run(name, role, "multisine", smooth, waves, duration)
 
     def step(name: str, role: Role, share: float) -> Run:
+        if law is not None:
+            return Run(name, role, "operation", smooth, _moves(share * amplitudes[GOAL], law, rng), duration)
         waves = in_proportion(doublets(amplitudes, band, rng), share)
-        return Run(name, role, "step", "foh" if law is not None else "zoh", waves, duration)
+        return Run(name, role, "step", "zoh", waves, duration)
 
     def again(name: str, run: Run) -> Run:
         return Run(name, run.role, run.kind, run.hold, run.waveforms, run.duration)
@@ -101,6 +107,12 @@ def draw_laboratory_runs(
     # No machine prescribes a motion that jumps.
     third = step if rig.is_driven else multisine
     return (*first, third("record_3", "estimation", 0.6), multisine("record_4", "estimation", 0.8), *last)
+
+
+def _moves(amplitude: float, law: Law, rng: np.random.Generator) -> dict[str, Waveform]:
+    """Return moves from rest to rest: a goal that jumps has the drive jump between two samples, where no record shows it."""
+    length = _MOVE / law.bandwidth
+    return {GOAL: PlannedMoves(amplitude, rng.uniform(*_REST_BEFORE_MOVES), length)}
 
 
 def before(subject: LaboratorySubject) -> float:
