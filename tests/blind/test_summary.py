@@ -80,18 +80,16 @@ def test_trials_of_a_laboratory_are_counted_by_condition(outcome_like: Like, wro
             wrong_outcome(stated=0.8, seconds=30.0, **unknown),
             outcome_like(condition="clean", stated=0.99, seconds=5.0),
             wrong_outcome(condition="clean", seconds=5.0),
+            wrong_outcome(condition="clean", seconds=5.0, verdict="failed", named=()),
             outcome_like(),
         ]
     )["conditions"]
     assert list(found) == ["clean", "drift", ALL]
     assert {name: row["laboratory_right"]["total"] for name, row in found.items()} == {
-        "clean": 2, "drift": 2, ALL: 4,
+        "clean": 3, "drift": 2, ALL: 5,
     }  # fmt: skip
-    assert [found["clean"][f]["count"] for f in ("laboratory_right", "laboratory_wrong_name", "unknown")] == [
-        1,
-        1,
-        0,
-    ]
+    figures = ("laboratory_right", "laboratory_wrong_name", "unknown", "neither")
+    assert [found["clean"][figure]["count"] for figure in figures] == [1, 1, 0, 1]
     assert (found["drift"]["unknown"]["count"], found["drift"]["largest_unknown"]) == (2, 0.8)
     assert (found["clean"]["largest_unknown"], found["drift"]["seconds_median"]) == (None, 20.0)
     assert summary([outcome_like()])["conditions"] == {}

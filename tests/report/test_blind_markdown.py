@@ -32,10 +32,12 @@ def test_every_row_of_a_table_has_the_columns_of_its_head(outcome_like: Like, wr
 
 def test_a_laboratory_has_a_table_by_condition(outcome_like: Like, wrong_outcome: Like) -> None:
     text = blind_markdown(content_of([outcome_like(condition="clean"), wrong_outcome(condition="drift")]))
-    heads = "| Condition | Trials | Right | Wrong name | Unknown | Largest stated | Seconds, median |"
+    heads = (
+        "| Condition | Trials | Right | Wrong name | Unknown | Neither | Largest stated | Seconds, median |"
+    )
     rows = next(rows for rows in tables(text) if rows[0] == heads)
     assert [row.split(" | ")[0].strip("| ") for row in rows[2:]] == ["Clean", "Drift", "All"]
-    assert rows[2].startswith("| Clean | 1 | 1 | 0 | 0 | - |")
+    assert rows[2].startswith("| Clean | 1 | 1 | 0 | 0 | 0 | - |")
     assert "## By condition" not in blind_markdown(content_of([outcome_like()]))
 
 

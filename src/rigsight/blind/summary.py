@@ -92,6 +92,7 @@ def _under(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return {
         **laboratory_figures(outcomes),
         "unknown": share_of(outcomes, lambda o: o.verdict == "unknown"),
+        "neither": share_of(outcomes, lambda o: not o.named and not o.right and o.verdict != "unknown"),
         "largest_unknown": max((o.stated for o in unknown), default=None),
         "seconds_median": median([o.seconds for o in outcomes]),
     }

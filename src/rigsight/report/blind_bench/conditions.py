@@ -19,13 +19,15 @@ CONDITION_HEADS = (
     "Right",
     "Wrong name",
     "Unknown",
+    "Neither",
     "Largest stated",
     "Seconds, median",
 )
 """Heads of the table by condition; the largest stated probability is that of `unknown`."""
 CONDITION_WORDS = (
     "Records as laboratories take them, by what stands between rig and record. Right is the hidden effect at its place; of three "
-    "effects the one with the largest gap, alone or with others of the three. The largest stated probability is that of unknown."
+    "effects the one with the largest gap, alone or with others of the three. Neither counts the verdicts none and "
+    "parameters, and diagnoses that failed. The largest stated probability is that of unknown."
 )
 
 
@@ -37,7 +39,7 @@ def condition_rows(content: Mapping[str, Any]) -> list[list[str]]:
             str(row["laboratory_right"]["total"]),
             *(
                 str(row[figure]["count"])
-                for figure in ("laboratory_right", "laboratory_wrong_name", "unknown")
+                for figure in ("laboratory_right", "laboratory_wrong_name", "unknown", "neither")
             ),
             number(row["largest_unknown"]),
             number(row["seconds_median"]),
