@@ -124,8 +124,9 @@ def test_an_observer_is_no_part_of_a_result() -> None:
 def test_only_a_rig_that_drifts_is_followed_and_by_sensors_of_its_motion() -> None:
     records = stage({})
     assert followed_sensors(Task("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)) == ("x",)
-    assert followed_sensors(Task("s", AXIS, {"gain": 1.0}, {"k": 50.0}, records)) == ()
     assert followed_sensors(Task("s", ELEMENT, {}, {}, (Record("r", DT, {"x": T, "force": T}, {}),))) == ()
+    sprung = Task("s", AXIS, {"gain": 1.0}, {"k": 50.0}, records)
+    assert structures_to_fit(sprung, [compose(AXIS)]) == [compose(AXIS)]
     task = Task("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)
     (structure,) = structures_to_fit(task, [compose(AXIS)])
     assert structure.observed == ("x",)
@@ -145,3 +146,14 @@ def test_friction_of_a_disturbed_stage_is_named_with_its_numbers(disturbance: fl
     assert numbers["T_c"].value == pytest.approx(FRICTION, rel=0.15)
     assert numbers["m"].value == pytest.approx(2.0, rel=0.03)
     assert 1.0 - (1.0 - found.gap["x"].closed) ** 2 > 0.7
+
+
+def test_a_spring_that_nobody_left_out_and_that_is_not_there_is_found_to_be_none() -> None:
+    names = ("coulomb_friction", "bouc_wen_hysteresis", "quadratic_damping")
+    effects = [effect for effect in CATALOGUE if effect.name in names]
+    task = Task("s", AXIS, {"gain": 1.0}, {}, stage({"coulomb_friction": {"T_c": FRICTION}}, 0.3))
+    found = diagnose(task, effects)
+    assert found.bandwidth is not None
+    assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
+    stiffness = found.candidates[0].parameters["k"]
+    assert abs(stiffness.value) < 3.0 * stiffness.std < 2.0

@@ -18,28 +18,27 @@ from rigsight.diagnose.data.data_quality import data_quality, with_best_model, w
 from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.data.offset_question import asked_offsets, with_offsets_free
 from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.horizon import brings_back, preparing, windowing_of
 from rigsight.diagnose.main_cause import main_cause
-from rigsight.diagnose.observer import Observer, followed_sensors, structures_to_fit
 from rigsight.diagnose.places.search import Search, search_places
 from rigsight.diagnose.plausibility import doubts, plausible_first
+from rigsight.diagnose.preparation import start_values_of, workbench_of
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, MOST_LEFT, Judgement, judge, most_left
-from rigsight.diagnose.windows import Windowing, leading_output, typical_period, window_length
-from rigsight.diagnose.workbench import Scored, Workbench, liveliest, until_rest
+from rigsight.diagnose.windows import Windowing, leading_output
+from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
     FitMemory,
     IdleThreads,
     characteristic_scales,
-    linear_start,
-    swallowed_by_offsets,
 )
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose
+from rigsight.simulate import Structure
 
 _SIGNIFICANT = 3.0
 """Standard errors from zero at which a constant force counts as needed."""
@@ -124,13 +123,14 @@ def examine(
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
-    floors = noise_floors(task.rig, task.records, task.drifts, at_rest)
+    drifts = task.drifts or not brings_back(task)
+    floors = noise_floors(task.rig, task.records, drifts, at_rest)
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    windowing = windowing_of(task, noise, n_jobs)
-    ready = None if prepare is None else lambda own: prepare(structures_to_fit(task, own))
+    windowing = windowing_of(task, noise, n_jobs) if drifts else Windowing()
+    ready = preparing(prepare, windowing.cut(task.records))
     models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
     asked = asked_offsets(models.bench, models.linear, models.singles, allowed) if windowing.whole else None
@@ -268,7 +268,7 @@ def _singly(
     search = search_places(bench, linear, effects)
     if search.places:
         say("places")
-    if search.places and prepare is not None:
+    if prepare is not None:
         prepare([bench.simplest((effect,)) for effect in search.effects])
     singles = fit_candidates(bench, linear, search.effects, say)
     if search.others and min((model.excess for model in singles), default=np.inf) > AT_FLOOR:
@@ -316,128 +316,12 @@ def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
     return bool(cut.linear.residuals) and best <= at_floor < cut.linear.excess
 
 
-_CLOSE, _LOOSE = 6.0, 0.1
-"""Bandwidths of the closest and the loosest observer, in units of the typical frequency of the velocity.
-
-At six the harmonics of friction that turns with the velocity still show; at a tenth errors add up for ten periods, as long as
-drift stays small against motion.
-"""
-_LOOSER = 2.0
-_OF_SAMPLING = 0.2
-"""Largest bandwidth times sample time: an observer that is closer follows the noise of single samples."""
-_CLEAR = 10.0
-"""Gap, in units of the noise floor, that shows its cause: benches of the catalogue are judged from ten floors on."""
-
-
-def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowing:
-    """Return how the records of a task are compared with models: by free runs, or where the rig drifts by an observer.
-
-    The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
-    it. Where no sensor shows the motion by itself, records are cut into windows.
-
-    Parameters
-    ----------
-    task
-        Records and the simulation in question.
-    noise
-        Noise floor of each output.
-    n_jobs
-        Threads that help with the records of a fit.
-    """
-    if not task.drifts:
-        return Windowing()
-    sensors = followed_sensors(task)
-    if not sensors:
-        return Windowing(window_length(task.rig, task.estimation))
-    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
-    bandwidth = min(_CLOSE * typical, _OF_SAMPLING / max(record.dt for record in task.records))
-    values: Mapping[str, float] | None = None
-    while True:
-        windowing = Windowing(observer=Observer(sensors, bandwidth))
-        bench = workbench_of(task, noise, windowing, None, IdleThreads(n_jobs))
-        linear = fit_linear(bench, values or bench.start)
-        if linear.excess >= _CLEAR or bandwidth <= _LOOSE * typical:
-            return windowing
-        values = linear.fit.values if linear.residuals else None
-        bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
-
-
-def workbench_of(
-    task: Task,
-    noise: Mapping[str, float],
-    windowing: Windowing,
-    memory: FitMemory | None,
-    threads: IdleThreads,
-) -> Workbench:
-    """Return what candidates of a task are fitted and scored with.
-
-    Parameters
-    ----------
-    task
-        Records and the simulation in question.
-    noise
-        Noise floor of each output.
-    windowing
-        How to cut records.
-    memory, threads
-        As of `Workbench`.
-    """
-    start = _start(task)
-    fitted = windowing.cut(task.estimation)
-    output = leading_output(task.rig, task.estimation)
-    moving = until_rest(fitted, [signal.name for signal in task.rig.inputs], output)
-    held = _held(task)
-    asked = [p.name for p in task.rig.parameters if p.name not in held]
-    scales = characteristic_scales(task.rig, task.estimation, start)
-    held |= frozenset(swallowed_by_offsets(compose(task.rig), task.estimation, scales, noise, start, asked))
-    return Workbench(
-        rig=task.rig,
-        estimation=fitted,
-        look=liveliest(moving, output),
-        scoring=windowing.cut(task.validation or task.estimation),
-        scales=scales,
-        noise=noise,
-        held=held,
-        start=start,
-        given=task.given,
-        modelled=task.modelled,
-        memory=memory,
-        threads=threads,
-    )
-
-
-def _start(task: Task) -> dict[str, float]:
-    held = {} if task.absent_spring is None else {task.absent_spring: 0.0}
-    if task.open_factor is not None:
-        held[task.open_factor.held] = task.open_factor.value
-    start = {**task.constants, **linear_start(task.rig, task.estimation, task.constants, held)}
-    # Numbers fitted without the effects that the simulation has are farther off than those it came with.
-    return {**start, **task.given} if task.modelled else start
-
-
-def _held(task: Task) -> frozenset[str]:
-    """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
-    held = set() if task.absent_spring is None else {task.absent_spring}
-    if task.open_factor is not None:
-        held.add(task.open_factor.held)
-    if not task.rig.has_one_motion:
-        return frozenset(held)
-    unmeasured = [
-        symbol
-        for symbol in task.rig.downstream
-        if not any(symbol.name in record for record in task.estimation)
-    ]
-    if unmeasured:
-        held |= task.rig.downstream_parameters
-    return frozenset(held)
-
-
 def _before(task: Task, bench: Workbench, linear: Scored) -> Scored:
     """Score the given simulation; parameters that were not given are identified with the given ones held."""
     if not task.given:
         return linear
     structure = bench.composed()
-    start = {**_start(task), **linear.fit.values, **task.given}
+    start = {**start_values_of(task), **linear.fit.values, **task.given}
     missing = [name for name in bench.free_parameters(structure) if name not in task.given]
     fit = bench.problem(structure, bench.estimation).fit(start, missing)
     if not fit.residuals:

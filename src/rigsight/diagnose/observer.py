@@ -50,22 +50,20 @@ def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
 
 
 def followed_sensors(task: Task) -> tuple[str, ...]:
-    """Return the sensors that models of a task follow: none where the rig does not drift, or no sensor shows its motion alone.
+    """Return the sensors that models of a task can follow: those that show nothing but the motion.
 
     Parameters
     ----------
     task
         Records and the simulation in question.
     """
-    if not task.drifts:
-        return ()
     shown = {name for record in task.records for name in record.signals}
     return tuple(name for name in _sensors_of_motion(task.rig) if name in shown)
 
 
 def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Structure]:
     """Return structures as they are simulated in fits to the records of a task: with free offsets and with an observer."""
-    any_bandwidth = Observer(followed_sensors(task), 0.0)
+    any_bandwidth = Observer(followed_sensors(task) if task.drifts else (), 0.0)
     records = any_bandwidth.following(task.records)
     return [structure_of_fit(structure, records) for structure in structures]
 

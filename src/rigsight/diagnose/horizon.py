@@ -1,0 +1,78 @@
+"""For how long must a model predict before it is compared with records? As long as the gap needs to show, where a rig drifts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.candidates.grow import Prepare
+from rigsight.diagnose.observer import Observer, followed_sensors
+from rigsight.diagnose.preparation import start_values_of, workbench_of
+from rigsight.diagnose.task import Task
+from rigsight.diagnose.windows import Windowing, typical_period, window_length
+from rigsight.identify import IdleThreads
+from rigsight.records.record import Record
+from rigsight.rigs import evaluated
+from rigsight.simulate import structure_of_fit
+
+_CLOSE, _LOOSE = 6.0, 0.1
+"""Bandwidths of the closest and the loosest observer, in units of the typical frequency of the velocity.
+
+At six the harmonics of friction that turns with the velocity still show; at a tenth errors add up for ten periods, as long as
+drift stays small against motion.
+"""
+_LOOSER = 2.0
+_OF_SAMPLING = 0.2
+"""Largest bandwidth times sample time: an observer that is closer follows the noise of single samples."""
+_CLEAR = 10.0
+"""Gap, in units of the noise floor, that shows its cause: benches of the catalogue are judged from ten floors on."""
+
+
+def brings_back(task: Task) -> bool:
+    """Return True if a spring brings one mass back before the loosest observer would: weaker ones let errors of force add up."""
+    if not (task.rig.has_one_motion and task.rig.is_driven):
+        return True
+    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
+    motion, values = task.rig.motion, start_values_of(task)
+    numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
+    return bool(np.min(np.abs(np.roots(numbers))) >= _LOOSE * typical)
+
+
+def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowing:
+    """Return how records of a rig that drifts are compared with models: by an observer.
+
+    The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
+    it. Where no sensor shows the motion by itself, records are cut into windows.
+
+    Parameters
+    ----------
+    task
+        Records and the simulation in question.
+    noise
+        Noise floor of each output.
+    n_jobs
+        Threads that help with the records of a fit.
+    """
+    sensors = followed_sensors(task)
+    if not sensors:
+        return Windowing(window_length(task.rig, task.estimation))
+    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
+    bandwidth = min(_CLOSE * typical, _OF_SAMPLING / max(record.dt for record in task.records))
+    values: Mapping[str, float] | None = None
+    while True:
+        windowing = Windowing(observer=Observer(sensors, bandwidth))
+        bench = workbench_of(task, noise, windowing, None, IdleThreads(n_jobs))
+        linear = fit_linear(bench, values or bench.start)
+        if linear.excess >= _CLEAR or bandwidth <= _LOOSE * typical:
+            return windowing
+        values = linear.fit.values if linear.residuals else None
+        bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
+
+
+def preparing(prepare: Prepare | None, records: Sequence[Record]) -> Prepare | None:
+    """Return how structures are compiled that are fitted to records: with their free offsets and observers."""
+    if prepare is None:
+        return None
+    return lambda structures: prepare([structure_of_fit(structure, records) for structure in structures])
