@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.diagnose.candidates.grow import pruned
+from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
+from rigsight.diagnose.candidates.grow import grown, pruned
+from rigsight.diagnose.second_cause import OtherForms
+from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
@@ -64,6 +67,17 @@ def test_one_effect_stays_one():
     found = diagnose(task, [effect_named(name) for name in TRIED])
     assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
     assert all(len(candidate.effects) < 2 for candidate in found.candidates)
+
+
+def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
+    records = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0).records
+    scales = characteristic_scales(AXIS, records, VALUES)
+    fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
+    bench = Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
+    spring, lag = effect_named("cubic_stiffness"), effect_named("actuator_lag")
+    singles = fit_candidates(bench, fit_linear(bench, VALUES), [spring])
+    pairs = grown(bench, singles, [spring, lag], AT_FLOOR, OtherForms(bench, lower_bound=False))
+    assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
 
 
 def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:

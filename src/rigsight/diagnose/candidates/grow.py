@@ -102,7 +102,8 @@ def grown(
     others = [model for model in close if model is not first and not _alike(first, model)]
     beam = [first, *[model for model in others if max(model.fit.substeps) <= _FINEST_STEPS][:1]]
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
-    alone = {model.names[0]: model.excess for model in singles}
+    # An effect that was left out of the singles, as another says the same, may still be half of a pair.
+    alone = {effect.name: np.inf for effect in effects} | {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []
     for parent in beam:
         if min((pair.excess for pair in pairs), default=np.inf) > _NOTHING_LEFT:
@@ -113,7 +114,7 @@ def grown(
         for second in (model for model in usable if model not in beam):
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
-                instead = [e for e in effects if alone.get(e.name, np.inf) <= _IN_ITS_PLACE * alone[name]]
+                instead = [e for e in effects if alone[e.name] <= _IN_ITS_PLACE * alone[name]]
                 pairs += _grown_from(bench, second, forms.partners(second, instead), pairs, usable, prepare)
     for _ in range(MOST_EFFECTS):
         best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
