@@ -12,6 +12,7 @@ from rigsight.diagnose.advise import advise
 from rigsight.diagnose.candidates.grow import Prepare
 from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.detect import AT_REST
+from rigsight.diagnose.disturbance import disturbance
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.location.localize import localize
@@ -196,6 +197,8 @@ def _assembled(
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
         left = remainder_of(linear, judgement.model, found.adequacy, lower_bound)
+    if judgement.verdict != "unknown":
+        floors = _with_disturbance(bench, judgement.model, floors, found.windowing.bandwidth)
     return Diagnosis(
         title=task.title,
         rig=rig.name,
@@ -224,6 +227,25 @@ def _assembled(
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
+    )
+
+
+def _with_disturbance(
+    bench: Workbench, model: Scored, floors: Sequence[NoiseFloor], bandwidth: float | None
+) -> tuple[NoiseFloor, ...]:
+    """Return the floors, that of the first output with the force that would leave what a model leaves above it."""
+    first = bench.rig.outputs[0].name
+    if not all(first in record for record in bench.scoring):
+        return tuple(floors)
+    left = [residual[:, 0] for residual in model.residuals]
+    return tuple(
+        replace(
+            floor,
+            disturbance=disturbance(bench.rig, model.fit.values, bench.scoring, left, floor.std, bandwidth),
+        )
+        if floor.output == first
+        else floor
+        for floor in floors
     )
 
 

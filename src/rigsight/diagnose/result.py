@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.disturbance import Disturbance
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.remainder import Remainder
 from rigsight.discover import MissingForce
@@ -152,6 +153,7 @@ class NoiseFloor:
     ``lower_bound`` says that only part of the noise was seen: colored noise and disturbances may stand above it. ``interval``
     are its 95 % limits; the upper one of a lower bound is what an adequate model leaves, infinite without one. ``stretches``
     are pieces of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise.
+    ``disturbance`` is the force that would leave what the diagnosed model leaves above this noise, where the records show one.
     """
 
     output: str
@@ -161,6 +163,7 @@ class NoiseFloor:
     lower_bound: bool = False
     interval: tuple[float, float] = (0.0, math.inf)
     stretches: Stretches = field(default=(), compare=False, repr=False)
+    disturbance: Disturbance | None = None
 
 
 @dataclass(frozen=True)
@@ -304,6 +307,7 @@ class Diagnosis:
                     "method": floor.method,
                     "lower_bound": floor.lower_bound,
                     "interval": [_number(limit) for limit in floor.interval],
+                    "disturbance": None if floor.disturbance is None else asdict(floor.disturbance),
                 }
                 for floor in self.noise_floors
             },

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
-from rigsight.diagnose.result import STAGES, Diagnosis, Estimate
+from rigsight.diagnose.result import STAGES, Diagnosis, Estimate, NoiseFloor
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.report.declared import effect_of, rig_of
@@ -206,10 +206,20 @@ def floor_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
                 "output": output_label(diagnosis, floor.output),
                 "std": f"{floor.std * scale.factor:.3g}" if math.isfinite(floor.std) else "not finite",
                 "unit": scale.unit,
-                "method": floor.method,
+                "method": floor.method + _disturbing(floor),
             }
         )
     return rows
+
+
+def _disturbing(floor: NoiseFloor) -> str:
+    found = floor.disturbance
+    if found is None:
+        return ""
+    return (
+        f". What the model leaves above it acts like a force of {found.std:.2g} {found.unit} beside the drive, "
+        f"up to {found.below:.3g} rad/s"
+    )
 
 
 def output_label(diagnosis: Diagnosis, output: str) -> str:

@@ -1,0 +1,98 @@
+"""How large is the force that disturbs a rig, judged by what the completed model leaves?
+
+A force w beside the drive moves one mass by ``H w`` with ``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0 being the
+bandwidth of an observer and 0 in a free run. What is left above the sensor's noise, divided by H, is its spectrum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from rigsight.records.record import Record
+from rigsight.rigs import Rig, evaluated
+
+Floats = NDArray[np.float64]
+
+_SMOOTHED = 9
+"""Lines of a spectrum that are averaged."""
+_ABOVE = 2.0
+"""Power, in units of the noise, from which a line is read: nine lines of white noise reach it once in a hundred times."""
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A force that acts beside the drive.
+
+    Attributes
+    ----------
+    std
+        Its standard deviation.
+    unit
+        Of the force.
+    below
+        Angular frequency up to which it stands above the sensor's noise [rad/s].
+    """
+
+    std: float
+    unit: str
+    below: float
+
+
+def disturbance(
+    rig: Rig,
+    values: Mapping[str, float],
+    records: Sequence[Record],
+    left: Sequence[Floats],
+    noise: float,
+    bandwidth: float | None,
+) -> Disturbance | None:
+    """Return the force that would leave what a model leaves; None of other rigs than one driven mass, and where noise covers it.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    values
+        Its constants and parameters.
+    records
+        What was scored.
+    left
+        What the model leaves of the first output of each record, shape (n_samples,).
+    noise
+        Standard deviation of the sensor's noise.
+    bandwidth
+        Of the observer [rad/s]; None for free runs.
+    """
+    if not (rig.has_one_motion and rig.is_driven):
+        return None
+    motion, follows = rig.motion, bandwidth or 0.0
+    inertia, damping, stiffness = (
+        evaluated(p, values) for p in (motion.inertia, motion.damping, motion.stiffness)
+    )
+    variances, highest = [], 0.0
+    for record, residual in zip(records, left, strict=True):
+        omega, power = _power(residual, record.dt)
+        covered = np.flatnonzero(power < _ABOVE * noise**2)
+        stop = int(covered[0]) if covered.size else omega.size
+        omega, power = omega[:stop], power[:stop]
+        real = stiffness + follows**2 * inertia - inertia * omega**2
+        imaginary = omega * (damping + np.sqrt(2.0) * follows * inertia)
+        force = (real**2 + imaginary**2) * (power - noise**2)
+        variances.append((2.0 * float(np.sum(force)) / residual.size, residual.size))
+        highest = max(highest, float(omega[-1]) if stop else 0.0)
+    total = sum(size for _, size in variances)
+    variance = sum(own * size for own, size in variances) / total
+    return Disturbance(float(np.sqrt(variance)), rig.units["force"], highest) if variance > 0.0 else None
+
+
+def _power(residual: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Return angular frequencies above zero and the smoothed power of each line; white noise has its variance at each."""
+    window = np.hanning(residual.size)
+    lines = np.abs(np.fft.rfft((residual - np.mean(residual)) * window)) ** 2 / np.sum(window**2)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(residual.size, dt)
+    return np.asarray(omega[1:]), uniform_filter1d(lines[1:], _SMOOTHED, mode="nearest")
