@@ -280,3 +280,17 @@ def test_a_rig_file_elsewhere_is_named_with_what_to_do(tmp_path: Path) -> None:
     assert read_campaign(tmp_path / "records", own_rigs=own_rigs([file]).values()).rig.name == "train"
     text = (tmp_path / "records" / "campaign.toml").read_text(encoding="utf-8")
     assert "name it with --rigs, or copy it here" in text
+
+
+@pytest.mark.parametrize("name", ["ref", "setpoint", "goal", "reference"])
+def test_a_column_called_like_a_reference_is_proposed_as_one(tmp_path: Path, name: str) -> None:
+    write_text(tmp_path / "run.csv", {"t": T, "u": SWEEP, name: 0.5 * ANSWER, "x": ANSWER}, {})
+    assert run_init(tmp_path).model == "axis"
+    (record,) = read_campaign(tmp_path).records
+    np.testing.assert_allclose(record["reference"], 0.5 * ANSWER)
+
+
+def test_what_a_rig_calls_so_itself_is_no_reference_beside_it(tmp_path: Path) -> None:
+    write_text(tmp_path / "run.csv", {"t": T, "goal": SWEEP, "angle": ANSWER}, {})
+    assert run_init(tmp_path).model == "servo"
+    assert "reference" not in (tmp_path / "campaign.toml").read_text(encoding="utf-8")

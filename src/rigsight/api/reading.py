@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
+from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
 from rigsight.workflow.campaigns.given_simulation import checked_numbers
 from rigsight.workflow.campaigns.in_memory import rig_of
@@ -37,7 +38,8 @@ def read_record(
         Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x), ``"element"`` (t, x, force), the name
         of another built-in rig, or a rig of your own.
     columns
-        Where signals and time ``t`` stand, and how they become SI units; by default in columns of their own names.
+        Where signals and time ``t`` stand, and how they become SI units; by default in columns of their own names. A record of a
+        closed loop may hold the ``reference`` of its controller beside them.
     require_outputs
         False to simulate the record: its time and inputs suffice.
     name
@@ -102,4 +104,5 @@ def read_record(
         dt=dt,
         resample=resample,
         constants=checked_numbers(Path(path).name, "constants", found, found.constants, constants or {}),
+        beside=signals_beside([signal.name for signal in (*found.inputs, *found.outputs)]),
     )

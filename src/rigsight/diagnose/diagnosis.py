@@ -34,6 +34,7 @@ from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
+from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
@@ -45,6 +46,10 @@ _REFUTES = 0.7
 A loose rig wanders in its play where nothing drives it, and what pulsates goes on. An assumption: true models of blind trials
 left 0.82 and more where neither was so; the relative of a play that did wander 0.52, pulsations 0.44 and 0.53.
 """
+_REFERENCE_USED = (
+    "It serves as instrument where the frequency responses of two amplitudes are compared, if the input answers it in both; the "
+    "responses in the report do not use it."
+)
 _WITHOUT_EFFECT = 0.95
 """Probability given to the equations without an effect where they reach the noise floor."""
 
@@ -89,6 +94,7 @@ def diagnose(
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
     effects = candidates_on(task.rig, effects, task.modelled)
     notes = [note for record in task.records for note in record.notes]
+    notes += closed_loop_notes(task.records, task.rig, _REFERENCE_USED)
     scored_on = "validation" if task.validation else "estimation"
     if not task.validation:
         notes.append(

@@ -36,6 +36,8 @@ SPARE = 6
 _CHUNK = 4096
 _RANK = 1e-11
 """Relative singular value below which two terms of a local model are the same."""
+_ANSWERS = 10.0
+"""Power over variance (10 dB) of the source's answer to an instrument, over half of its power; chance brings one line in 500."""
 
 
 def local_polynomial_response(
@@ -49,6 +51,7 @@ def local_polynomial_response(
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
     wanted: NDArray[np.float64] | None = None,
+    instrument: str | None = None,
 ) -> FrequencyResponse:
     """Return the frequency response with a polynomial of the frequency fitted around each line.
 
@@ -74,6 +77,9 @@ def local_polynomial_response(
         Limits [rad/s]; None takes all that the source excites.
     wanted
         Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
+    instrument
+        A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
+        is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
 
     Returns
     -------
@@ -84,7 +90,7 @@ def local_polynomial_response(
     Raises
     ------
     InputError
-        If the record is too short for `bandwidth`, or does not excite the band.
+        If the record is too short for `bandwidth`, or does not excite the band, or the source does not answer the instrument.
 
     Notes
     -----
@@ -93,7 +99,18 @@ def local_polynomial_response(
     well, ``transient=False`` is better still; without rest it is biased, and its variance does not tell.
     """
     return _local_response(
-        record, source, response, order, 0, bandwidth, transient, hold, band, wanted, "local polynomial"
+        record,
+        source,
+        response,
+        order,
+        0,
+        bandwidth,
+        transient,
+        hold,
+        band,
+        wanted,
+        instrument,
+        "local polynomial",
     )
 
 
@@ -108,6 +125,7 @@ def local_rational_response(
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
     wanted: NDArray[np.float64] | None = None,
+    instrument: str | None = None,
 ) -> FrequencyResponse:
     """Return the frequency response with a rational function of the frequency fitted around each line.
 
@@ -133,6 +151,9 @@ def local_rational_response(
         Limits [rad/s]; None takes all that the source excites.
     wanted
         Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
+    instrument
+        A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
+        is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
 
     Returns
     -------
@@ -142,7 +163,7 @@ def local_rational_response(
     Raises
     ------
     InputError
-        If the record is too short for `bandwidth`, or does not excite the band.
+        If the record is too short for `bandwidth`, or does not excite the band, or the source does not answer the instrument.
 
     Notes
     -----
@@ -152,7 +173,18 @@ def local_rational_response(
     the variance may be several times too small.
     """
     return _local_response(
-        record, source, response, order, order, bandwidth, transient, hold, band, wanted, "local rational"
+        record,
+        source,
+        response,
+        order,
+        order,
+        bandwidth,
+        transient,
+        hold,
+        band,
+        wanted,
+        instrument,
+        "local rational",
     )
 
 
@@ -167,6 +199,7 @@ def _local_response(
     hold: Hold,
     band: tuple[float, float] | None,
     wanted: NDArray[np.float64] | None,
+    instrument: str | None,
     method: str,
 ) -> FrequencyResponse:
     if order < 0:
@@ -187,18 +220,27 @@ def _local_response(
         raise InputError(
             f"{what} has {U.size} spectral lines, fewer than the {width} of one local band: record more samples."
         )
-    smoothed = np.convolve(np.abs(U) ** 2, np.ones(width) / width, mode="same")
-    lines = np.flatnonzero(excited(omega, smoothed, band, f"{what}: the source '{source}'"))
+    driven_by, drive = ("source", source) if instrument is None else ("instrument", instrument)
+    R = U if instrument is None else np.fft.rfft(record[instrument])[1 : omega.size + 1]
+    smoothed = np.convolve(np.abs(R) ** 2, np.ones(width) / width, mode="same")
+    lines = np.flatnonzero(excited(omega, smoothed, band, f"{what}: the {driven_by} '{drive}'"))
     if wanted is not None:
         lines = lines[among(omega[lines], wanted)]
         if not lines.size:
             raise InputError(
                 f"{what} does not excite any of the frequencies at which its response is wanted."
             )
-    parts = [
-        _solve(U, Y, lines[start : start + _CHUNK], half, order, poles, transient)
-        for start in range(0, lines.size, _CHUNK)
-    ]
+    chunks = [lines[start : start + _CHUNK] for start in range(0, lines.size, _CHUNK)]
+    if instrument is None:
+        parts = [_solve(U, Y, chunk, half, order, poles, transient) for chunk in chunks]
+    else:
+        ratios = [_solve_ratio(R, U, Y, chunk, half, order, poles, transient) for chunk in chunks]
+        answers = np.concatenate([clearness for *_, clearness in ratios]) >= _ANSWERS
+        power = np.abs(R[lines]) ** 2
+        if power @ answers < 0.5 * np.sum(power):
+            raise InputError(f"{what}: the source '{source}' does not answer the instrument '{instrument}'.")
+        parts = [(values, shares, near) for values, shares, near, _ in ratios]
+        method = f"{method} by {instrument}"
     values, shares, near = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     held = hold_response(omega[lines], record.dt, hold)
     shares = np.asarray(shares / held[:, None])
@@ -251,12 +293,17 @@ class LocalFit:
         freedom = terms.shape[1] - absorbed - np.count_nonzero(kept, axis=1)
         self.left_over = np.sum(np.abs(residual) ** 2, axis=1)
         self.noise = self.left_over / freedom
+        self._residual, self._freedom = residual, freedom
         self._scales, self._theta = scales[:, 0], theta
         self._left, self._inverse, self._right = left, inverse, right
 
     def coefficient(self, term: int) -> NDArray[np.complex128]:
         """Return the coefficient of one term, shape (n_bands,)."""
         return np.asarray(self._theta[:, term] / self._scales[:, term])
+
+    def noise_with(self, other: LocalFit) -> NDArray[np.complex128]:
+        """Return the covariance of what this fit and one in the same bands leave, per degree of freedom, shape (n_bands,)."""
+        return np.asarray(np.sum(self._residual * other._residual.conj(), axis=1) / self._freedom)
 
     def shares(self, term: int) -> NDArray[np.complex128]:
         """Return what each equation has in the coefficient of one term, shape (n_bands, n_equations)."""
@@ -273,10 +320,53 @@ def _solve(
     poles: int,
     transient: bool,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp]]:
-    """Return the values at some lines, and what the noise of which lines has in them.
+    """Return the values at some lines, and what the noise of which lines has in them."""
+    fit, picked = _fit(U, Y, lines, half, order, poles, transient)
+    return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked
 
-    At the ends of the spectrum the band is one-sided.
+
+def _solve_ratio(
+    R: NDArray[np.complex128],
+    U: NDArray[np.complex128],
+    Y: NDArray[np.complex128],
+    lines: NDArray[np.intp],
+    half: int,
+    order: int,
+    poles: int,
+    transient: bool,
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64]]:
+    """Return what `_solve` returns, of the response to R over that of U, and the power of the latter over its variance.
+
+    The noise of one line in both counts as one, with the phase that it has in the response: what feedback brings into both
+    cancels as it does in the ratio.
     """
+    (below, picked), (above, _) = (_fit(R, S, lines, half, order, poles, transient) for S in (U, Y))
+    denominator = below.coefficient(0)
+    # Silent by chance, it is a value of no weight and no fault.
+    denominator = np.where(denominator == 0.0, np.finfo(np.float64).tiny, denominator)
+    values = above.coefficient(0) / denominator
+    of_Y, of_U = above.shares(0), values[:, None] * below.shares(0)
+    variance = (
+        np.abs(of_Y) ** 2 * above.noise[:, None]
+        + np.abs(of_U) ** 2 * below.noise[:, None]
+        - 2.0 * np.real(of_Y * of_U.conj() * above.noise_with(below)[:, None])
+    )
+    shares = np.sqrt(np.maximum(variance, 0.0)) * np.exp(1j * np.angle(of_Y)) / denominator[:, None]
+    unsure = np.sum(np.abs(below.shares(0)) ** 2, axis=1) * below.noise
+    clearness = np.abs(denominator) ** 2 / np.maximum(unsure, np.finfo(np.float64).tiny)
+    return values, shares, picked, clearness
+
+
+def _fit(
+    U: NDArray[np.complex128],
+    Y: NDArray[np.complex128],
+    lines: NDArray[np.intp],
+    half: int,
+    order: int,
+    poles: int,
+    transient: bool,
+) -> tuple[LocalFit, NDArray[np.intp]]:
+    """Return the local models around some lines, and the lines of each; at the ends of the spectrum a band is one-sided."""
     width = 2 * half + 1
     first = np.clip(lines - half, 0, U.size - width)
     picked = first[:, None] + np.arange(width)
@@ -288,5 +378,4 @@ def _solve(
         terms.append(powers.astype(np.complex128))
     if poles:
         terms.append(-(r[..., None] ** np.arange(1, poles + 1)) * near_Y)
-    fit = LocalFit(np.concatenate(terms, axis=-1), near_Y[..., 0])
-    return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked
+    return LocalFit(np.concatenate(terms, axis=-1), near_Y[..., 0]), picked

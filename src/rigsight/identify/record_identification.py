@@ -28,6 +28,7 @@ from rigsight.identify.transfer.transfer_step import fit_step
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Hold, Record
+from rigsight.records.reference import instrument_of
 from rigsight.rigs import Rig, evaluated
 
 _SURE = 0.1
@@ -89,8 +90,11 @@ def identify_record(
     if not rig.is_driven:
         return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, wishes),))
     forward = _driven_forward(record, constants.get("gain", 1.0))
-    motion, seen = _motion(forward, rig, constants, no_spring, wishes)
+    instrument = instrument_of(record, [signal.name for signal in (*rig.inputs, *rig.outputs)])
+    motion, seen = _motion(forward, rig, constants, no_spring, wishes, instrument)
+    unused = "" if seen is None else seen.unused_instrument
     paths, warnings = [motion], _resolution_warning(motion, seen, record)
+    warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
     if rig.downstream:
         paths.append(_lateral(record, constants, wishes, motion))
     warnings = [*(f"{p.source} -> {p.response}: {p.problem}" for p in paths if p.problem), *warnings]
@@ -126,7 +130,12 @@ def _driven_forward(record: Record, gain: float) -> Record:
 
 
 def _motion(
-    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, wishes: Wishes
+    record: Record,
+    rig: Rig,
+    constants: Mapping[str, float],
+    no_spring: bool,
+    wishes: Wishes,
+    instrument: str | None,
 ) -> tuple[PathIdentification, RecordResponse | None]:
     source, response = rig.inputs[0].name, rig.outputs[0].name
 
@@ -144,7 +153,14 @@ def _motion(
             fit = _step_fit(record, source, response, order, no_spring)
         else:
             seen = record_response(
-                record, source, response, order, wishes.method, wishes.resolution, record.hold
+                record,
+                source,
+                response,
+                order,
+                wishes.method,
+                wishes.resolution,
+                record.hold,
+                instrument=instrument,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
             fit = _fit(_velocity(seen.response) if no_spring else seen.response, order, seen, wishes)

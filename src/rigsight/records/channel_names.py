@@ -14,6 +14,7 @@ NAMES_OF: dict[str, tuple[str, ...]] = {
     "psi": ("psi", "yaw", "yaw angle", "gierwinkel", "wendewinkel"),
     "y": ("y", "lateral", "lateral displacement", "lateral position", "querverschiebung", "spurlage"),
     "x": ("x", "position", "displacement", "weg", "pos", "auslenkung", "stroke", "travel", "hub", "deflection"),
+    "reference": ("reference", "ref", "setpoint", "set point", "goal", "sollwert", "führungsgröße"),
     "force": ("force", "kraft", "f", "load", "last", "damper force", "dämpferkraft"),
 }  # fmt: skip
 _IN_PART = 0.9

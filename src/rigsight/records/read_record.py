@@ -54,6 +54,7 @@ class ReadingOptions(TypedDict, total=False):
     header: bool | int | None
     comment: str | None
     constants: Mapping[str, float] | None
+    beside: Sequence[str]
 
 
 def read_record(
@@ -100,6 +101,7 @@ def read_stretches(
     header: bool | int | None = None,
     comment: str | None = None,
     constants: Mapping[str, float] | None = None,
+    beside: Sequence[str] = (),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
     """Read, check and repair the stretches of a record between the pauses of its clock; mostly there is one.
@@ -134,6 +136,8 @@ def read_stretches(
         See `read_csv`; only delimited text has them.
     constants
         See `Record`.
+    beside
+        Names of signals that are none of the rig's; they are read where the file has them, in whatever unit.
     at_pauses
         Whether a pause parts records, or makes the file unusable.
 
@@ -150,12 +154,12 @@ def read_stretches(
         raise InputError(f"{path.name}: dt = {dt:g} stands beside a column for time; give one of the two.")
     constant_inputs = constant_inputs or {}
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
-    signals = [*recorded, *outputs]
-    wanted = {signal.name: columns.get(signal.name, ColumnMapping(signal.name)) for signal in signals}
+    names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
+    wanted = {name: columns.get(name, ColumnMapping(name)) for name in names}
     needed = [signal.name for signal in outputs[:1]] if required_outputs is None else required_outputs
     free = [output.name for output in outputs if not require_outputs or output.name not in needed]
     # A column that was mapped by hand is meant to be there.
-    spare = [signal for signal in (*absent_inputs, *free) if signal not in columns]
+    spare = [signal for signal in (*absent_inputs, *free, *beside) if signal not in columns]
     dialect = _Dialect(separator, decimal, header, comment)
     table = _table(path, {TIME: time, **wanted}, spare, dialect, dt, time_is_mapped=TIME in columns)
     absent = [signal.name for signal in recorded if signal.name not in table.values]
@@ -168,15 +172,22 @@ def read_stretches(
             f"{path.name} has none of the outputs {listed}. Its columns: {listed_columns(table)}. Map one at least under columns."
         )
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
+    # One that nothing is computed in has the unit that it was said to have.
+    units |= {name: wanted[name].unit or "" for name in beside}
     unit_notes: list[str] = []
     to_si: dict[str, ColumnMapping] = {}
     for signal, label in table.labels.items():
         mapping = time if signal == TIME else wanted[signal]
         to_si[signal], notes = si_mapping(
-            path.name, signal, units[signal], mapping, label, table.units.get(signal)
+            path.name,
+            signal,
+            units[signal],
+            mapping,
+            label,
+            None if signal in beside else table.units.get(signal),
         )
         unit_notes += notes
-    raw = {signal.name: table.values[signal.name] for signal in signals if signal.name in table.values}
+    raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
     refuse_what_nobody_measures(path, raw, table)
@@ -186,7 +197,8 @@ def read_stretches(
         if role == "estimation":
             must_move = moving_inputs if may_rest else [signal.name for signal in recorded]
             found += rest_notes(path, raw, table, recorded, must_move)
-    found += clipping_notes(path, raw, table)
+    # A command stands at its extremes on purpose.
+    found += clipping_notes(path, {name: v for name, v in raw.items() if name not in beside}, table)
     found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     if absent:
         found.append(

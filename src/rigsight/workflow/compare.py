@@ -15,6 +15,7 @@ from rigsight.diagnose.detect import noise_floors
 from rigsight.diagnose.drift import can_drift
 from rigsight.diagnose.windows import cut, window_length
 from rigsight.errors import InputError, check_option
+from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
@@ -252,7 +253,7 @@ def _distinct(name: str, taken: Sequence[str]) -> str:
 
 
 def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
-    notes = []
+    notes = closed_loop_notes(campaign.records, campaign.rig, "It is not used in a comparison.")
     if all(record.kind == "step" for record in campaign.records):
         notes.append(
             "No record is a sweep or a multisine, so no frequency responses are compared; steps and free runs are."

@@ -15,6 +15,7 @@ from rigsight.diagnose.windows import cut, window_length
 from rigsight.discover import METHODS, Discovery, Task, discover
 from rigsight.discover.discovery import Method
 from rigsight.errors import RigsightError, check_option
+from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
@@ -123,6 +124,7 @@ def discover_campaign(
     with threadpool_limits(limits=1, user_api="blas"):
         found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
+        notes += tuple(closed_loop_notes(campaign.records, campaign.rig, "It is not used in a discovery."))
         factor = campaign.open_factor
         notes = notes if factor is None else (factor.sentence, *notes)
         found = replace(found, warnings=(*found.warnings, *notes))

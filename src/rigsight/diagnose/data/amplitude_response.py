@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
+from rigsight.records.reference import instrument_of
 from rigsight.rigs import Rig
 
 _DIFFERENT_AMPLITUDE = 1.2
@@ -60,7 +62,7 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
         )
     names = (pair[0].name, pair[1].name)
     try:
-        low, high = (local_rational_response(r, source, response, hold=r.hold) for r in pair)
+        low, high, by = _responses(pair, source, response, rig)
     except InputError as error:
         return AmplitudeDependence(
             "cannot tell", f"The frequency responses cannot be compared: {error}", names
@@ -83,7 +85,7 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
         worst = int(np.argmax(np.where(changed, relative, 0.0)))
         return AmplitudeDependence(
             "yes",
-            f"The frequency response {source} -> {response} changes with the amplitude: between {span} by up to "
+            f"The frequency response {source} -> {response} changes with the amplitude{by}: between {span} by up to "
             f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect takes part.",
             names,
         )
@@ -91,15 +93,32 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
     if np.mean(chance < _LINE_CHANCE) < _LINES_CHANGED and seen > 0.1:
         return AmplitudeDependence(
             "cannot tell",
-            f"Between {span} the frequency responses agree within their noise, but that hides changes of {seen:.0%}.",
+            f"Between {span} the frequency responses{by} agree within their noise, but that hides changes of {seen:.0%}.",
             names,
         )
     return AmplitudeDependence(
         "no",
-        f"The frequency response {source} -> {response} does not change with the amplitude between {span} "
+        f"The frequency response {source} -> {response} does not change with the amplitude{by} between {span} "
         f"(by {float(np.median(relative)):.1%} in the median): a linear cause, or an effect too small to be seen there.",
         names,
     )
+
+
+def _responses(
+    pair: Sequence[Record], source: str, response: str, rig: Rig
+) -> tuple[FrequencyResponse, FrequencyResponse, str]:
+    """Return both responses, read in one way, and what to say of it: by the reference of a loop where both records have one."""
+    own = [signal.name for signal in (*rig.inputs, *rig.outputs)]
+    instruments = [instrument_of(record, own) for record in pair]
+    if all(instruments):
+        with suppress(InputError):
+            low, high = (
+                local_rational_response(r, source, response, hold=r.hold, instrument=name)
+                for r, name in zip(pair, instruments, strict=True)
+            )
+            return low, high, f" (with the {instruments[0]} as instrument)"
+    low, high = (local_rational_response(r, source, response, hold=r.hold) for r in pair)
+    return low, high, ""
 
 
 def _extremes(records: Sequence[Record], source: str) -> tuple[Record, Record] | None:

@@ -58,6 +58,8 @@ class RecordResponse:
         Half-power width of the narrowest peak that the method follows at this resolution [rad/s].
     coherence
         H1 with its coherence from segments of the same record; None where it is not wanted or the record is too short for it.
+    unused_instrument
+        Why the instrument that was given was not used; empty where it was, or there is none.
     """
 
     response: FrequencyResponse
@@ -65,6 +67,7 @@ class RecordResponse:
     resolution: float
     narrowest: float
     coherence: FrequencyResponse | None
+    unused_instrument: str = ""
 
 
 def record_response(
@@ -79,6 +82,7 @@ def record_response(
     least_clearness: float = _CLEAR,
     with_coherence: bool = True,
     wanted: NDArray[np.float64] | None = None,
+    instrument: str | None = None,
 ) -> RecordResponse:
     """Return the frequency response of one record.
 
@@ -105,6 +109,8 @@ def record_response(
         False where nobody reads the coherence: it takes as long as a third of a local model.
     wanted
         Frequencies [rad/s] that somebody reads; a local method leaves out other lines. None for all.
+    instrument
+        The reference of a closed loop: a local method divides the responses to it, unless the source does not answer it.
 
     Raises
     ------
@@ -112,7 +118,10 @@ def record_response(
         If the record is too short, or does not excite anything, or nothing is left inside the band.
     """
     check_option("The method", method, METHODS)
-    periodic, note = _mean_period(record)
+    unused = ""
+    if instrument is not None and method not in _BAND_LINES:
+        unused, instrument = f"The method '{method}' has no use for it; local_rational has.", None
+    periodic, note = _mean_period(record, instrument)
     span = periodic.n_samples * periodic.dt
     line = 2.0 * math.pi / span
     coherence = _coherence(record, source, response, hold) if with_coherence else None
@@ -126,27 +135,47 @@ def record_response(
         lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
         local = local_rational_response if method == "local_rational" else local_polynomial_response
         bandwidth = resolution or lines * line
-        found = local(
-            periodic,
-            source,
-            response,
-            bandwidth=bandwidth,
-            transient=periodic is record,
-            hold=hold,
-            wanted=wanted,
-        )
+        try:
+            found = local(
+                periodic,
+                source,
+                response,
+                bandwidth=bandwidth,
+                transient=periodic is record,
+                hold=hold,
+                wanted=wanted,
+                instrument=instrument,
+            )
+        except InputError as error:
+            if instrument is None:
+                raise
+            direct = record_response(
+                record,
+                source,
+                response,
+                order,
+                method,
+                resolution,
+                hold,
+                band,
+                least_clearness,
+                with_coherence,
+                wanted,
+            )
+            return replace(direct, unused_instrument=str(error))
         width, shared = line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
         found = _clear(found, lines, least_clearness)
     if note:
         found = replace(found, method=f"{found.method}, {note}")
     if band is not None:
         found = found.band(*band)
-    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence)
+    return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence, unused)
 
 
-def _mean_period(record: Record) -> tuple[Record, str]:
-    """Return the mean of all periods but the first of a repeated input, or the record as it is."""
-    period = repeated_period(next(iter(record.signals.values())))
+def _mean_period(record: Record, instrument: str | None) -> tuple[Record, str]:
+    """Return the mean of all periods but the first of a repeated instrument or input, or the record as it is."""
+    drive = next(iter(record.signals.values())) if instrument is None else record[instrument]
+    period = repeated_period(drive)
     count = record.n_samples // period if period else 1
     if period is None or count < 2:
         return record, ""

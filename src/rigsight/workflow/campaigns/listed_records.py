@@ -7,6 +7,7 @@ from pathlib import Path
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import ColumnMapping, Record
 from rigsight.records.read_record import TIME, read_stretches
+from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
 from rigsight.workflow.campaigns.campaign_file import RecordTable
 from rigsight.workflow.campaigns.given_simulation import checked_numbers
@@ -118,13 +119,18 @@ def read_listed_record(
             header=record.header,
             comment=record.comment,
             constants=constants,
+            beside=signals_beside(_own(rig)),
         )
     except InputError as error:
         raise InputError(f"{path.name}: record {number}: {error}") from None
 
 
+def _own(rig: Rig) -> list[str]:
+    return [signal.name for signal in (*rig.inputs, *rig.outputs)]
+
+
 def _columns(key: str, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping]:
-    known = [TIME, *(signal.name for signal in (*rig.inputs, *rig.outputs))]
+    known = [TIME, *_own(rig), *signals_beside(_own(rig))]
     columns = {}
     for signal, column in record.columns.items():
         if signal not in known:

@@ -176,6 +176,11 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
             lines.append(
                 f"# {one.signal} =    # {_unit_of(one)}{left or 'no channel is left'}; or not recorded here"
             )
+    reference = guess.reference.channel
+    if reference is not None and reference.name != guess.reference.signal:
+        lines.append(
+            f"{guess.reference.signal} = {quoted(reference.name)}  # of the controller, if it is one; else remove this line"
+        )
     return lines, blanks
 
 
@@ -191,7 +196,8 @@ def _needed(guess: FileGuess) -> set[str]:
 
 def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
     """Return which channels are no signal yet; empty where all are."""
-    taken = {one.channel.name for one in (guess.time, *guess.signals) if one.channel is not None}
+    known = (guess.time, guess.reference, *guess.signals)
+    taken = {one.channel.name for one in known if one.channel is not None}
     free = [quoted(channel.name) for channel in channels if channel.name not in taken]
     return f"one of: {', '.join(free[:_LISTED])}" if free else ""
 

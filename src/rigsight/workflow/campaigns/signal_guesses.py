@@ -9,6 +9,7 @@ from rigsight.records.channel_names import closeness, split_unit
 from rigsight.records.channel_units import DRIVES, has_si, is_a
 from rigsight.records.formats.channel import Channel
 from rigsight.records.read_record import TIME
+from rigsight.records.reference import REFERENCE
 from rigsight.rigs import Rig
 
 _FITTING_UNIT = 0.5
@@ -57,6 +58,7 @@ class FileGuess:
     time: Guess
     signals: tuple[Guess, ...] = field(default=())
     score: float = 0.0
+    reference: Guess = field(default=Guess(REFERENCE, ""))
 
     @property
     def open_questions(self) -> int:
@@ -84,7 +86,18 @@ def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) 
     """
     guesses = [_guess_rig(rig, channels, is_text) for rig in rigs]
     found = min(guesses, key=_unlikely)
+    found = replace(found, reference=_guess_reference(found, channels))
     return replace(found, signals=_completed_by_unit(found, channels, is_text))
+
+
+def _guess_reference(found: FileGuess, channels: Sequence[Channel]) -> Guess:
+    """Return which channel that is no signal of the rig is called like the reference of a controller; its unit says nothing."""
+    none = Guess(REFERENCE, "")
+    if any(one.signal == REFERENCE for one in found.signals):
+        return none
+    taken = [one.channel for one in (found.time, *found.signals)]
+    called = [c for c in channels if c not in taken and closeness(c.name, REFERENCE) >= _CLEAR]
+    return replace(none, channel=called[0]) if len(called) == 1 else none
 
 
 def _unlikely(guess: FileGuess) -> tuple[int, bool, bool, float, int]:
@@ -122,7 +135,7 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
     for i, guess in enumerate(guesses):
         if guess.is_clear or guess.candidates:
             continue
-        taken = [found.time.channel, *(own.channel for own in guesses)]
+        taken = [found.time.channel, found.reference.channel, *(own.channel for own in guesses)]
         # A drive has the unit of its amplifier.
         units = [guess.si] if has_si(guess.si) else DRIVES
         fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
@@ -131,7 +144,8 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
             guesses[i] = _of_channel(guess, fitting[0], is_text)
     needed = (*(signal.name for signal in found.rig.inputs), *found.rig.required_outputs)
     lacking = [i for i, own in enumerate(guesses) if own.signal in needed and own.channel is None]
-    left = [c for c in channels if c not in [found.time.channel, *(own.channel for own in guesses)]]
+    taken = [found.time.channel, found.reference.channel, *(own.channel for own in guesses)]
+    left = [c for c in channels if c not in taken]
     if len(lacking) == len(left) == 1 and guesses[lacking[0]].signal in found.rig.required_outputs:
         own, alone = guesses[lacking[0]], left[0]
         unit = _unit_of(alone)

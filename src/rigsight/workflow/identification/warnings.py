@@ -10,6 +10,7 @@ import numpy as np
 
 from rigsight.diagnose.windows import cut
 from rigsight.identify import OFFSETS_MEND, differing_means
+from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.identification import JointIdentification, RecordIdentification
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.record_identification import MISFIT, measured_amplitude
@@ -21,6 +22,14 @@ from rigsight.workflow.identification.joint import parent
 
 _TOLERANCE = 0.02
 """Share by which an amplitude may lie outside the identified ones and still count as one of them."""
+_OF_EACH_RECORD = (
+    "It is the instrument of the frequency response of the motion to its input, record by record where nothing else is said "
+    "below: noise on the input, fed back or not, does not bias it."
+)
+_NOT_OF_ANY_RIG = (
+    "It is not used: the frequency responses are those of all records and inputs together, and noise on a measured input makes "
+    "them too small."
+)
 
 
 def out_of_band(
@@ -64,6 +73,7 @@ def campaign_warnings(
     """Return what the records' own identifications, the joint fit and the reading have to tell, a sentence each."""
     told = list(campaign.notes)
     told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
+    told += closed_loop_notes(campaign.records, campaign.rig, _OF_EACH_RECORD)
     told += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
     told += _not_the_whole(found)
     told += [f"Record '{name}' was left out of the joint fit." for name in joint.left_out]
@@ -102,6 +112,7 @@ def any_rig_warnings(
     """
     told = list(campaign.notes)
     told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
+    told += closed_loop_notes(campaign.records, campaign.rig, _NOT_OF_ANY_RIG)
     for view in views:
         told += _of_view(view)
     if not joint.fit.fit.success:

@@ -1,0 +1,46 @@
+"""What is a user told of records that hold the reference of a closed loop?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rigsight.records.record import Record
+from rigsight.records.reference import REFERENCE, instrument_of, signals_beside
+from rigsight.rigs import Rig
+
+_LISTED = 5
+
+
+def closed_loop_notes(records: Sequence[Record], rig: Rig, used: str) -> list[str]:
+    """Return which records are taken as those of a closed loop, and what for; nothing where none holds a reference.
+
+    Parameters
+    ----------
+    records
+        Of a campaign.
+    rig
+        Their rig; a signal of its own that is called `reference` is none.
+    used
+        What the reference is used for, a sentence or more.
+    """
+    own = [signal.name for signal in (*rig.inputs, *rig.outputs)]
+    if not signals_beside(own):
+        return []
+    holding = [record for record in records if REFERENCE in record]
+    moving = [record.name for record in holding if instrument_of(record, own)]
+    still = [record.name for record in holding if record.name not in moving]
+    notes = []
+    if moving:
+        inputs = " and ".join(signal.name for signal in rig.inputs)
+        notes.append(
+            f"A {REFERENCE} is recorded in {_listed(moving)}: taken as records of a closed loop. {used} Fits over time and "
+            f"simulations take {inputs} as measured, its noise included."
+        )
+    if still:
+        notes.append(f"The {REFERENCE} never changes in {_listed(still)}, so it was not used there.")
+    return notes
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return ", ".join(f"'{name}'" for name in names[:_LISTED]) + more

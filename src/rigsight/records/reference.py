@@ -1,0 +1,31 @@
+"""Does a record of a closed loop hold the reference of the controller, so that it can serve as instrument?"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from rigsight.records.plausibility import is_constant
+from rigsight.records.record import Record
+
+REFERENCE = "reference"
+"""The signal that a record may hold beside those of its rig; a rig with a signal of this name means its own."""
+
+
+def signals_beside(own: Collection[str]) -> tuple[str, ...]:
+    """Return what a record may hold beside the signals of its rig, whose names are given."""
+    return () if REFERENCE in own else (REFERENCE,)
+
+
+def instrument_of(record: Record, own: Collection[str]) -> str | None:
+    """Return the name of the signal that drives a record's loop from outside; None where none is there, or it never changes.
+
+    Parameters
+    ----------
+    record
+        The record.
+    own
+        Names of the signals of its rig.
+    """
+    if not signals_beside(own) or REFERENCE not in record or is_constant(record[REFERENCE]):
+        return None
+    return REFERENCE
