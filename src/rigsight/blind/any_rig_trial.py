@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rigsight.blind.any_rig_campaign import DT, DURATION, Run, draw_runs
 from rigsight.blind.any_rig_numbers import draw_numbers, draw_offsets
 from rigsight.blind.any_rig_subjects import PlacedSubject, draw_effects, placed_subject_of
+from rigsight.blind.attempts import first_that_succeeds
 from rigsight.blind.campaign import LinearRig
 from rigsight.blind.draw import Trial
 from rigsight.blind.strength import draw_shape, sized
@@ -49,8 +50,6 @@ _OFF = (0.05, 0.2)
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
 _EVALUATIONS = 25
-_ATTEMPTS = 8
-"""Draws of one trial, each with random numbers of its own, before it is given up."""
 
 
 def draw_placed_trial(seed: int, trial: int) -> Trial:
@@ -69,12 +68,7 @@ def draw_placed_trial(seed: int, trial: int) -> Trial:
         If no rig that was drawn can be integrated, or no effect leaves a gap of the wished size.
     """
     subject = placed_subject_of(seed, trial)
-    for attempt in range(_ATTEMPTS):
-        try:
-            return _drawn(subject, seed, trial, attempt)
-        except SimulationError as error:
-            reason = error
-    raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reason}")
+    return first_that_succeeds(lambda attempt: _drawn(subject, seed, trial, attempt), seed, trial)
 
 
 def _drawn(subject: PlacedSubject, seed: int, trial: int, attempt: int) -> Trial:

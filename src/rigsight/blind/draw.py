@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from rigsight.blind.attempts import first_that_succeeds
 from rigsight.blind.campaign import DT, Experiment, LinearRig, draw_experiments, draw_rig
 from rigsight.blind.plant import Plant
 from rigsight.blind.strength import draw_shape, scaled, strength_for
@@ -43,8 +44,6 @@ _OFF = (0.05, 0.2)
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
 _EVALUATIONS = 25
-_ATTEMPTS = 5
-"""Draws of one trial, each with random numbers of its own, before it is given up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +88,7 @@ def draw_trial(design: CatalogueDesign, seed: int, trial: int) -> Trial:
     SimulationError
         If no plant that was drawn can be integrated, or is near enough to a linear one to be re-identified.
     """
-    for attempt in range(_ATTEMPTS):
-        try:
-            return _drawn(design, seed, trial, attempt)
-        except SimulationError as error:
-            reason = error
-    raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reason}")
+    return first_that_succeeds(lambda attempt: _drawn(design, seed, trial, attempt), seed, trial)
 
 
 def _drawn(design: CatalogueDesign, seed: int, trial: int, attempt: int) -> Trial:

@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from rigsight.blind.any_rig_numbers import draw_offsets, is_offset
+from rigsight.blind.attempts import first_that_succeeds
 from rigsight.blind.campaign import LinearRig
 from rigsight.blind.draw import Trial
 from rigsight.blind.laboratory.bench import LaboratoryBench, largest_left
@@ -39,8 +40,6 @@ _WITHOUT_INPUTS = 0.5
 """Share of free decays that hold no column of an input."""
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
-_ATTEMPTS = 12
-"""Draws of one trial, each with random numbers of its own, before it is given up."""
 
 
 def draw_laboratory_trial(seed: int, trial: int) -> Trial:
@@ -59,12 +58,7 @@ def draw_laboratory_trial(seed: int, trial: int) -> Trial:
         If no stand that was drawn can be simulated, or no effect leaves a gap of the wished size.
     """
     subject = laboratory_subject_of(seed, trial)
-    for attempt in range(_ATTEMPTS):
-        try:
-            return _drawn(subject, seed, trial, attempt)
-        except SimulationError as error:
-            reason = error
-    raise SimulationError(f"Trial {trial} of seed {seed} cannot be drawn: {reason}")
+    return first_that_succeeds(lambda attempt: _drawn(subject, seed, trial, attempt), seed, trial)
 
 
 def _drawn(subject: LaboratorySubject, seed: int, trial: int, attempt: int) -> Trial:
