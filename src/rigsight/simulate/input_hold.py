@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -168,20 +168,28 @@ def _divided(held: HeldInput, parts: int) -> HeldInput:
 def _band_limited_nodes(
     samples: NDArray[np.float64], dt: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values and slopes at the interval boundaries, from a finely oversampled windowed-sinc interpolation."""
-    fine = _OVERSAMPLING * BAND_LIMITED_INTERVALS
-    n_taps = 2 * _HALF_LENGTH * fine + 1
-    taps = fine * firwin(n_taps, 1.0 / fine, window=("kaiser", 10.0))
+    """Return values and slopes at the interval boundaries, from a windowed-sinc interpolation."""
+    values, slopes = _interpolation_taps()
     pad = min(_HALF_LENGTH + 2, samples.size - 1)
     before = 2.0 * samples[0] - samples[pad:0:-1]
     after = 2.0 * samples[-1] - samples[-2 : -pad - 2 : -1]
     extended = np.concatenate([before, samples, after])
-    dense = upfirdn(taps, extended, up=fine)[_HALF_LENGTH * fine :]
-    start = pad * fine
-    stop = start + (samples.size - 1) * fine
-    index = np.arange(start, stop + 1, _OVERSAMPLING)
-    step = dt / fine
-    slopes = (8.0 * (dense[index + 1] - dense[index - 1]) - (dense[index + 2] - dense[index - 2])) / (
-        12.0 * step
+    start = (_HALF_LENGTH + pad) * BAND_LIMITED_INTERVALS
+    nodes = slice(start, start + (samples.size - 1) * BAND_LIMITED_INTERVALS + 1)
+    at_nodes, rising = (
+        upfirdn(taps, extended, up=BAND_LIMITED_INTERVALS)[nodes] for taps in (values, slopes)
     )
-    return dense[index], slopes
+    return at_nodes, rising * (BAND_LIMITED_INTERVALS / dt)
+
+
+@cache
+def _interpolation_taps() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the filters that give values and slopes [per interval] at the interval boundaries.
+
+    The slope is the difference quotient of fourth order of a finer interpolation, which is never computed between these.
+    """
+    fine = _OVERSAMPLING * BAND_LIMITED_INTERVALS
+    taps = fine * firwin(2 * _HALF_LENGTH * fine + 1, 1.0 / fine, window=("kaiser", 10.0))
+    around = np.pad(taps, 2)
+    rise = 8.0 * (around[3:-1] - around[1:-3]) - (around[4:] - around[:-4])
+    return taps[::_OVERSAMPLING], rise[::_OVERSAMPLING] / 12.0 * _OVERSAMPLING
