@@ -19,7 +19,7 @@ from rigsight.diagnose.candidates.first_look import (
     mean_square,
     widened,
 )
-from rigsight.diagnose.candidates.starts import restart_values
+from rigsight.diagnose.candidates.starts import restart_values, start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
@@ -28,6 +28,9 @@ from rigsight.simulate import Structure
 _MOST_RESTARTS = 4
 _WORTH_RESTARTING = 1e-3
 """Share of the cost that a fit from elsewhere must remove to be followed."""
+_FAINT = 1e-3
+_ENDLESS = 1e100
+"""Null values from here on stand for infinity."""
 _LONG_PIECE = 20.0
 _STUCK = 2.0
 """Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit counts as stopped short."""
@@ -87,6 +90,8 @@ def fit_candidates(
         found = wide.get(found.newest, found)
         promising = found.newest in wide and found.cost <= _PROMISING * lowest
         scored = followed(bench, found, promising)
+        if scored.fit.cost > (1.0 + _WORTH_RESTARTING) * linear.fit.cost:
+            scored = min(scored, _from_hardly_any(bench, found, linear.fit), key=lambda model: model.fit.cost)
         if progress is not None:
             progress(found.newest)
         return scored
@@ -95,6 +100,24 @@ def fit_candidates(
     refined = with_a_mean_that_is_needed(bench, refine(bench, models))
     late = {m.effects[0].at for m in refined if m.effects[0].measured_late is not None and not _shift(m)}
     return [model for model in refined if not (_shift(model) > 0.0 and model.effects[0].at in late)]
+
+
+def _from_hardly_any(bench: Workbench, look: Look, base: FitResult) -> Scored:
+    """Fit a candidate from where it is nearly absent: its equations are those of the base there, so that none need be worse."""
+    structure, (effect,) = look.structure, look.effects
+    start = next(start_values(bench, structure, effect, base, {}))
+    faint = {
+        (name := structure.parameter_name(effect, p.name)): _faint(start[name], p.null)
+        for p in effect.parameters
+        if p.null is not None
+    }
+    begin = replace(base, values={**start, **base.values, **faint})
+    return _fitted(bench, look.effects, structure, look.free, (begin,), promising=False)
+
+
+def _faint(value: float, null: float) -> float:
+    """Return a value that lies by a thousandth on the side of another one from where the effect is absent."""
+    return null + _FAINT * (value - null) if abs(null) < _ENDLESS else value / _FAINT
 
 
 def _shift(model: Scored) -> float:
