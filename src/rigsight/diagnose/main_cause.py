@@ -12,7 +12,7 @@ from rigsight.diagnose.location.block_means import RESAMPLES, block_means
 from rigsight.diagnose.workbench import Scored
 from rigsight.rigs import Rig
 
-_LARGER_PART = 0.5
+LARGER_PART = 0.5
 """Share of the squared gap above the noise floor: what takes more of it than all else together is the main cause."""
 _SURELY = 0.05
 """Quantile, over resampled stretches of the records, at which it must still be the larger part."""
@@ -39,7 +39,7 @@ class MainCause:
     @property
     def clear(self) -> bool:
         """True where the model surely takes the larger part and nothing that is as good contradicts its place."""
-        return self.at_least > _LARGER_PART and not self.contradicted_by
+        return self.at_least > LARGER_PART and not self.contradicted_by
 
 
 def main_cause(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.diagnose.adequacy import Adequacy
+from rigsight.diagnose.adequacy import BY_RECORD, Adequacy
+from rigsight.diagnose.main_cause import LARGER_PART
 from rigsight.diagnose.workbench import Scored
 
 
@@ -38,9 +39,14 @@ class Remainder:
                 "What is left goes with no motion, drive, reading, time or record that was looked at "
                 f"(p = {self.p_value:.2g}): it counts as noise and disturbance."
             )
+        left = (
+            f"What is left, {100.0 * self.share:.2g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
+            f"(p = {self.p_value:.2g})"
+        )
+        if self.share > LARGER_PART:
+            return f"{left}: the larger part of the gap is not explained."
         return (
-            f"What is left, {100.0 * self.share:.2g} % of the squared gap, still goes with {self.goes_with} "
-            f"(p = {self.p_value:.2g}): something smaller is missing too, or the equation has not quite the form of the rig's."
+            f"{left}: something smaller is missing too, or the equation has not quite the form of the rig's."
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -52,6 +58,12 @@ class Remainder:
             "p_value": self.p_value,
             "text": self.text,
         }
+
+
+def _in_words(goes_with: str) -> str:
+    """Return with what a remainder goes as a part of a sentence."""
+    kind, _, what = goes_with.partition(BY_RECORD)
+    return goes_with if kind else f"the record: {what} differs from one to another"
 
 
 def remainder_of(linear: Scored, model: Scored, found: Adequacy, lower_bound: bool) -> Remainder:

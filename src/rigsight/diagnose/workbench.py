@@ -113,6 +113,11 @@ class Workbench:
     threads: IdleThreads = field(default_factory=IdleThreads)
 
     @cached_property
+    def records(self) -> tuple[Record, ...]:
+        """All records, each once."""
+        return self.estimation if self.scoring == self.estimation else (*self.estimation, *self.scoring)
+
+    @cached_property
     def driven(self) -> tuple[Record, ...]:
         """The records to fit in which an input moves; in the others the rig moves freely."""
         names = [signal.name for signal in self.rig.inputs]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap, Stage
-from rigsight.diagnose.verdict import AT_FLOOR
+from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND
 from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
 
@@ -161,6 +161,11 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "none":
         if not before > AT_FLOOR:
             return f"There is no gap to explain: {_first(diagnosis)} {times_floor(before)}."
+        if before > AT_LOWER_BOUND:
+            return (
+                f"No effect is seen to be missing: {_first(diagnosis)} {times_floor(before)}, but that goes with nothing that "
+                "was looked at. The noise floor seems too low; a repeated record would measure it."
+            )
         other = ", and better numbers do not change that much" if is_given(diagnosis) else ""
         return f"The gap is too small against the noise to have a cause: {_first(diagnosis)} {times_floor(before)}{other}."
     return _unknown_sentence(diagnosis)
@@ -208,9 +213,13 @@ def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """Return what a named cause leaves and with what that goes; empty where it leaves nothing to tell."""
+    """Return what a named or an unknown cause leaves and with what that goes; empty where it leaves nothing to tell."""
     left = diagnosis.remainder
-    return left.text if left is not None and diagnosis.verdict == "effect" and left.goes_with else ""
+    return (
+        left.text
+        if left is not None and diagnosis.verdict in ("effect", "unknown") and left.goes_with
+        else ""
+    )
 
 
 def ambiguity_sentence(diagnosis: Diagnosis) -> str:

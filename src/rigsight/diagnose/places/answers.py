@@ -8,6 +8,7 @@ residual.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -34,11 +35,45 @@ _DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True)
-class _Free:
-    """What parameters and initial states could follow: bases per record, and of all records together."""
+class Followed:
+    """What parameters and initial states could follow.
 
-    of_states: list[Floats]
+    Attributes
+    ----------
+    spans
+        Where each record stands in a column of all readings.
+    of_states
+        Basis of what the initial states of each record could follow, shape (n_own, n_columns) each.
+    of_parameters
+        Basis of what parameters could follow beside, shape (n, n_columns).
+    """
+
+    spans: tuple[slice, ...]
+    of_states: tuple[Floats, ...]
     of_parameters: Floats
+
+    @classmethod
+    def of(cls, spans: Sequence[slice], by_state: Sequence[Floats], by_parameter: Floats) -> Followed:
+        """Return the bases of given answers.
+
+        Parameters
+        ----------
+        spans
+            Where each record stands in a column.
+        by_state
+            Answers to its initial states, shape (n_own, n_states) each.
+        by_parameter
+            Answers to the parameters, shape (n, n_free).
+        """
+        states = cls(tuple(spans), tuple(map(orthonormal, by_state)), np.zeros((by_parameter.shape[0], 0)))
+        return replace(states, of_parameters=orthonormal(states.without(by_parameter)))
+
+    def without(self, columns: Floats) -> Floats:
+        """Return what is left of columns, shape (n,) or (n, m), when parameters and initial states follow."""
+        left = np.array(columns, dtype=np.float64)
+        for span, basis in zip(self.spans, self.of_states, strict=True):
+            left[span] -= basis @ (basis.T @ left[span])
+        return np.asarray(left - self.of_parameters @ (self.of_parameters.T @ left))
 
 
 class Answers:
@@ -91,8 +126,8 @@ class Answers:
             for record in records
         ]
         self._residuals = [np.nan_to_num(residual) for residual in fit.residuals]
-        sizes = [record.n_samples * self._n_outputs for record in self.records]
-        self._edges = np.concatenate([[0], np.cumsum(sizes)])
+        edges = np.cumsum([0, *(record.n_samples * self._n_outputs for record in self.records)])
+        self.spans = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(edges))
 
     @cached_property
     def seen_left(self) -> Floats:
@@ -119,13 +154,19 @@ class Answers:
 
     def seen(self, place: str) -> list[Floats]:
         """Return what an effect at a place sees along each record: a joint's motion, a drive's signal, a sensor's reading."""
-        rig = self.bench.rig
-        if place in signal_columns(rig):
-            return [out[:, signal_columns(rig)[place]] for out in self.calm_outputs]
-        names = [signal.name for signal in rig.outputs]
-        if place in motion_columns(rig):
+        if place in motion_columns(self.bench.rig):
             return [motion[place] for motion in self.motions]
-        return [out[:, names.index(place)] for out in self.calm_outputs]
+        return self.simulated(place)
+
+    def simulated(self, place: str) -> list[Floats]:
+        """Return the same as the equations alone have it: free of what disturbs the rig and the sensors."""
+        rig = self.bench.rig
+        columns = {
+            **{signal.name: i for i, signal in enumerate(rig.outputs)},
+            **signal_columns(rig),
+            **motion_columns(rig),
+        }
+        return [out[:, columns[place]] for out in self.calm_outputs]
 
     def to_push(self, place: str, signals: Sequence[Floats], size: float) -> Floats:
         """Return the change of all readings, weighted and stacked, per size of a push; not finite where it cannot be followed.
@@ -160,39 +201,23 @@ class Answers:
             int(np.count_nonzero(w)) * r.n_samples for w, r in zip(self._weights, self.records, strict=True)
         )
 
-    def span(self, index: int) -> slice:
-        """Return where a record stands in a stacked column."""
-        return slice(int(self._edges[index]), int(self._edges[index + 1]))
-
     def without_free(self, columns: Floats) -> Floats:
         """Return what is left of columns, shape (n,) or (n, m), when parameters and initial states follow."""
-        left = self._without_states(columns)
-        basis = self._free.of_parameters
-        return np.asarray(left - basis @ (basis.T @ left))
-
-    def _without_states(self, columns: Floats) -> Floats:
-        left = np.array(columns, dtype=np.float64)
-        for index, basis in enumerate(self._free.of_states):
-            part = self.span(index)
-            left[part] -= basis @ (basis.T @ left[part])
-        return left
+        return self._followed.without(columns)
 
     @cached_property
-    def _free(self) -> _Free:
-        return _Free(self._of_states, orthonormal(self._parameter_columns()))
+    def _followed(self) -> Followed:
+        return Followed.of(self.spans, self.by_state, self.by_parameter)
 
-    def _parameter_columns(self) -> Floats:
+    @cached_property
+    def by_parameter(self) -> Floats:
+        """The changes of all readings with the free parameters, weighted and stacked, shape (n, n_free)."""
         columns = [self.stacked(changes) for changes in self._of_parameters]
-        if not columns:
-            return np.zeros((int(self._edges[-1]), 0))
-        stacked = np.column_stack(columns)
-        for index, basis in enumerate(self._of_states):
-            part = self.span(index)
-            stacked[part] -= basis @ (basis.T @ stacked[part])
-        return stacked
+        return np.column_stack(columns) if columns else np.zeros((self.spans[-1].stop, 0))
 
     @cached_property
-    def _of_states(self) -> list[Floats]:
+    def by_state(self) -> list[Floats]:
+        """The changes of each record's readings with its initial states and offsets, weighted and stacked."""
         found = []
         for change, weights in zip(self._changes, self._weights, strict=True):
             by_state = change[:, :, len(self.free) :] * weights[None, :, None]
@@ -201,7 +226,7 @@ class Answers:
                 place = [signal.name for signal in self.bench.rig.outputs].index(name)
                 shifts[:, place, column] = weights[place]
             own = np.concatenate([by_state, shifts], axis=2)
-            found.append(orthonormal(own.reshape(change.shape[0] * change.shape[1], own.shape[2])))
+            found.append(own.reshape(change.shape[0] * change.shape[1], own.shape[2]))
         return found
 
     @cached_property
