@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from rigsight.diagnose.remainder import Remainder
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
-from rigsight.report.wording import percent, verdict_sentence
+from rigsight.report.wording import percent, remainder_sentence, verdict_sentence
 
 
 @pytest.mark.parametrize(
@@ -29,6 +31,32 @@ def test_the_verdict_is_one_plain_sentence(
     assert words in sentence
     assert sentence.endswith(".")
     assert "nan" not in sentence
+
+
+def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(
+    variant: Callable[[str], Diagnosis],
+) -> None:
+    none = variant("none")
+    far = {
+        name: replace(gap, before=300.0 * gap.noise_floor, reidentified=300.0 * gap.noise_floor)
+        for name, gap in none.gap.items()
+    }
+    sentence = verdict_sentence(replace(none, gap=far))
+    assert "goes with nothing" in sentence
+    assert "noise floor seems too low" in sentence
+    assert "too small" not in sentence
+
+
+def test_an_unknown_cause_says_with_what_the_rest_goes(variant: Callable[[str], Diagnosis]) -> None:
+    left = Remainder(0.89, ("pivot",), "velocity of pivot", 0.0008)
+    sentence = remainder_sentence(replace(variant("unknown"), remainder=left))
+    assert "89 % of the squared gap, still goes with velocity of pivot" in sentence
+    assert "the larger part of the gap is not explained" in sentence
+
+
+def test_a_number_that_differs_by_record_is_told_as_such() -> None:
+    left = Remainder(0.02, (), "record: T_c", 0.001)
+    assert "still goes with the record: T_c differs from one to another" in left.text
 
 
 def test_nearly_all_is_not_rounded_to_all() -> None:
