@@ -64,7 +64,7 @@ def asked(bench: Workbench, model: Scored) -> Adequacy:
 @pytest.mark.parametrize("disturbance", [0.0, 0.05, 0.5], ids=["white noise", "disturbed", "much disturbed"])
 def test_p_values_of_noise_and_disturbance_are_uniform(disturbance: float) -> None:
     """A disturbing force of 0.5 leaves 80 times the noise, most of it at the resonance."""
-    benches = [axis_bench(seed=seed, disturbance=disturbance) for seed in range(24)]
+    benches = [axis_bench(seed=seed, disturbance=disturbance) for seed in range(16)]
     p_values = [asked(bench, fit_linear(bench, VALUES)).p_value for bench in benches]
     assert kstest(p_values, "uniform").pvalue > 0.01
 
