@@ -15,11 +15,11 @@ from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector
+from rigsight.simulate.binder import state_symbol
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.kinks import FrozenStructure, freeze
 from rigsight.simulate.model import Model
-from rigsight.simulate.signal_path import state_symbol
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 from rigsight.units import unit_text
 

@@ -10,6 +10,7 @@ from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
 from rigsight.rigs.mechanism import MOST_COUPLED as MOST_COUPLED
+from rigsight.rigs.mechanism import Coordinate as Coordinate
 from rigsight.rigs.mechanism import Drive as Drive
 from rigsight.rigs.mechanism import Joint as Joint
 from rigsight.rigs.mechanism import Sensor as Sensor
@@ -32,6 +33,7 @@ __all__ = [
     "RIGS",
     "ROLLING",
     "RUNNING_GEAR",
+    "Coordinate",
     "Drive",
     "Follower",
     "Joint",

@@ -12,7 +12,8 @@ import sympy as sp
 
 from rigsight.effects import Effect, Energy, Place, placed_dimension
 from rigsight.effects import symbols as canonical
-from rigsight.rigs import Drive, Joint, Rig, Sensor, acceleration, force_symbol, reading_symbol
+from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
+from rigsight.simulate.binder import Binder, state_symbol
 from rigsight.simulate.equation_tree import (
     Definition,
     EquationsOfMotion,
@@ -23,7 +24,8 @@ from rigsight.simulate.equation_tree import (
     late,
     shifted,
 )
-from rigsight.simulate.structure import TIME, bandwidth_name, input_symbols
+from rigsight.simulate.observer_acceleration import measured_before, observer_acceleration
+from rigsight.simulate.structure import bandwidth_name, input_symbols
 from rigsight.units import at_place, size_of
 
 
@@ -56,7 +58,7 @@ def equation_tree(
         Sensors of an observer, towards whose measured readings the motion is pulled.
     """
     bandwidths = {sensor: symbols[bandwidth_name(sensor)] for sensor in observed}
-    return _Path(_Binder(rig, symbols, unique, fixed), rig, effects, offsets, bandwidths).tree()
+    return _Path(Binder(rig, symbols, unique, fixed), rig, effects, offsets, bandwidths).tree()
 
 
 def bound_to(
@@ -73,51 +75,8 @@ def bound_to(
     expressions
         Of the rig's own names; none reads the force of a joint.
     """
-    path = _Path(_Binder(rig, symbols, {}, {}), rig, ())
+    path = _Path(Binder(rig, symbols, {}, {}), rig, ())
     return path.bound(expressions)
-
-
-class _Binder:
-    """Replaces the symbols of rig and effect declarations by those of one structure."""
-
-    def __init__(
-        self,
-        rig: Rig,
-        symbols: Mapping[str, sp.Symbol],
-        unique: Mapping[tuple[str, str], str],
-        fixed: Mapping[str, float],
-    ) -> None:
-        self._symbols = symbols
-        self._unique = unique
-        self._fixed = {name: sp.nsimplify(value) for name, value in fixed.items()}
-        mechanism = rig.mechanism
-        own: dict[sp.Symbol, sp.Expr] = {
-            sp.Symbol(p.name, real=True): symbols[p.name] for p in (*rig.constants, *rig.parameters)
-        }
-        inputs = {name: input_symbols(index) for index, name in enumerate(mechanism.inputs)}
-        own |= {sp.Symbol(name, real=True): value for name, (value, _, _) in inputs.items()}
-        for coordinate in mechanism.prescribed:
-            moved = (coordinate.symbol, coordinate.rate, acceleration(coordinate))
-            own |= dict(zip(moved, inputs[str(coordinate.prescribed_by)], strict=True))
-        self._own = own
-
-    def rig(self, expression: sp.Expr) -> sp.Expr:
-        """Bind an expression of the rig's declaration."""
-        return expression.xreplace({s: self._own[s] for s in expression.free_symbols if s in self._own})
-
-    def effect(self, effect: Effect, expression: sp.Expr, signals: Mapping[str, sp.Expr]) -> sp.Expr:
-        """Bind an expression of an effect; `signals` are what canonical symbols stand for, by name."""
-        states = {state.symbol for state in effect.states}
-        replacement: dict[sp.Symbol, sp.Expr] = {canonical.t: TIME}
-        for symbol in expression.free_symbols:
-            name = self._unique.get((effect.name, symbol.name))
-            if symbol in states:
-                replacement[symbol] = state_symbol(effect, symbol)
-            elif symbol.name in signals:
-                replacement[symbol] = signals[symbol.name]
-            elif name is not None:
-                replacement[symbol] = self._fixed[name] if name in self._fixed else self._symbols[name]
-        return expression.xreplace(replacement)
 
 
 class _Path:
@@ -125,7 +84,7 @@ class _Path:
 
     def __init__(
         self,
-        binder: _Binder,
+        binder: Binder,
         rig: Rig,
         effects: tuple[Effect, ...],
         offsets: tuple[str, ...] = (),
@@ -235,31 +194,23 @@ class _Path:
         )
 
     def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
-        """Return the accelerations by which an observer follows what sensors showed, shape (n_degrees, 1).
-
-        Accelerations and not forces, so that how closely it follows does not depend on the parameters of the rig. An error e of
-        a reading dies away by ``e'' + sqrt(2) w e' + w^2 e = 0``: the optimal observer of a free mass on which white noise acts
-        as a force. What a delayed sensor showed is moved back in time by its Taylor series.
-        """
+        """Return the accelerations by which an observer follows what sensors showed, shape (n_degrees, 1)."""
         mechanism = self._rig.mechanism
         sensors = {sensor.name: sensor for sensor in mechanism.sensors}
         tree = EquationTree((), tuple(self._definitions), EquationsOfMotion(), (), ())
         rates = {c.symbol: c.rate for c in mechanism.free} | {state.symbol: state.rate for state in states}
         found = sp.zeros(len(mechanism.free), 1)
         for place, (name, bandwidth) in enumerate(self._bandwidths.items(), len(mechanism.inputs)):
-            value, rate, curvature = input_symbols(place)
             reading, delay = self._shown[name]
-            value, rate = value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature
-            reads = self._bound(sensors[name].reads)
-            slopes = sp.Matrix([sp.diff(reads, c.rate) for c in mechanism.free])
-            if any(slope != 0 for slope in slopes):
-                wanted = bandwidth * (value - reading)
-            else:
-                slopes = sp.Matrix([sp.diff(reads, c.symbol) for c in mechanism.free])
-                shown = tree.flattened(reading)
-                own = sp.Add(*(sp.diff(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
-                wanted = bandwidth**2 * (value - reading) + sp.sqrt(2) * bandwidth * (rate - own)
-            found += slopes * (wanted / slopes.dot(slopes))
+            shown = tree.flattened(reading)
+            rate = sp.Add(*(sp.diff(shown, s) * rates[s] for s in rates if s in shown.free_symbols))
+            found += observer_acceleration(
+                mechanism.free,
+                self._bound(sensors[name].reads),
+                (reading, rate),
+                measured_before(input_symbols(place), delay),
+                bandwidth,
+            )
         return found
 
     def _add(self, terms: Sequence[list[sp.Expr]], along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
@@ -478,8 +429,3 @@ def _read_by_laws(rig: Rig) -> frozenset[sp.Symbol]:
     laws += [*mechanism.signals.values(), *(state.rate for state in mechanism.states)]
     laws += [*(joint.force for joint in mechanism.joints), *(sensor.reads for sensor in mechanism.sensors)]
     return frozenset().union(*(law.free_symbols for law in laws))
-
-
-def state_symbol(effect: Effect, symbol: sp.Symbol) -> sp.Symbol:
-    """Return the symbol of an effect's state within a structure; two effects may both call theirs z."""
-    return sp.Symbol(f"{effect.name}.{symbol.name}", real=True)

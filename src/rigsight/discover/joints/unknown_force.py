@@ -8,7 +8,7 @@ from rigsight.effects import Effect
 from rigsight.effects.effect import Energy, GainTrend, Place, Signature, State
 from rigsight.rigs import Joint
 from rigsight.simulate import Structure
-from rigsight.simulate.signal_path import state_symbol
+from rigsight.simulate.binder import state_symbol
 from rigsight.simulate.structure import input_symbols
 
 _FORCE = sp.Symbol("missing_force", real=True)

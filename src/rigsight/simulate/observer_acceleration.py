@@ -1,0 +1,59 @@
+"""By which acceleration does an observer follow what a sensor showed?
+
+Accelerations and not forces, so that how closely it follows does not depend on the parameters of the rig.
+An error e of a reading dies away by ``e'' + sqrt(2) w e' + w^2 e = 0``: the optimal observer of a free mass on which white noise
+acts as a force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from rigsight.rigs import Coordinate
+
+
+def measured_before(shown: Sequence[sp.Expr], delay: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Return value and rate of a measured motion before a delay, by its Taylor series.
+
+    Parameters
+    ----------
+    shown
+        What was measured, and its first and second derivative by time.
+    delay
+        Time by which the sensor is late [s].
+    """
+    value, rate, curvature = shown
+    return value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature
+
+
+def observer_acceleration(
+    free: Sequence[Coordinate],
+    reads: sp.Expr,
+    shown: tuple[sp.Expr, sp.Expr],
+    measured: tuple[sp.Expr, sp.Expr],
+    bandwidth: sp.Expr,
+) -> sp.Matrix:
+    """Return the accelerations of the free coordinates that let the error of one sensor die away, shape (n_degrees, 1).
+
+    Parameters
+    ----------
+    free
+        Coordinates that move freely.
+    reads
+        What the sensor reads of them, without its effects; a velocity or a position.
+    shown
+        What it shows without a delay, its effects included, and the rate of that.
+    measured
+        What it showed, and the rate of that.
+    bandwidth
+        Up to which the observer follows [rad/s].
+    """
+    slopes = sp.Matrix([sp.diff(reads, c.rate) for c in free])
+    if any(slope != 0 for slope in slopes):
+        wanted = bandwidth * (measured[0] - shown[0])
+    else:
+        slopes = sp.Matrix([sp.diff(reads, c.symbol) for c in free])
+        wanted = bandwidth**2 * (measured[0] - shown[0]) + sp.sqrt(2) * bandwidth * (measured[1] - shown[1])
+    return slopes * (wanted / slopes.dot(slopes))
