@@ -15,6 +15,7 @@ model", 16th IFAC Symposium on System Identification (2012).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,15 +103,15 @@ def local_polynomial_response(
         record,
         source,
         response,
-        order,
-        0,
-        bandwidth,
-        transient,
-        hold,
-        band,
-        wanted,
-        instrument,
-        "local polynomial",
+        order=order,
+        poles=0,
+        bandwidth=bandwidth,
+        transient=transient,
+        hold=hold,
+        band=band,
+        wanted=wanted,
+        instrument=instrument,
+        method="local polynomial",
     )
 
 
@@ -176,22 +177,37 @@ def local_rational_response(
         record,
         source,
         response,
-        order,
-        order,
-        bandwidth,
-        transient,
-        hold,
-        band,
-        wanted,
-        instrument,
-        "local rational",
+        order=order,
+        poles=order,
+        bandwidth=bandwidth,
+        transient=transient,
+        hold=hold,
+        band=band,
+        wanted=wanted,
+        instrument=instrument,
+        method="local rational",
     )
+
+
+@dataclass(frozen=True)
+class _LocalModel:
+    """Lines on each side of one, degree of the polynomials and of the denominator, and whether a transient is told apart."""
+
+    half: int
+    order: int
+    poles: int
+    transient: bool
+
+    @property
+    def width(self) -> int:
+        return 2 * self.half + 1
 
 
 def _local_response(
     record: Record,
     source: str,
     response: str,
+    *,
     order: int,
     poles: int,
     bandwidth: float | None,
@@ -215,7 +231,8 @@ def _local_response(
     half = max(round(bandwidth * span / (4.0 * math.pi)), (unknowns + 1) // 2)
     omega = line_frequencies(record.n_samples, record.dt)
     U, Y = (np.fft.rfft(record[name])[1 : omega.size + 1] for name in (source, response))
-    width = 2 * half + 1
+    model = _LocalModel(half, order, poles, transient)
+    width = model.width
     if width > U.size:
         raise InputError(
             f"{what} has {U.size} spectral lines, fewer than the {width} of one local band: record more samples."
@@ -232,9 +249,9 @@ def _local_response(
             )
     chunks = [lines[start : start + _CHUNK] for start in range(0, lines.size, _CHUNK)]
     if instrument is None:
-        parts = [_solve(U, Y, chunk, half, order, poles, transient) for chunk in chunks]
+        parts = [_solve(U, Y, chunk, model) for chunk in chunks]
     else:
-        ratios = [_solve_ratio(R, U, Y, chunk, half, order, poles, transient) for chunk in chunks]
+        ratios = [_solve_ratio(R, U, Y, chunk, model) for chunk in chunks]
         answers = np.concatenate([clearness for *_, clearness in ratios]) >= _ANSWERS
         power = np.abs(R[lines]) ** 2
         if power @ answers < 0.5 * np.sum(power):
@@ -315,13 +332,10 @@ def _solve(
     U: NDArray[np.complex128],
     Y: NDArray[np.complex128],
     lines: NDArray[np.intp],
-    half: int,
-    order: int,
-    poles: int,
-    transient: bool,
+    model: _LocalModel,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp]]:
     """Return the values at some lines, and what the noise of which lines has in them."""
-    fit, picked = _fit(U, Y, lines, half, order, poles, transient)
+    fit, picked = _fit(U, Y, lines, model)
     return fit.coefficient(0), fit.shares(0) * np.sqrt(fit.noise)[:, None], picked
 
 
@@ -330,17 +344,14 @@ def _solve_ratio(
     U: NDArray[np.complex128],
     Y: NDArray[np.complex128],
     lines: NDArray[np.intp],
-    half: int,
-    order: int,
-    poles: int,
-    transient: bool,
+    model: _LocalModel,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.intp], NDArray[np.float64]]:
     """Return what `_solve` returns, of the response to R over that of U, and the power of the latter over its variance.
 
     The noise of one line in both counts as one, with the phase that it has in the response: what feedback brings into both
     cancels as it does in the ratio.
     """
-    (below, picked), (above, _) = (_fit(R, S, lines, half, order, poles, transient) for S in (U, Y))
+    (below, picked), (above, _) = (_fit(R, S, lines, model) for S in (U, Y))
     denominator = below.coefficient(0)
     # Silent by chance, it is a value of no weight and no fault.
     denominator = np.where(denominator == 0.0, np.finfo(np.float64).tiny, denominator)
@@ -361,21 +372,17 @@ def _fit(
     U: NDArray[np.complex128],
     Y: NDArray[np.complex128],
     lines: NDArray[np.intp],
-    half: int,
-    order: int,
-    poles: int,
-    transient: bool,
+    model: _LocalModel,
 ) -> tuple[LocalFit, NDArray[np.intp]]:
     """Return the local models around some lines, and the lines of each; at the ends of the spectrum a band is one-sided."""
-    width = 2 * half + 1
-    first = np.clip(lines - half, 0, U.size - width)
-    picked = first[:, None] + np.arange(width)
-    r = (picked - lines[:, None]) / half
-    powers = r[..., None] ** np.arange(order + 1)
+    first = np.clip(lines - model.half, 0, U.size - model.width)
+    picked = first[:, None] + np.arange(model.width)
+    r = (picked - lines[:, None]) / model.half
+    powers = r[..., None] ** np.arange(model.order + 1)
     near_U, near_Y = U[picked][..., None], Y[picked][..., None]
     terms = [powers * near_U]
-    if transient:
+    if model.transient:
         terms.append(powers.astype(np.complex128))
-    if poles:
-        terms.append(-(r[..., None] ** np.arange(1, poles + 1)) * near_Y)
+    if model.poles:
+        terms.append(-(r[..., None] ** np.arange(1, model.poles + 1)) * near_Y)
     return LocalFit(np.concatenate(terms, axis=-1), near_Y[..., 0]), picked

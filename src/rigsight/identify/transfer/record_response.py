@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -121,55 +122,64 @@ def record_response(
     unused = ""
     if instrument is not None and method not in _BAND_LINES:
         unused, instrument = f"The method '{method}' has no use for it; local_rational has.", None
-    periodic, note = _mean_period(record, instrument)
-    span = periodic.n_samples * periodic.dt
-    line = 2.0 * math.pi / span
     coherence = _coherence(record, source, response, hold) if with_coherence else None
-    shared = 1.0
     if method == "thesis":
-        found, width = _thesis(periodic, source, response, order), line
+        periodic, note = _mean_period(record, None)
+        found, width, shared = _noted(_thesis(periodic, source, response, order), note), _line(periodic), 1.0
     elif method == "h1":
-        width = resolution or _SEGMENTS * 2.0 * math.pi / (record.n_samples * record.dt)
+        width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
     else:
-        lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
-        local = local_rational_response if method == "local_rational" else local_polynomial_response
-        bandwidth = resolution or lines * line
+        local = partial(_local, record, source, response, method, resolution, hold, wanted, least_clearness)
         try:
-            found = local(
-                periodic,
-                source,
-                response,
-                bandwidth=bandwidth,
-                transient=periodic is record,
-                hold=hold,
-                wanted=wanted,
-                instrument=instrument,
-            )
+            found, width, shared = local(instrument)
         except InputError as error:
             if instrument is None:
                 raise
-            direct = record_response(
-                record,
-                source,
-                response,
-                order,
-                method,
-                resolution,
-                hold,
-                band,
-                least_clearness,
-                with_coherence,
-                wanted,
-            )
-            return replace(direct, unused_instrument=str(error))
-        width, shared = line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
-        found = _clear(found, lines, least_clearness)
-    if note:
-        found = replace(found, method=f"{found.method}, {note}")
+            unused = str(error)
+            found, width, shared = local(None)
     if band is not None:
         found = found.band(*band)
     return RecordResponse(found, shared, width, _PEAK_LINES[method] * width, coherence, unused)
+
+
+def _line(record: Record) -> float:
+    """Return the distance of a record's spectral lines [rad/s]."""
+    return 2.0 * math.pi / (record.n_samples * record.dt)
+
+
+def _local(
+    record: Record,
+    source: str,
+    response: str,
+    method: Method,
+    resolution: float | None,
+    hold: Hold,
+    wanted: NDArray[np.float64] | None,
+    least_clearness: float,
+    instrument: str | None,
+) -> tuple[FrequencyResponse, float, float]:
+    """Return what a local method shows, its resolution [rad/s] and its lines per independent value."""
+    periodic, note = _mean_period(record, instrument)
+    line = _line(periodic)
+    lines = max(_BAND_LINES[method], round((resolution or 0.0) / line))
+    local = local_rational_response if method == "local_rational" else local_polynomial_response
+    found = local(
+        periodic,
+        source,
+        response,
+        bandwidth=resolution or lines * line,
+        transient=periodic is record,
+        hold=hold,
+        wanted=wanted,
+        instrument=instrument,
+    )
+    clear = _noted(_clear(found, lines, least_clearness), note)
+    return clear, line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
+
+
+def _noted(found: FrequencyResponse, note: str) -> FrequencyResponse:
+    return replace(found, method=f"{found.method}, {note}") if note else found
 
 
 def _mean_period(record: Record, instrument: str | None) -> tuple[Record, str]:
@@ -188,7 +198,7 @@ def _mean_period(record: Record, instrument: str | None) -> tuple[Record, str]:
 
 
 def _coherence(record: Record, source: str, response: str, hold: Hold) -> FrequencyResponse | None:
-    width = _SEGMENTS * 2.0 * math.pi / (record.n_samples * record.dt)
+    width = _SEGMENTS * _line(record)
     try:
         return averaged_response(record, source, response, width, hold=hold)
     except InputError:
