@@ -10,10 +10,10 @@ import numpy as np
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.excitation import linear_sweep, log_sweep
 from rigsight.records.record import Record
-from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
+from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.units import characteristic_value
-from rigsight.workflow.own.effect_promises import AXIS_BENCH, GEAR_BENCH, bench_of, sizes
+from rigsight.workflow.own.effect_promises import bench_of, sizes
 
 DT = 5e-3
 N_SAMPLES = 200
@@ -31,8 +31,8 @@ class Draw:
     record: Record
 
 
-def record_for(rng: np.random.Generator, omega: float, hold: str) -> Record:
-    """Return a random input around the rig's angular frequency [rad/s]: a sweep, a sum of sines or a staircase."""
+def record_for(rng: np.random.Generator, omega: float, hold: str, driven: str) -> Record:
+    """Return a random input of that name around the rig's angular frequency [rad/s]: a sweep, a sum of sines or a staircase."""
     dt = float(rng.uniform(0.02, 0.12)) / omega
     t = dt * np.arange(N_SAMPLES)
     kind = rng.integers(3)
@@ -45,7 +45,7 @@ def record_for(rng: np.random.Generator, omega: float, hold: str) -> Record:
         frequencies = rng.uniform(first, last, 4)
         u = sum(np.sin(w * t + rng.uniform(0.0, 6.3)) for w in frequencies) / 2.0
         u = u - u[0]
-    return Record("draw", dt, {"u": np.asarray(u)}, {"u": "input"}, hold=hold)
+    return Record("draw", dt, {driven: np.asarray(u)}, {driven: "input"}, hold=hold)
 
 
 def draws(effect: Effect, count: int, seed: int) -> Iterator[Draw]:
@@ -63,16 +63,14 @@ def draws(effect: Effect, count: int, seed: int) -> Iterator[Draw]:
     rng = np.random.default_rng([seed, CATALOGUE.index(effect)])
     bench = bench_of(effect)
     rig: Rig = bench.rig
-    omega = 1.0
     structure = compose(rig, [effect])
     while count:
         values = dict(bench.values)
         for name in ("m", "d", "k", "J_z", "k_c", "k_d"):
             if name in values:
                 values[name] *= float(np.exp(rng.uniform(-1.0, 1.0)))
-        inertia, stiffness = (values["m"], values["k"]) if rig is AXIS else (values["J_z"], values["k_c"])
-        omega = float(np.sqrt(stiffness / inertia))
-        record = record_for(rng, omega, ("foh", "zoh")[int(rng.integers(2))])
+        omega = _frequency(values)
+        record = record_for(rng, omega, ("foh", "zoh")[int(rng.integers(2))], rig.inputs[0].name)
         scales = sizes(type(bench)(rig, values, bench.output, values, bench.free), record)
         own = {p.name: _drawn(rng, p) * characteristic_value(p.dimension, scales) for p in effect.parameters}
         own |= {p.name: p.default or 0.0 for p in effect.parameters if not p.fitted}
@@ -87,6 +85,14 @@ def draws(effect: Effect, count: int, seed: int) -> Iterator[Draw]:
         yield Draw(effect.name, structure, {**values, **named}, record)
 
 
+def _frequency(values: dict[str, float]) -> float:
+    """Return the angular frequency of a rig's own motion [rad/s]; a motion that is prescribed has none, and 1 rad/s does."""
+    for inertia, stiffness in (("m", "k"), ("J_z", "k_c")):
+        if inertia in values:
+            return float(np.sqrt(values[stiffness] / values[inertia]))
+    return 1.0
+
+
 def _drawn(rng: np.random.Generator, p) -> float:
     low, high = p.search
     if not (np.isfinite(low) and np.isfinite(high)):
@@ -98,7 +104,3 @@ def _drawn(rng: np.random.Generator, p) -> float:
         side = high if high > 0.0 else low
         return float(np.clip(side * 10.0 ** rng.uniform(-3.0, 0.0), low, high))
     return float(rng.uniform(low, high))
-
-
-BENCHES = (AXIS_BENCH, GEAR_BENCH)
-RIGS = (AXIS, RUNNING_GEAR)

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from rigsight.simulate import Structure
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.kinks import freeze
-from rigsight.simulate.structure import INPUT, INPUT_RATE, TIME
+from rigsight.simulate.structure import TIME, input_symbols
 
 Floats = NDArray[np.float64]
 RTOL = 1e-11
@@ -43,7 +43,8 @@ class Truth:
         frozen = freeze(structure)
         numbers = dict(zip(structure.parameter_symbols, map(float, p), strict=True))
         states = list(structure.states)
-        signals = [INPUT, INPUT_RATE, TIME]
+        self._states = states
+        signals = [*input_symbols(0), TIME]
 
         def compiled(expressions: Any, modes: bool) -> Any:
             arguments = [signals, states, list(frozen.modes)] if modes else [signals, states]
@@ -84,7 +85,8 @@ class Truth:
         for t in times[1:]:
             if t - merged[-1] > 1e-9 * dt:
                 merged.append(t)
-        y = np.array(state, dtype=float)
+        # A model without states is begun with a stand-in for them.
+        y = np.array(state[: len(self._states)], dtype=float)
         self._row = self._row_at(0.0)
         self._read_signs(0.0, y, jump=True)
         start_rate = self._rates(self._signals(0.0), y, self._modes)
@@ -109,11 +111,11 @@ class Truth:
         """Return the row of the input's coefficients that holds at a time."""
         return int(np.floor((t - self._delay) / self._held.interval)) + 1 if t >= self._delay else 0
 
-    def _signals(self, t: float) -> tuple[float, float, float]:
+    def _signals(self, t: float) -> tuple[float, float, float, float]:
         c = self._held.coefficients[min(self._row, self._held.n_pieces)]
         tau = t - self._delay - (self._row - 1) * self._held.interval if self._row else 0.0
         value = c[0] + tau * (c[1] + tau * (c[2] + tau * c[3]))
-        return value, c[1] + tau * (2.0 * c[2] + 3.0 * tau * c[3]), t
+        return value, c[1] + tau * (2.0 * c[2] + 3.0 * tau * c[3]), 2.0 * c[2] + 6.0 * tau * c[3], t
 
     def _read(self, t: float, y: Floats) -> float:
         return float(self._reading(self._signals(t), y)[0])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.signal import cont2discrete
 
 from rigsight.effects import effect_named
 from rigsight.errors import SimulationError
@@ -94,6 +95,33 @@ def prepared(structure, values, record):
     held = record_input(structure, record)
     p = parameter_vector(structure, values)
     return held, p, rest_state(structure, p, held)
+
+
+LIGHT = {"gain": 1.0, "m": 1e-3, "d": 0.03, "k": 1e4, "x_off": 0.0, "force_off": 0.0}
+"""Swings ten times between two samples at 50 Hz."""
+
+
+def test_a_rig_that_swings_many_times_between_two_samples(make_record, error_of):
+    structure = compose(AXIS, [effect_named("actuator_lag")])
+    record = make_record(np.sin(3.0 * 0.02 * np.arange(200)), dt=0.02, hold="zoh")
+    simulated = simulate(structure, {**LIGHT, "T_a": 0.01}, record)["x"]
+    m, d, k = (LIGHT[name] for name in "mdk")
+    rates = np.array([[0.0, 1.0, 0.0], [-k / m, -d / m, 1.0 / m], [0.0, 0.0, -100.0]])
+    step = cont2discrete((rates, np.array([[0.0], [0.0], [100.0]]), np.eye(3), np.zeros((3, 1))), 0.02)
+    state, exact = np.zeros(3), np.zeros(record.n_samples)
+    for i, u in enumerate(record["u"][:-1]):
+        state = step[0] @ state + step[1][:, 0] * u
+        exact[i + 1] = state[0]
+    assert error_of(simulated, exact) <= 1e-6
+
+
+def test_sliders_of_a_light_rig_hold_it(make_record, error_of):
+    structure = compose(AXIS, [effect_named("iwan_hysteresis")])
+    record = make_record(0.06 * np.sin(3.0 * 0.02 * np.arange(60)), dt=0.02, hold="zoh")
+    values = {**LIGHT, "m": 8e-4, "d": 6e-3, "k": 1e3, "a": 1e-3, "x_s": 1.7e-3, "q": -0.7}
+    held, p, state = prepared(structure, values, record)
+    fixed = simulate_sets(structure, held, p[:, None], state[:, None], record.n_samples, 2000)[:, 0, 0]
+    assert error_of(simulate_outputs(structure, held, p, state, record.n_samples)[:, 0], fixed) <= 1e-5
 
 
 def test_lanes_converge_to_the_truth(hysteretic, hysteresis_sets, sweep, truths, make_record, error_of):
