@@ -20,6 +20,9 @@ WISH = 1e-6
 NUDGE = 1e-9
 """Shift of the states at the start, in units of their size, whose growth says how sensitive a motion is by itself."""
 
+FINE_STEPS = 200
+"""Least steps of DOP853 between samples where the engine differs from it: which of the two misses something?"""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -32,7 +35,7 @@ class Trial:
 
 
 def relative(difference: NDArray[np.float64], of: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(difference**2) / (np.mean((of - of[0]) ** 2) + 1e-300)))
+    return float(np.sqrt(np.nanmean(difference**2) / (np.nanmean((of - of[0]) ** 2) + 1e-300)))
 
 
 def tried(number: int, draw: Draw) -> Trial:
@@ -48,6 +51,9 @@ def tried(number: int, draw: Draw) -> Trial:
     sizes = np.full(state.size, max(float(np.ptp(finest)), 1e-30))
     try:
         exact = Truth(structure, p, held, sizes).reading(state, n_samples)
+        if relative(simulated - exact, exact) > WISH:
+            longest = held.interval / FINE_STEPS
+            exact = Truth(structure, p, held, sizes, longest).reading(state, n_samples)
     except ArithmeticError as error:
         return Trial(number, None, 0.0, f"DOP853: {error}")
     error = relative(simulated - exact, exact)
@@ -69,8 +75,9 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--effects", nargs="+", default=[effect.name for effect in CATALOGUE])
     chosen = parser.parse_args()
-    names = [effect.name for effect in CATALOGUE]
+    names = chosen.effects
     rows, misses, left_out = [], [], []
     results = Parallel(n_jobs=chosen.jobs, return_as="generator")(
         delayed(of_effect)(name, chosen.draws, chosen.seed) for name in names

@@ -37,9 +37,13 @@ class Truth:
         Input between its samples.
     sizes
         Size of each state, in which an absolute error is counted, shape (n_states,).
+    longest
+        Longest step [s]. A friction that rises over a tiny velocity acts for so short a time that long steps miss it.
     """
 
-    def __init__(self, structure: Structure, p: Floats, held: HeldInput, sizes: Floats) -> None:
+    def __init__(
+        self, structure: Structure, p: Floats, held: HeldInput, sizes: Floats, longest: float = np.inf
+    ) -> None:
         frozen = freeze(structure)
         numbers = dict(zip(structure.parameter_symbols, map(float, p), strict=True))
         states = list(structure.states)
@@ -67,12 +71,13 @@ class Truth:
         self._delay = 0.0 if structure.delay is None else float(structure.delay.xreplace(numbers))
         late = structure.measured_late
         self._late = 0.0 if late is None else float(late.xreplace(numbers))
+        self._longest = longest
         self._modes = [1.0] * len(frozen.modes)
         self._largest = np.zeros(len(frozen.modes) + (0 if self._friction is None else 2))
         self._holds = False
 
     def reading(self, state: Floats, n_samples: int) -> Floats:
-        """Return the first output at each sample, shape (n_samples,), from the states at the start."""
+        """Return the first output at each sample, shape (n_samples,), from the states at the start; NaN behind the record."""
         dt = self._held.interval * self._held.per_sample
         end = dt * (n_samples - 1)
         shift = self._delay
@@ -102,6 +107,10 @@ class Truth:
             if t <= 0.0:
                 # Before the record the motion went on as it started.
                 out[k] = found[0] + (start_rate[0] * t if self._late else 0.0)
+                continue
+            if t > end + 1e-9 * dt:
+                # An early reading shows what comes behind the record, of which the input says nothing.
+                out[k] = np.nan
                 continue
             place = min(bisect.bisect_left(merged, t - 1e-9 * dt), len(merged) - 1)
             out[k] = found[place]
@@ -169,7 +178,7 @@ class Truth:
         for _ in range(_MOST_EVENTS):
             if end - t <= 1e-13 * (end - t + 1.0) or end <= t:
                 return y
-            solver = DOP853(self._slopes, t, y, end, rtol=RTOL, atol=self._atol)
+            solver = DOP853(self._slopes, t, y, end, max_step=self._longest, rtol=RTOL, atol=self._atol)
             event = None
             while event is None and solver.status == "running":
                 solver.step()
