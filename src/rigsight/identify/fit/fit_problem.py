@@ -32,7 +32,12 @@ from rigsight.simulate import (
 MOST_SUBSTEPS = 16
 """A model that is too stiff for this many is fitted with them all the same: its residuals are recomputed accurately."""
 _WORTH_REFINING = 1e-3
-"""Share of the cost that finer steps must promise to remove."""
+"""Share of the cost that finer steps must promise to remove, of a model near the noise floor."""
+_MOST_WORTH = 1e-2
+"""The same of a model that is far above it, half a percent of its error: a time constant that samples do not show is pushed to
+zero for ever smaller gains, in ever finer steps, and from there many a candidate cannot be simulated."""
+_FAR = 10.0
+"""Error in units of the noise that is far above it: benches of the catalogue are judged from ten floors on."""
 _WORSE = 1e3
 _DIVERGED = 1e100
 """Sum of squares, in units of the noise, of a simulation that left the range in which an optimizer can compare numbers."""
@@ -121,11 +126,15 @@ class Problem:
         within_reach = self._removable(theta)
         self.substeps = [n.with_most(min(2 * n, MOST_SUBSTEPS)) for n in before]
         self._last = None
-        if self.substeps != before and self._removable(theta) > within_reach + _WORTH_REFINING:
+        if self.substeps != before and self._removable(theta) > within_reach + self._worth_refining(theta):
             self._best = float("inf")
             return True
         self.substeps, self._last = before, None
         return False
+
+    def _worth_refining(self, theta: NDArray[np.float64]) -> float:
+        n_samples = sum(np.count_nonzero(np.isfinite(record.measured)) for record in self.data.records)
+        return _MOST_WORTH if self.at(theta).cost > _FAR**2 * n_samples else _WORTH_REFINING
 
     def _removable(self, theta: NDArray[np.float64]) -> float:
         """Return the share of the cost that a full Gauss-Newton step promises to remove."""

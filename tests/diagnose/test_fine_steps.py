@@ -1,0 +1,26 @@
+"""In how fine steps does a fit follow a time constant that the samples do not show?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.preparation import workbench_of
+from rigsight.diagnose.windows import Windowing
+from rigsight.identify import IdleThreads
+from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.diagnose import task_of
+
+
+def test_a_mass_that_samples_do_not_show_is_not_followed_to_zero(shared_data: Path) -> None:
+    # At 50 samples a second the pole of a measured servo went to -1073 rad/s, in 16 steps a sample, for a thousandth of the cost.
+    task = task_of(read_campaign(shared_data / "so101" / "elbow" / "campaign.toml"))
+    noise = {floor.output: floor.std for floor in noise_floors(task.rig, task.records)}
+    bench = workbench_of(task, noise, Windowing(), None, IdleThreads())
+    linear = fit_linear(bench, bench.start)
+    assert max(linear.fit.substeps) <= 4
+    finest = bench.problem(linear.fit.structure, bench.estimation).fit(
+        linear.fit.values, linear.fit.free, linear.fit.initial_states, substeps=[16] * len(bench.estimation)
+    )
+    assert linear.fit.cost < 1.005 * finest.cost
