@@ -92,6 +92,6 @@ def scored() -> MakeScored:
             covariance=np.eye(n_free),
             residuals=columns,
         )
-        return Scored(chosen, fit, columns, (), excess)
+        return Scored(chosen, fit, fit, excess)
 
     return make

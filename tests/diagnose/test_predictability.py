@@ -28,7 +28,7 @@ def model_of(effects: dict[str, dict[str, float]]) -> tuple[Workbench, Scored]:
     noise = {"x": NOISE}
     bench = Workbench(AXIS, (record,), (record,), (record,), scales, noise, frozenset())
     fit = GreyBoxFit(structure, [record], scales, noise).fit(values, [])
-    return bench, Scored(structure.effects, fit, fit.residuals, fit.initial_states, fit.weighted_rms)
+    return bench, Scored(structure.effects, fit, fit, fit.weighted_rms)
 
 
 def growth(effects: dict[str, dict[str, float]]) -> float:

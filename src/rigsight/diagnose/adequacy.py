@@ -53,6 +53,8 @@ _KNOTS = (0.02, 0.15, 0.35, 0.5, 0.65, 0.85, 0.98)
 _PUSH = 1e-3
 """Size of a push in units of the typical force, signal or reading at its place: the answer is proportional."""
 _TIMES = 4
+_TOO_FAST = "motion that is too fast for the sample time"
+"""What a model is blamed for whose steps between two samples cannot be as short as its motion needs: nothing of it can be compared."""
 
 
 @dataclass(frozen=True)
@@ -138,8 +140,9 @@ def adequacy(
         p-value below which it is not adequate.
     """
     records = bench.records
-    fit = bench.problem(model.fit.structure, records).fit(model.fit.values, [])
-    answers = Answers(bench, records, fit, model.effects, model.fit.free)
+    answers = Answers(bench, records, bench.on_all_records(model), model.effects, model.fit.free)
+    if not answers.can_be_compared:
+        return Adequacy(0.0, (Agreement(_TOO_FAST, "", 0.0, 1.0),), significance=significance)
     innovations = Innovations(answers)
     seen_left, new = answers.seen_left, innovations.of(answers.seen_left)
     stretches = _stretches(answers, _STRETCHES)

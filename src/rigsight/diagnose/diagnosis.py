@@ -290,7 +290,7 @@ def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate
     units = {p.name: p.unit for p in model.fit.structure.parameters}
     measured = _measured(bench.rig, bench.scoring)
     fitted = _measured(bench.rig, bench.estimation)
-    estimation = Scored(model.effects, model.fit, model.fit.residuals, (), 0.0)
+    estimation = Scored(model.effects, model.fit, model.fit, 0.0)
     return Candidate(
         effects=model.names,
         where=tuple(bench.rig.where(effect) for effect in model.effects),

@@ -41,8 +41,9 @@ class OtherForms:
         """Return by how much the mean square error of a single effect, in units of the noise floor, falls with another form."""
         (name,) = single.names
         if name not in self._known:
-            fit = self._bench.problem(single.fit.structure, self._bench.scoring).fit(single.fit.values, [])
-            answers = Answers(self._bench, self._bench.scoring, fit, single.effects, single.fit.free)
+            answers = Answers(
+                self._bench, self._bench.scoring, single.held_out, single.effects, single.fit.free
+            )
             form = orthonormal(answers.without_free(law_columns(answers, single.effects[0])))
             self._known[name] = float(np.sum((form.T @ answers.left) ** 2)) / answers.n_measured
         return self._known[name]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,24 +44,35 @@ class Scored:
         The effects added.
     fit
         The fit to the estimation records.
-    residuals
-        Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured.
-    initial_states
-        Per scoring record.
+    held_out
+        The same numbers on the scoring records, only initial states fitted; without residuals where they cannot be simulated.
     excess
         RMS of the residuals in units of the noise floor.
     """
 
     effects: tuple[Effect, ...]
     fit: FitResult
-    residuals: tuple[NDArray[np.float64], ...]
-    initial_states: tuple[NDArray[np.float64], ...]
+    held_out: FitResult
     excess: float
+
+    @property
+    def residuals(self) -> tuple[NDArray[np.float64], ...]:
+        """Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured."""
+        return self.held_out.residuals
+
+    @property
+    def initial_states(self) -> tuple[NDArray[np.float64], ...]:
+        """Of the equations, per scoring record."""
+        return self.held_out.rig_states
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
         return tuple(effect.name for effect in self.effects)
+
+    def not_simulated(self) -> Scored:
+        """Return the same as a model that cannot be simulated on the scoring records."""
+        return replace(self, held_out=replace(self.held_out, residuals=()), excess=float("inf"))
 
     @property
     def n_free(self) -> int:
@@ -246,7 +257,19 @@ class Workbench:
         else:
             result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
         excess = result.weighted_rms if result.residuals else float("inf")
-        return Scored(effects, fit, result.residuals, result.rig_states, excess)
+        return Scored(effects, fit, result, excess)
+
+    def on_all_records(self, model: Scored) -> FitResult:
+        """Return what a model leaves of `records`, with the initial states that suit it in each; nothing is fitted anew."""
+        if self.scoring == self.estimation:
+            return model.held_out
+        parts = (model.fit, model.held_out)
+        return replace(
+            model.fit,
+            residuals=tuple(r for part in parts for r in part.residuals),
+            initial_states=tuple(s for part in parts for s in part.initial_states),
+            substeps=tuple(n for part in parts for n in part.substeps),
+        )
 
 
 def _sees_position(effect: Effect) -> bool:

@@ -105,7 +105,7 @@ def _fitted(bench: Workbench, linear: Scored, model: Scored) -> Scored:
     fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[:_MOST_STARTS]]
     usable = [fit for fit in fits if fit.residuals]
     if not usable:
-        return replace(model, residuals=(), excess=float("inf"))
+        return model.not_simulated()
     best = min(usable, key=lambda fit: fit.cost)
     return scored_in_windows(bench, replace(model, fit=best), best.values)
 
@@ -137,4 +137,4 @@ def scored_in_windows(bench: Workbench, model: Scored, values: Mapping[str, floa
     """
     result = bench.problem(model.fit.structure, bench.scoring).fit_windows(values, ())
     excess = result.weighted_rms if result.residuals else float("inf")
-    return replace(model, residuals=result.residuals, initial_states=result.rig_states, excess=excess)
+    return replace(model, held_out=result, excess=excess)

@@ -295,5 +295,5 @@ def _fitted(
         results.append(whole(near.values))
     usable = [result for result in results if result.residuals]
     if not usable:
-        return Scored(effects, results[0], (), (), float("inf"))
+        return Scored(effects, results[0], results[0], float("inf"))
     return bench.score(effects, min(usable, key=lambda result: result.cost), roughly=not promising)

@@ -57,6 +57,6 @@ def _fitted(bench: Workbench, windows: Workbench, linear: Scored, pair: Scored) 
     fits = [problem.fit_windows(fit.values, pair.fit.free) for fit in (pair.fit, *look.fits)]
     usable = [fit for fit in fits if fit.residuals]
     if not usable:
-        return replace(pair, residuals=(), excess=float("inf"))
+        return pair.not_simulated()
     best = min(usable, key=lambda fit: fit.cost)
     return scored_in_windows(windows, replace(pair, fit=best), best.values)

@@ -129,6 +129,11 @@ class Answers:
         edges = np.cumsum([0, *(record.n_samples * self._n_outputs for record in self.records)])
         self.spans = tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(edges))
 
+    @property
+    def can_be_compared(self) -> bool:
+        """False where the equations are too stiff for the steps of a fit, so that no answer to a push is known."""
+        return all(bool(np.all(np.isfinite(out))) for out in self.calm_outputs)
+
     @cached_property
     def seen_left(self) -> Floats:
         """What the equations leave, weighted and stacked."""
