@@ -20,7 +20,7 @@ from rigsight.simulate.simulation import (
     state_vector,
 )
 from rigsight.simulate.structure import Structure
-from rigsight.simulate.substeps import Substeps
+from rigsight.simulate.substeps import Substeps, relative_needs
 
 _CAUTION = 0.6
 """Share of the predicted number of substeps that is tried first."""
@@ -231,11 +231,11 @@ def choose_substeps(
     exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
     size = np.std(exact, axis=0) + 1e-300
     state = np.asarray(initial_state, dtype=np.float64)[:, None]
-    least = 1.0
+    least, needs = 1.0, relative_needs(taken)
     for substeps in (number for number in _SUBSTEPS if number <= most):
         if substeps < least:
             continue
-        steps = Substeps(substeps, taken)
+        steps = Substeps(substeps, needs)
         fast = simulate_sets(structure, held, p[:, None], state, n_samples, steps)[:, :, 0]
         with np.errstate(over="ignore", invalid="ignore"):
             error = float(np.max(np.sqrt(np.mean((fast - exact) ** 2, axis=0)) / size))

@@ -14,32 +14,42 @@ class Substeps(int):
 
     Attributes
     ----------
-    taken
-        Steps of the accurate integrator in each piece, shape (n_pieces,); None where every piece takes the most.
+    needs
+        Steps that each piece needs as a share of the most, see `relative_needs`; None where every piece takes the most.
     """
 
-    taken: NDArray[np.intc] | None
+    needs: NDArray[np.float64] | None
     _schedule: NDArray[np.intc] | None
 
-    def __new__(cls, most: int, taken: NDArray[np.intc] | None = None) -> Substeps:
-        """Make the most steps of a piece, `taken` saying which need as many."""
+    def __new__(cls, most: int, needs: NDArray[np.float64] | None = None) -> Substeps:
+        """Make the most steps of a piece, `needs` saying which need as many."""
         made = super().__new__(cls, most)
-        made.taken = taken
+        made.needs = needs
         made._schedule = None
         return made
 
     def with_most(self, most: int) -> Substeps:
         """Return the same needs with another number of steps at the most."""
-        return Substeps(most, self.taken)
+        return Substeps(most, self.needs)
 
     def per_piece(self, n_pieces: int) -> NDArray[np.intc]:
         """Return the steps of each piece, shape (n_pieces,); all the most where these needs are of another input."""
-        if self.taken is None or self.taken.size != n_pieces:
+        if self.needs is None or self.needs.size != n_pieces:
             return np.full(n_pieces, int(self), dtype=np.intc)
         if self._schedule is None:
-            place = int(_NEEDED_BY * (n_pieces - 1))
-            full = max(float(np.partition(self.taken, place)[place]), 1.0)
             # A product such as 3 * (1 / 3) may lie above the whole number that it is.
-            steps = np.ceil(self.taken * (int(self) / full) - 1e-9)
+            steps = np.ceil(self.needs * int(self) - 1e-9)
             self._schedule = np.asarray(np.clip(steps, 1, int(self)), dtype=np.intc)
         return self._schedule
+
+
+def relative_needs(taken: NDArray[np.intc]) -> NDArray[np.float64]:
+    """Return how many steps pieces need in units of what all but a few of them can do with.
+
+    Parameters
+    ----------
+    taken
+        Steps of the accurate integrator in each piece, shape (n_pieces,).
+    """
+    place = int(_NEEDED_BY * (taken.size - 1))
+    return np.asarray(taken / max(float(np.partition(taken, place)[place]), 1.0))

@@ -363,6 +363,7 @@ class GreyBoxFit:
                     np.nansum((r * d.weights) ** 2) for r, d in zip(residuals, self.data.records, strict=True)
                 )
             )
+        if finish and n_free:
             outputs = [int(np.count_nonzero(d.weights)) for d in self.data.records]
             covariance = colored_covariance(
                 problem.sensitivities(theta), n_free, outputs, problem.derivative_error
