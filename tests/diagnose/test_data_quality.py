@@ -74,7 +74,7 @@ def prepared(
         rig=rig,
         estimation=tuple(estimation),
         scoring=tuple(record for record in records if record.role == "validation"),
-        look=liveliest(estimation, rig.outputs[0].name),
+        look=liveliest(estimation, rig),
         scales=characteristic_scales(rig, estimation, start),
         noise={floor.output: floor.std for floor in noise_floors(rig, records)},
         held=frozenset(),

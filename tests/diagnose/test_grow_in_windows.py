@@ -27,7 +27,7 @@ def benches() -> tuple[Workbench, Workbench]:
     made = []
     for windowing in (Windowing(), Windowing.by_cycles("x", NOISE)):
         fitted, scored = windowing.cut(records[:2]), windowing.cut(records[2:])
-        look = liveliest(fitted, "x")
+        look = liveliest(fitted, AXIS)
         scales = characteristic_scales(AXIS, records, RIG)
         made.append(
             Workbench(AXIS, fitted, scored, look, scales, {"x": NOISE}, frozenset({"gain"}), start=RIG)

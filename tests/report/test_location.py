@@ -9,8 +9,10 @@ from dataclasses import replace
 
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.result import Diagnosis
+from rigsight.discover import JointForce, JointLaw
 from rigsight.report import render_report
 from rigsight.report.location import output_maps, path_rows
+from rigsight.report.wording import missing_force_sentence
 
 
 def render(diagnosis: Diagnosis) -> str:
@@ -86,3 +88,19 @@ def test_a_result_without_places_has_no_such_section(diagnosis: Diagnosis) -> No
     html = render(replace(diagnosis, localization=Localization(), traces=()))
     assert 'id="where"' not in html
     assert 'href="#where"' not in html
+
+
+def joint_force(joint: str, left: float) -> JointForce:
+    return JointForce(joint, "rad", "N m", (), 0.9, left, 1e-3, JointLaw((), 0.0, {}), {}, 1.0)
+
+
+def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagnosis]) -> None:
+    forces = (joint_force("load", 0.95), joint_force("motor", 1.2), joint_force("shaft", 145.0))
+    unknown = replace(variant("unknown"), missing_force=None, joint_forces=forces)
+    assert missing_force_sentence(unknown).startswith(
+        "A missing force at load or motor alone, whatever its course, leaves 0.95 × the noise floor of what all sensors show "
+        "(at shaft 145). No law of the motion of load"
+    )
+    page = words(render(unknown))
+    assert "motor 1.2 × no law of its motion shaft 145 × ruled out by the sensors" in page
+    assert "ruled out by the sensors" not in words(render(variant("effect")))

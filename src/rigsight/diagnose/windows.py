@@ -111,6 +111,12 @@ def leading_output(rig: Rig, records: Sequence[Record]) -> str:
     )
 
 
+def shown_by(rig: Rig, records: Sequence[Record]) -> list[str]:
+    """Return for each record the output whose motion tells its lively stretches: the leading one where it holds that."""
+    leading = leading_output(rig, records)
+    return [leading if leading in record else leading_output(rig, [record]) for record in records]
+
+
 def window_length(rig: Rig, records: Sequence[Record]) -> float:
     """Return a window length [s] that holds several of the typical periods of the velocity.
 

@@ -6,6 +6,7 @@ from rigsight.discover.joints.joint_force import ForceTrace as ForceTrace
 from rigsight.discover.joints.joint_force import JointForce as JointForce
 from rigsight.discover.joints.joint_force import JointLaw as JointLaw
 from rigsight.discover.joints.joint_force import missing_forces as missing_forces
+from rigsight.discover.joints.joint_force import not_contradicted as not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm as LawTerm
 from rigsight.discover.missing_force import MissingForce as MissingForce
 from rigsight.discover.missing_force import missing_force as missing_force
@@ -28,4 +29,5 @@ __all__ = [
     "known_terms",
     "missing_force",
     "missing_forces",
+    "not_contradicted",
 ]

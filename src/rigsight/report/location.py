@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from rigsight import plot
 from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
+from rigsight.discover import not_contradicted
 from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
@@ -87,6 +88,21 @@ def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
             "first" if place.looked_at else "only if the others explain too little",
         )
         for place in diagnosis.places
+    ]
+
+
+def force_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return each joint of a rig that has several, what a force missing there alone would leave, and its law."""
+    agreeing = not_contradicted(diagnosis.joint_forces)
+    return [
+        (
+            force.joint,
+            f"{force.error_over_noise:.3g} {TIMES}",
+            (listed(term.text for term in force.law.terms) or "no law of its motion")
+            if force in agreeing
+            else "ruled out by the sensors",
+        )
+        for force in diagnosis.joint_forces
     ]
 
 
