@@ -8,6 +8,7 @@ import numpy as np
 
 from rigsight.diagnose.workbench import Scored, Workbench, liveliest
 from rigsight.discover import JointForce, MissingForce, missing_force, missing_forces, not_contradicted
+from rigsight.errors import SimulationError
 from rigsight.identify import without_offsets
 from rigsight.rigs import Rig
 
@@ -52,7 +53,13 @@ def forces_at_joints(bench: Workbench, linear: Scored) -> tuple[JointForce, ...]
     if bench.modelled or bench.rig.has_one_motion:
         return ()
     centered = without_offsets(bench.estimation, linear.fit)
-    return missing_forces(bench.rig, liveliest(centered, bench.rig, _TRACED), linear.fit.values, bench.noise)
+    try:
+        return missing_forces(
+            bench.rig, liveliest(centered, bench.rig, _TRACED), linear.fit.values, bench.noise
+        )
+    except (SimulationError, np.linalg.LinAlgError):
+        # What is not known of the cause is no reason to have no diagnosis.
+        return ()
 
 
 def traced_to(rig: Rig, forces: Sequence[JointForce]) -> tuple[str, ...]:

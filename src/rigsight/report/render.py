@@ -92,7 +92,7 @@ def render_report(
             path_sentence=diagnosis.localization.sentence.replace("->", "\u2192"),
             path_rows=location.path_rows(diagnosis),
             place_rows=location.place_rows(diagnosis),
-            maps=location.output_maps(diagnosis),
+            maps=[*location.output_maps(diagnosis), *location.joint_maps(diagnosis)],
             share_rows=location.share_rows(diagnosis),
             ranking=sections.ranking_figure(diagnosis) if diagnosis.candidates else None,
             ranking_rows=sections.ranking_rows(diagnosis),
