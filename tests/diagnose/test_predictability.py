@@ -63,7 +63,7 @@ def test_each_input_is_disturbed_and_each_sensor_looked_at(two_masses: Rig) -> N
         scales = characteristic_scales(two_masses, [record], values)
         bench = Workbench(two_masses, (record,), (record,), (record,), scales, noise, frozenset())
         fit = GreyBoxFit(structure, [record], scales, noise).fit(values | own, [])
-        models.append(Scored(structure.effects, fit, fit.residuals, fit.initial_states, fit.weighted_rms))
+        models.append(Scored(structure.effects, fit, fit, fit.weighted_rms))
     linear, with_play = models
     rng = np.random.default_rng(0)
     assert growth_of_disturbances(bench, linear, linear, rng) == pytest.approx(1.0, rel=1e-6)
