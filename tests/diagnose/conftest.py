@@ -14,9 +14,58 @@ from rigsight.effects import Effect, effect_named
 from rigsight.identify import FitResult
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS, RIGS, Rig
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 
 MakeScored = Callable[..., Scored]
+TWO_MASSES = """
+name = "two_masses"
+summary = "Two carts, each with a motor, and a spring between them."
+[inputs.f_1]
+unit = "N"
+[inputs.f_2]
+unit = "N"
+[parameters.m]
+unit = "kg"
+[parameters.k]
+unit = "N/m"
+[parameters.c]
+unit = "N/m"
+[parameters.d]
+unit = "N s/m"
+[coordinates.x_1]
+unit = "m"
+[coordinates.x_2]
+unit = "m"
+[energy]
+kinetic = "m*d(x_1)^2/2 + m*d(x_2)^2"
+[joints.first]
+motion = "x_1"
+stiffness = "k"
+damping = "d"
+[joints.between]
+motion = "x_1 - x_2"
+stiffness = "c"
+damping = "d"
+[joints.second]
+motion = "x_2"
+stiffness = "k"
+damping = "d"
+[drives.motor_1]
+signal = "f_1"
+force = "motor_1"
+along = "x_1"
+[drives.motor_2]
+signal = "f_2"
+force = "motor_2"
+along = "x_2"
+[sensors.first_place]
+reads = "x_1"
+unit = "m"
+[sensors.second_place]
+reads = "x_2"
+unit = "m"
+"""
 
 
 @dataclass(frozen=True)
@@ -61,6 +110,12 @@ class Train:
 def train() -> Train:
     """Return the drive train."""
     return Train()
+
+
+@pytest.fixture(scope="session")
+def two_masses() -> Rig:
+    """Return a rig of two inputs, two degrees of freedom and two sensors that is linear by itself."""
+    return rig_of_text(TWO_MASSES)
 
 
 @pytest.fixture(scope="session")

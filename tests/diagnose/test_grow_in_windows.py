@@ -25,9 +25,9 @@ def benches() -> tuple[Workbench, Workbench]:
     """The bench of whole records, and that of windows of four cycles."""
     records = measured([effect.name for effect in PAIR], {"g": 1.35e-4, "u_0": 0.1}, 3000)
     made = []
-    for windowing in (Windowing(), Windowing.by_cycles("x", NOISE)):
+    for windowing in (Windowing(), Windowing.by_cycles({"x": NOISE})):
         fitted, scored = windowing.cut(records[:2]), windowing.cut(records[2:])
-        look = liveliest(fitted, "x")
+        look = liveliest(fitted, AXIS)
         scales = characteristic_scales(AXIS, records, RIG)
         made.append(
             Workbench(AXIS, fitted, scored, look, scales, {"x": NOISE}, frozenset({"gain"}), start=RIG)

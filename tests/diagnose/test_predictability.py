@@ -7,11 +7,11 @@ import pytest
 
 from rigsight.diagnose.predictability import growth_of_disturbances
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.effects import effect_named
+from rigsight.effects import effect_named, placed
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records.record import Record
-from rigsight.rigs import AXIS
+from rigsight.rigs import AXIS, Rig
 from rigsight.simulate import compose, simulate
 
 DT, NOISE = 0.01, 1e-5
@@ -47,3 +47,24 @@ def test_a_stiffer_spring_is_no_less_predictable() -> None:
 
 def test_play_lets_a_disturbance_choose_another_motion() -> None:
     assert growth({"backlash": {"g": 5e-3}}) > 3.0
+
+
+def test_each_input_is_disturbed_and_each_sensor_looked_at(two_masses: Rig) -> None:
+    """Nothing ties the masses together: only the second motor reaches the play, and only the second sensor shows it."""
+    values = {"m": 1.0, "k": 40.0, "c": 0.0, "d": 1.0}
+    noise = {"first_place": 1e-5, "second_place": 1e-5}
+    t = DT * np.arange(4000)
+    drives = {"f_1": linear_sweep(t, 1.0, 1.0, 20.0), "f_2": linear_sweep(t, 1.0, 2.0, 25.0)}
+    play = placed(effect_named("backlash"), "second")
+    models = []
+    for effects, own in (([], {}), ([play], {"g": 0.01})):
+        structure = compose(two_masses, effects)
+        record = simulate(structure, values | own, Record("sweep", DT, drives, {}, hold="zoh"))
+        scales = characteristic_scales(two_masses, [record], values)
+        bench = Workbench(two_masses, (record,), (record,), (record,), scales, noise, frozenset())
+        fit = GreyBoxFit(structure, [record], scales, noise).fit(values | own, [])
+        models.append(Scored(structure.effects, fit, fit, fit.weighted_rms))
+    linear, with_play = models
+    rng = np.random.default_rng(0)
+    assert growth_of_disturbances(bench, linear, linear, rng) == pytest.approx(1.0, rel=1e-6)
+    assert growth_of_disturbances(bench, linear, with_play, rng) > 3.0

@@ -29,7 +29,7 @@ def windows() -> tuple[Record, ...]:
     run = Record("sweep", DT, {"u": linear_sweep(t, 0.5, 3.0, 40.0)}, {}, role="estimation", hold="zoh")
     clean = simulate(PLAY, TRUTH, run)
     record = clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size))
-    return Windowing.by_cycles("x", NOISE).cut([record])
+    return Windowing.by_cycles({"x": NOISE}).cut([record])
 
 
 def problem_of(windows: tuple[Record, ...]) -> GreyBoxFit:

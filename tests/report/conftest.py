@@ -304,7 +304,7 @@ def variant(diagnosis: Diagnosis) -> Callable[[str], Diagnosis]:
                         None,
                     ),
                 ),
-                AmplitudeDependence("yes", "The frequency response u -> psi changes with the amplitude."),
+                (AmplitudeDependence("yes", "The frequency response u -> psi changes with the amplitude."),),
             ),
         },
         "long": {

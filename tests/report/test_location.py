@@ -9,8 +9,10 @@ from dataclasses import replace
 
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.result import Diagnosis
+from rigsight.discover import JointForce, JointLaw
 from rigsight.report import render_report
-from rigsight.report.location import output_maps, path_rows
+from rigsight.report.location import joint_maps, output_maps, path_rows
+from rigsight.report.wording import missing_force_sentence
 
 
 def render(diagnosis: Diagnosis) -> str:
@@ -86,3 +88,40 @@ def test_a_result_without_places_has_no_such_section(diagnosis: Diagnosis) -> No
     html = render(replace(diagnosis, localization=Localization(), traces=()))
     assert 'id="where"' not in html
     assert 'href="#where"' not in html
+
+
+def joint_force(joint: str, left: float) -> JointForce:
+    return JointForce(joint, "rad", "N m", (), 0.9, left, 1e-3, JointLaw((), 0.0, {}), {}, 1.0)
+
+
+def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagnosis]) -> None:
+    forces = (joint_force("load", 0.95), joint_force("motor", 1.2), joint_force("shaft", 145.0))
+    unknown = replace(variant("unknown"), missing_force=None, joint_forces=forces)
+    assert missing_force_sentence(unknown).startswith(
+        "A missing force at load or motor alone, whatever its course, leaves 0.95 × the noise floor of what all sensors show "
+        "(at shaft 145). No law of the motion of load"
+    )
+    page = words(render(unknown))
+    assert "motor 1.2 × no law of its motion shaft 145 × ruled out by the sensors" in page
+    assert "ruled out by the sensors" not in words(render(variant("effect")))
+
+
+def test_the_maps_of_joints_are_those_that_the_verdict_names_else_all(diagnosis: Diagnosis) -> None:
+    states = diagnosis.localization.by_state
+    at_joints = tuple(replace(part, joint=joint) for joint in ("load", "shaft") for part in states)
+    several = replace(diagnosis, localization=replace(diagnosis.localization, by_state=at_joints))
+    (maps,) = joint_maps(several)
+    assert [figure.key for figure in maps.figures] == ["where-joint-1-states", "where-joint-2-states"]
+    assert "By state of load, along the motion" in maps.figures[0].caption
+    assert "if all that they lack acts at load." in maps.figures[0].caption
+    assert "where-joint-2-states" in render(several)
+    (named,) = joint_maps(replace(several, where=("shaft",)))
+    assert ["By state of shaft" in figure.caption for figure in named.figures] == [True]
+    assert not any(figure.key.endswith("states") for own in output_maps(several) for figure in own.figures)
+
+
+def test_at_the_floor_no_joint_has_a_map(diagnosis: Diagnosis) -> None:
+    unknown = {"force_mean": math.nan, "force_rms": math.nan, "force_noise": math.nan}
+    parts = tuple(replace(part, joint="load", **unknown) for part in diagnosis.localization.by_state)
+    assert joint_maps(replace(diagnosis, localization=replace(diagnosis.localization, by_state=parts))) == []
+    assert joint_maps(diagnosis) == []

@@ -19,10 +19,13 @@ from rigsight.identify.identification import Identification
 from rigsight.records.record import Record, Role
 from rigsight.report.identification import identification_summary
 from rigsight.rigs import RIGS, Rig, read_rig_file, rig_file_text
+from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaigns.in_memory import make_campaign
 from rigsight.workflow.identification import any_rig
+from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_wishes, identify_campaign, run_identify, write_identification
+from rigsight.workflow.not_yet import check_takes
 
 Floats = NDArray[np.float64]
 DT, N = 0.01, 2000
@@ -382,3 +385,32 @@ def test_a_servo_is_identified_without_any_start_values() -> None:
             < 0.1 * SERVO[parameter.name]
         )
     assert found.changing == ()
+
+
+def test_the_name_of_a_rig_changes_nothing() -> None:
+    """The axis copied into a file of one's own, under a name of one's own, is still the axis."""
+    rng, axis = np.random.default_rng(1), RIGS["axis"]
+    values = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+    record = recorded("one", axis, values, {"u": multisine(rng, 1.0, 60.0)}, rng)
+    stage = rig_of_text(rig_file_text("axis").replace('name = "axis"', 'name = "stage"'))
+    found = {}
+    for rig in (axis, stage):
+        campaign = make_campaign(rig, [record], title="same")
+        check_takes("discover", campaign.rig, campaign.records)
+        found[rig.name] = identify_campaign(campaign, checked_wishes("local_rational", None))
+    own = {name: identification_json(one, {}) for name, one in found.items()}
+    assert own["axis"]["records"][0]["paths"][0]["fit"] is not None
+    for content in own.values():
+        content.pop("rig")
+    assert json.dumps(own["axis"]) == json.dumps(own["stage"])
+
+
+def test_a_rig_of_one_motion_in_other_words_is_refused_where_words_count() -> None:
+    words = (
+        rig_file_text("axis")
+        .replace('name = "axis"', 'name = "stage"')
+        .replace("[parameters.d]", "[parameters.damper]")
+    )
+    stage = rig_of_text(words.replace('damping = "d"', 'damping = "damper"'))
+    with pytest.raises(InputError, match="'stage' of your own yet: of rigs of one motion it takes axis"):
+        check_takes("discover", stage)

@@ -54,7 +54,7 @@ _PUSH = 1e-3
 """Size of a push in units of the typical force, signal or reading at its place: the answer is proportional."""
 _TIMES = 4
 _TOO_FAST = "motion that is too fast for the sample time"
-"""What a model is blamed for whose steps between two samples cannot be as short as its motion needs: nothing of it can be compared."""
+"""What a model is blamed for whose steps between samples cannot be as short as its motion needs: nothing can be compared."""
 
 
 @dataclass(frozen=True)

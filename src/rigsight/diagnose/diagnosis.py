@@ -28,9 +28,9 @@ from rigsight.diagnose.result import (
     Trace,
 )
 from rigsight.diagnose.task import Task
+from rigsight.diagnose.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
 from rigsight.diagnose.windows import WINDOW, readings
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.discover import MissingForce, missing_force
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
@@ -50,6 +50,8 @@ _REFERENCE_USED = (
     "It serves as instrument where the frequency responses of two amplitudes are compared, if the input answers it in both; the "
     "responses in the report do not use it."
 )
+_MOST = 0.5
+"""Share of the squared gap from which a push takes most of it away."""
 _WITHOUT_EFFECT = 0.95
 """Probability given to the equations without an effect where they reach the noise floor."""
 
@@ -136,24 +138,24 @@ def diagnose(
             "another form of it would come as near, so they are not named."
         )
     diagnosis = _assembled(task, found, notes, scored_on, rng)
-    lacking = None
-    if found.judgement.verdict == "unknown":
-        lacking = _missing_force(found.bench, found.linear, task.absent_spring is not None, rng)
-    return replace(diagnosis, data_quality=found.quality, missing_force=lacking)
+    diagnosis = replace(diagnosis, data_quality=found.quality)
+    if found.judgement.verdict != "unknown":
+        return diagnosis
+    forces = forces_at_joints(found.bench, found.linear)
+    if forces:
+        say("missing force at each joint")
+    # A push that takes most of the gap away says more than a force of any course.
+    pushed = max((place.share for place in found.places), default=0.0) >= _MOST
+    return replace(
+        diagnosis,
+        where=diagnosis.where if pushed else traced_to(task.rig, forces) or diagnosis.where,
+        missing_force=force_of_one_motion(found.bench, found.linear, task.absent_spring is not None, rng),
+        joint_forces=forces,
+    )
 
 
 def _least_left(found: Examination) -> float:
     return min(model.excess for model in (found.before, found.linear, *found.ranking.order))
-
-
-def _missing_force(
-    bench: Workbench, linear: Scored, no_spring: bool, rng: np.random.Generator
-) -> MissingForce | None:
-    """Return the shape of what is lacking; beside effects that are modelled already the rig's own terms do not stand alone."""
-    if bench.modelled or not bench.rig.has_one_motion:
-        return None
-    noise = bench.noise[bench.rig.outputs[0].name]
-    return missing_force(bench.rig, bench.estimation, linear.fit.values, bench.scales, noise, rng, no_spring)
 
 
 def _assembled(

@@ -301,8 +301,8 @@ def _grown(
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
     """Return the models in windows of a few cycles."""
-    output = leading_output(task.rig, task.records)
-    windowing = Windowing.by_cycles(output, noise[output])
+    leading = leading_output(task.rig, task.records)
+    windowing = Windowing.by_cycles({leading: noise[leading], **noise})
     bench = workbench_of(task, noise, windowing, models.bench.memory, models.bench.threads)
     linear = fit_linear(bench, models.linear.fit.values)
     singles = fitted_in_windows(bench, linear, models.singles)

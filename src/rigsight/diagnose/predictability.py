@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
@@ -9,6 +11,7 @@ from scipy.signal import lfilter
 from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.errors import SimulationError
+from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.simulate import parameter_vector, record_input, record_values, simulate_outputs
 
@@ -39,40 +42,64 @@ def growth_of_disturbances(
 
     Returns
     -------
-    The largest RMS change of the leading output over a scored record, in units of its noise floor; 1 for the linear equations, 0
-    where a model cannot be simulated.
+    The largest RMS change over a scored record, in units of the noise floor; 1 for the linear equations, 0 where a model cannot
+    be simulated. On a rig with one motion that of the leading output counts; on any other each input is disturbed in turn, and
+    the output that changes most counts.
     """
-    if not bench.rig.is_driven or not bench.rig.inputs:
+    rig = bench.rig
+    if not rig.is_driven or not rig.inputs:
         return 0.0
+    moving = {} if rig.has_one_motion else _sizes_of_inputs(bench)
+    sizes = moving or {rig.inputs[0].name: bench.scales["input"]}
     largest = 0.0
-    for index, record in enumerate(bench.scoring):
-        for _ in range(_DRAWS):
+    for index in range(len(bench.scoring)):
+        for source in list(sizes) * math.ceil(_DRAWS / len(sizes)):
             try:
-                largest = max(largest, _growth(bench, linear, model, index, record, rng))
+                grown = _growth(bench, linear, model, index, source, sizes[source], rng)
             except SimulationError:
                 return 0.0
+            largest = max(largest, grown)
     return largest
 
 
+def _sizes_of_inputs(bench: Workbench) -> dict[str, float]:
+    """Return the spread of each input that moves."""
+    shown = {s.name: np.concatenate([r[s.name] for r in bench.records]) for s in bench.rig.inputs}
+    return {name: float(np.std(samples)) for name, samples in shown.items() if not is_constant(samples)}
+
+
 def _growth(
-    bench: Workbench, linear: Scored, model: Scored, index: int, record: Record, rng: np.random.Generator
+    bench: Workbench,
+    linear: Scored,
+    model: Scored,
+    index: int,
+    source: str,
+    size: float,
+    rng: np.random.Generator,
 ) -> float:
-    source, output = bench.rig.inputs[0].name, leading_output(bench.rig, [record])
-    column = [signal.name for signal in bench.rig.outputs].index(output)
+    rig, record = bench.rig, bench.scoring[index]
+    seen = [signal.name for signal in rig.outputs if signal.name in record]
+    if rig.has_one_motion:
+        seen = [leading_output(rig, [record])]
+    floors = np.array([bench.noise[s.name] if s.name in seen else np.inf for s in rig.outputs])
     pole = np.exp(-record.dt / bench.scales["time"])
     disturbance = lfilter([1.0 - pole], [1.0, -pole], rng.standard_normal(record.n_samples))
-    disturbance *= 1e-3 * bench.scales["input"] / float(np.std(disturbance))
-    through = _change(linear, index, record, source, disturbance, column)
+    disturbance *= 1e-3 * size / float(np.std(disturbance))
+    through = _change(linear, index, record, source, disturbance, floors)
     if through == 0.0:
         return 0.0  # an input that this record's sensors do not see
-    noise = bench.noise[output]
-    return _change(model, index, record, source, disturbance * (noise / through), column) / noise
+    return _change(model, index, record, source, disturbance / through, floors)
 
 
 def _change(
-    model: Scored, index: int, record: Record, source: str, disturbance: NDArray[np.float64], column: int
+    model: Scored,
+    index: int,
+    record: Record,
+    source: str,
+    disturbance: NDArray[np.float64],
+    floors: NDArray[np.float64],
 ) -> float:
-    """Return the RMS change of an output that a disturbance beside the input makes."""
+    """Return the largest RMS change, in noise floors of the outputs, that a disturbance beside an input makes."""
     structure = model.fit.structure
     p = parameter_vector(structure, record_values(structure, model.fit.values, record))
     calm, disturbed = (
@@ -83,7 +110,7 @@ def _change(
             model.initial_states[index],
             record.n_samples,
             _ACCURACY,
-        )[:, column]
+        )
         for extra in (0.0, disturbance)
     )
-    return float(np.sqrt(np.mean((disturbed - calm) ** 2)))
+    return float(np.max(np.sqrt(np.mean((disturbed - calm) ** 2, axis=0)) / floors))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.windows import Windowing, leading_output
+from rigsight.diagnose.windows import Windowing
 from rigsight.diagnose.workbench import Workbench, liveliest, until_rest
 from rigsight.identify import (
     FitMemory,
@@ -39,8 +39,7 @@ def workbench_of(
     """
     start = start_values_of(task)
     fitted = windowing.cut(task.estimation)
-    output = leading_output(task.rig, task.estimation)
-    moving = until_rest(fitted, [signal.name for signal in task.rig.inputs], output)
+    moving = until_rest(fitted, task.rig)
     held = _held(task)
     asked = [p.name for p in task.rig.parameters if p.name not in held]
     scales = characteristic_scales(task.rig, task.estimation, start)
@@ -48,7 +47,7 @@ def workbench_of(
     return Workbench(
         rig=task.rig,
         estimation=fitted,
-        look=liveliest(moving, output),
+        look=liveliest(moving, task.rig),
         scoring=windowing.cut(task.validation or task.estimation),
         scales=scales,
         noise=noise,

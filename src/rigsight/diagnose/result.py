@@ -14,7 +14,7 @@ from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.disturbance import Disturbance
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.remainder import Remainder
-from rigsight.discover import MissingForce
+from rigsight.discover import JointForce, MissingForce
 from rigsight.effects import kind_of
 
 Verdict = Literal["effect", "parameters", "none", "unknown"]
@@ -243,7 +243,9 @@ class Diagnosis:
         Share of the squared gap of the re-identified equations that the best push at each joint, drive and sensor takes away, the
         largest first; empty on a rig with one motion.
     missing_force
-        What sparse regression makes of the force that is lacking, where no effect explains the gap.
+        What sparse regression makes of the force that is lacking on a rig with one motion, where no effect explains the gap.
+    joint_forces
+        The force that would have to be missing at each joint of any other rig then, the likeliest first.
     adequate
         Whether what the diagnosed simulation leaves is noise and disturbance; None where that could not be asked.
     remainder
@@ -273,6 +275,7 @@ class Diagnosis:
     effect_shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     places: tuple[SuspectedPlace, ...] = ()
     missing_force: MissingForce | None = None
+    joint_forces: tuple[JointForce, ...] = ()
     adequate: bool | None = None
     remainder: Remainder | None = None
 
@@ -321,6 +324,7 @@ class Diagnosis:
                 for effect, shares in self.effect_shares.items()
             },
             "missing_force": None if self.missing_force is None else self.missing_force.to_json(),
+            "missing_force_by_joint": [force.to_json() for force in self.joint_forces],
             "window": self.windows,
             "window_cycles": self.window_cycles,
             "observer_bandwidth": self.bandwidth,

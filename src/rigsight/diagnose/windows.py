@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,22 +39,21 @@ class Windowing:
         Length of a window [s].
     cycles
         Cycles of motion in a window, whatever they take: the fast part of a sweep is cut finer than the slow one.
-    output, noise
-        Whose cycles, and its noise floor.
+    noise
+        Noise floor of each output whose cycles count, the first that a record holds.
     observer
         What models follow along whole records; None for a free run.
     """
 
     length: float | None = None
     cycles: int | None = None
-    output: str = ""
-    noise: float = 0.0
+    noise: Mapping[str, float] = field(default_factory=dict)
     observer: Observer | None = None
 
     @classmethod
-    def by_cycles(cls, output: str, noise: float) -> Windowing:
-        """Return windows of a few cycles of an output with this noise floor."""
-        return cls(cycles=_CYCLES, output=output, noise=noise)
+    def by_cycles(cls, noise: Mapping[str, float]) -> Windowing:
+        """Return windows of a few cycles of the first of these outputs that a record holds, with their noise floors."""
+        return cls(cycles=_CYCLES, noise=noise)
 
     @property
     def whole(self) -> bool:
@@ -78,8 +77,9 @@ class Windowing:
         return tuple(windows)
 
     def _edges(self, record: Record, cycles: int) -> list[int]:
-        deviation = record[self.output] - np.median(record[self.output])
-        size = _ABOVE_NOISE * self.noise
+        output = next(name for name in self.noise if name in record)
+        deviation = record[output] - np.median(record[output])
+        size = _ABOVE_NOISE * self.noise[output]
         sides = np.flatnonzero(np.abs(deviation) > size)
         above = deviation[sides] > 0.0
         crossings = sides[1:][above[1:] & ~above[:-1]]
@@ -111,6 +111,12 @@ def leading_output(rig: Rig, records: Sequence[Record]) -> str:
     )
 
 
+def shown_by(rig: Rig, records: Sequence[Record]) -> list[str]:
+    """Return for each record the output whose motion tells its lively stretches: the leading one where it holds that."""
+    leading = leading_output(rig, records)
+    return [leading if leading in record else leading_output(rig, [record]) for record in records]
+
+
 def window_length(rig: Rig, records: Sequence[Record]) -> float:
     """Return a window length [s] that holds several of the typical periods of the velocity.
 
@@ -125,8 +131,7 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
 def typical_period(rig: Rig, records: Sequence[Record]) -> float:
     """Return the reciprocal of the middle frequency of the velocity [s]."""
     periods = []
-    output = leading_output(rig, records)
-    for record in records:
+    for record, output in zip(records, shown_by(rig, records), strict=True):
         velocity = np.gradient(record[output], record.dt)
         velocity -= np.mean(velocity)
         power = np.abs(np.fft.rfft(velocity)) ** 2

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.candidates.constant_force import known_constant_forces
 from rigsight.diagnose.candidates.placed import candidates_on
-from rigsight.diagnose.windows import cut
+from rigsight.diagnose.windows import cut, shown_by
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
@@ -277,27 +277,27 @@ def _sees_position(effect: Effect) -> bool:
     return any(canonical.x in expression.free_symbols for expression in expressions)
 
 
-def until_rest(records: Sequence[Record], inputs: Sequence[str], output: str) -> tuple[Record, ...]:
+def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
     """Return the records, those of a free motion only until it has died away.
 
     Where friction catches a mass its place jumps with the numbers of a model: a fit that begins with the rest that follows, which
     may be long, stays where it begins.
     """
     cut_off = []
-    for record in records:
+    for record, output in zip(records, shown_by(rig, records), strict=True):
         stop = record.n_samples
-        if all(is_constant(record[name]) for name in inputs):
+        if all(is_constant(record[signal.name]) for signal in rig.inputs):
             energy = np.cumsum(np.diff(record[output]) ** 2)
             stop = max(_FEWEST_IN_MOTION, int(np.searchsorted(energy, _DIED_AWAY * energy[-1])) + 1)
         cut_off.append(record.slice(0, min(stop, record.n_samples)))
     return tuple(cut_off)
 
 
-def liveliest(records: Sequence[Record], output: str, n_samples: int = 8000) -> tuple[Record, ...]:
-    """Return the stretch of each record in which an output moves most, together about `n_samples` long."""
+def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = 8000) -> tuple[Record, ...]:
+    """Return the stretch of each record in which its output moves most, together about `n_samples` long."""
     share = max(500, n_samples // max(1, len(records)))
     stretches = []
-    for record in records:
+    for record, output in zip(records, shown_by(rig, records), strict=True):
         if record.n_samples <= share:
             stretches.append(record)
             continue

@@ -6,7 +6,10 @@ from rigsight.discover.joints.joint_force import ForceTrace as ForceTrace
 from rigsight.discover.joints.joint_force import JointForce as JointForce
 from rigsight.discover.joints.joint_force import JointLaw as JointLaw
 from rigsight.discover.joints.joint_force import missing_forces as missing_forces
+from rigsight.discover.joints.joint_force import not_contradicted as not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm as LawTerm
+from rigsight.discover.joints.joint_motion import JointMotion as JointMotion
+from rigsight.discover.joints.joint_motion import joint_motions as joint_motions
 from rigsight.discover.missing_force import MissingForce as MissingForce
 from rigsight.discover.missing_force import missing_force as missing_force
 from rigsight.discover.result import Discovery as Discovery
@@ -21,11 +24,14 @@ __all__ = [
     "ForceTrace",
     "JointForce",
     "JointLaw",
+    "JointMotion",
     "LawTerm",
     "MissingForce",
     "Task",
     "discover",
+    "joint_motions",
     "known_terms",
     "missing_force",
     "missing_forces",
+    "not_contradicted",
 ]

@@ -43,6 +43,8 @@ class FrequencyResponse:
         the error of value i is ``sum_j noise_shares[i, j] xi[noise_lines[i, j]]`` with independent circular xi of variance 1.
     noise_freedom
         Complex degrees of freedom from which each variance was estimated, infinite where it is known otherwise.
+    shared_width
+        Width [rad/s] of the band that a value was read in where `noise_lines` does not say it: what lies closer shares data.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class FrequencyResponse:
     noise_shares: NDArray[np.complex128] | None = None
     noise_lines: NDArray[np.intp] | None = None
     noise_freedom: float = float("inf")
+    shared_width: float = 0.0
 
     def __post_init__(self) -> None:
         omega = np.array(self.omega, dtype=np.float64)

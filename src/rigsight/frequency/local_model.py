@@ -294,6 +294,8 @@ class LocalFit:
         Sum of squares of what no term explains, shape (n_bands,).
     noise
         The same per degree of freedom, shape (n_bands,).
+    freedom
+        Degrees of freedom, shape (n_bands,).
     """
 
     def __init__(
@@ -307,10 +309,10 @@ class LocalFit:
         projected = np.einsum("lws,lw->ls", left.conj(), sides)
         theta = np.einsum("lsp,ls->lp", right.conj(), inverse * projected)
         residual = sides - np.einsum("lwp,lp->lw", terms / scales, theta)
-        freedom = terms.shape[1] - absorbed - np.count_nonzero(kept, axis=1)
+        self.freedom = terms.shape[1] - absorbed - np.count_nonzero(kept, axis=1)
         self.left_over = np.sum(np.abs(residual) ** 2, axis=1)
-        self.noise = self.left_over / freedom
-        self._residual, self._freedom = residual, freedom
+        self.noise = self.left_over / self.freedom
+        self._residual = residual
         self._scales, self._theta = scales[:, 0], theta
         self._left, self._inverse, self._right = left, inverse, right
 
@@ -320,7 +322,7 @@ class LocalFit:
 
     def noise_with(self, other: LocalFit) -> NDArray[np.complex128]:
         """Return the covariance of what this fit and one in the same bands leave, per degree of freedom, shape (n_bands,)."""
-        return np.asarray(np.sum(self._residual * other._residual.conj(), axis=1) / self._freedom)
+        return np.asarray(np.sum(self._residual * other._residual.conj(), axis=1) / self.freedom)
 
     def shares(self, term: int) -> NDArray[np.complex128]:
         """Return what each equation has in the coefficient of one term, shape (n_bands, n_equations)."""

@@ -248,7 +248,7 @@ class _LocalModels:
         self._omega = _frequencies(spectra)
         chunks = [self._omega[i : i + _CHUNK] for i in range(0, self._omega.size, _CHUNK)]
         parts = [self._solved(chunk) for chunk in chunks]
-        self._values, self._variance, self._against, self._own = (
+        self._values, self._variance, self._freedom, self._against, self._own = (
             np.concatenate(arrays) for arrays in zip(*parts, strict=True)
         )
 
@@ -278,16 +278,19 @@ class _LocalModels:
             response=self._response,
             unit=pair_unit(self._spectra[0].record, sources[index], self._response),
             variance=variance[kept],
+            noise_freedom=float(np.min(self._freedom[kept])),
+            shared_width=max(w * s.line for s, w in zip(self._spectra, self._widths, strict=True)),
             records=names,
             method=f"{kind}, {len(sources)} inputs, {len(names)} records together",
         ), ()
 
     def _solved(
         self, omega: NDArray[np.float64]
-    ) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return values and variances of all inputs, and the share of each that others do not explain: each other one, and all.
+    ) -> tuple[NDArray[np.complex128], *tuple[NDArray[np.float64], ...]]:
+        """Return values and variances of all inputs, degrees of freedom, and the share of each input that others do not explain.
 
-        Shapes (n_frequencies, n_moving), the third (n_frequencies, n_moving, n_moving).
+        Shapes (n_frequencies, n_moving), the third (n_frequencies,); the shares are those that each other one, and that all
+        others leave, shapes (n_frequencies, n_moving, n_moving) and (n_frequencies, n_moving).
         """
         n_terms, n_inputs = self._order + 1, self._moving.size
         reach = max(0.5 * w * s.line for s, w in zip(self._spectra, self._widths, strict=True))
@@ -317,7 +320,7 @@ class _LocalModels:
         first = [n_terms * i for i in range(n_inputs)]
         values = np.stack([fit.coefficient(term) for term in first], axis=1)
         shares = np.stack([np.sum(np.abs(fit.shares(term)) ** 2, axis=1) for term in first], axis=1)
-        return values, fit.noise[:, None] * shares, *_own_shares(inputs, n_terms)
+        return values, fit.noise[:, None] * shares, fit.freedom, *_own_shares(inputs, n_terms)
 
 
 def _frequencies(spectra: Sequence[_Spectra]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from rigsight import plot
 from rigsight.diagnose.location.gap_parts import AmplitudePart, GapPart, StatePart
 from rigsight.diagnose.result import Diagnosis
+from rigsight.discover import not_contradicted
 from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent
@@ -78,6 +79,28 @@ def output_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
     return maps
 
 
+def joint_maps(diagnosis: Diagnosis) -> list[OutputMaps]:
+    """Return maps over the planes of the joints that the verdict names, else of all, for the output with the largest gap."""
+    parts = [
+        part for part in diagnosis.localization.by_state if part.joint and math.isfinite(part.force_mean)
+    ]
+    if not parts:
+        return []
+    named = [part for part in parts if part.joint in diagnosis.where]
+    parts = named or parts
+    shown = {part.output for part in parts}
+    output = max(
+        (name for name in diagnosis.gap if name in shown),
+        key=lambda name: diagnosis.gap[name].reidentified / diagnosis.gap[name].noise_floor,
+    )
+    figures = []
+    for number, joint in enumerate(dict.fromkeys(part.joint for part in parts), start=1):
+        own = [part for part in parts if part.joint == joint and part.output == output]
+        rest = stage_names(diagnosis)["reidentified"]
+        figures.append(_states_figure(own, output, joint, f"where-joint-{number}", rest))
+    return [OutputMaps("where-joints", "Joint by joint", figures)]
+
+
 def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return each place of a rig that has several, what share of the gap a push there takes away, and when it was looked at."""
     return [
@@ -90,12 +113,27 @@ def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     ]
 
 
+def force_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return each joint of a rig that has several, what a force missing there alone would leave, and its law."""
+    agreeing = not_contradicted(diagnosis.joint_forces)
+    return [
+        (
+            force.joint,
+            f"{force.error_over_noise:.3g} {TIMES}",
+            (listed(term.text for term in force.law.terms) or "no law of its motion")
+            if force in agreeing
+            else "ruled out by the sensors",
+        )
+        for force in diagnosis.joint_forces
+    ]
+
+
 def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     where = diagnosis.localization
     stages = stage_names(diagnosis)
     rest = stages["reidentified"]
     bands = [part for part in where.by_band if part.output == output]
-    states = [part for part in where.by_state if part.output == output]
+    states = [part for part in where.by_state if part.output == output and not part.joint]
     times = [part for part in where.by_time if part.output == output]
     records = [part for part in where.by_record if part.output == output]
     amplitudes = sorted(
@@ -128,21 +166,7 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             )
         )
     if states:
-        motion = _motion(diagnosis)
-        worst = max(states, key=lambda p: p.reidentified)
-        place = _place(worst, motion)
-        lacking = any(math.isfinite(p.force_mean) for p in states)
-        figures.append(
-            page_figure(
-                plot.gap_states(states, output, motion),
-                f"{key}-states",
-                f"Map of the error, {rest}, over the plane of states, largest with {gap_percent(worst.reidentified)} at "
-                f"{place}; noise floor {gap_percent(worst.noise_floor)}. {_lacking(states)}",
-                f"By state of the measured motion, {rest}; the error is largest at {place}; the noise floor is at "
-                f"{gap_percent(worst.noise_floor)}."
-                + (" Right: the mean force that the equations lack there, with its sign." if lacking else ""),
-            )
-        )
+        figures.append(_states_figure(states, output, _motion(diagnosis), key, rest))
     if len({p.amplitude for p in amplitudes}) > 1:
         labels = [_amplitude_label(p) for p in amplitudes]
         said_of = list(zip((label.replace("\n", " ") for label in labels), amplitudes, strict=True))
@@ -186,6 +210,26 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
             )
         )
     return figures
+
+
+def _states_figure(states: Sequence[StatePart], output: str, motion: str, key: str, rest: str) -> PageFigure:
+    worst = max(states, key=lambda p: p.reidentified)
+    place = _place(worst, motion)
+    lacking = any(math.isfinite(p.force_mean) for p in states)
+    joint = states[0].joint
+    if joint:
+        whose = f"By state of {joint}, along the motion that follows all sensors, {rest}"
+        there = f", if all that they lack acts at {joint}" if lacking else ""
+    else:
+        whose, there = f"By state of the measured motion, {rest}", ""
+    return page_figure(
+        plot.gap_states(states, output, motion),
+        f"{key}-states",
+        f"Map of the error, {rest}, over the plane of states, largest with {gap_percent(worst.reidentified)} at "
+        f"{place}; noise floor {gap_percent(worst.noise_floor)}. {_lacking(states)}",
+        f"{whose}; the error is largest at {place}; the noise floor is at {gap_percent(worst.noise_floor)}."
+        + (f" Right: the mean force that the equations lack there, with its sign{there}." if lacking else ""),
+    )
 
 
 def _told(parts: Sequence[tuple[str, GapPart]], diagnosis: Diagnosis) -> str:

@@ -18,6 +18,7 @@ from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
     basis_sentence,
+    missing_force_sentence,
     remainder_sentence,
     verdict_name,
     verdict_sentence,
@@ -40,10 +41,9 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     diagnosis
         The result.
     """
-    lacking = diagnosis.missing_force
     sentences = [
         verdict_sentence(diagnosis),
-        "" if lacking is None else lacking.sentence,
+        missing_force_sentence(diagnosis),
         remainder_sentence(diagnosis),
         ambiguity_sentence(diagnosis),
         *advice_sentences(diagnosis),

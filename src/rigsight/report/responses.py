@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast, get_args
 
@@ -27,6 +27,8 @@ from rigsight.report.declared import rig_of
 from rigsight.report.wording import stage_names
 
 _METHOD: Method = "local_rational"
+_MOST_PATHS = 6
+"""Paths of a rig with many inputs and sensors that a page shows per record."""
 _FEWEST_LINES = 8
 """Lines below which there is no curve to look at."""
 
@@ -56,6 +58,9 @@ class PathResponse:
 def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, ...]:
     """Return the responses of one record, path by path; none of a step, of an element, or where nothing stands out.
 
+    Of a rig with several inputs and sensors they are those to each input beside the others; of very many those of the sensors
+    with the largest gaps.
+
     There are none of a rig that drifts: what follows the measured motion has the measured response.
 
     Parameters
@@ -67,11 +72,11 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
     """
     rig = rig_of(diagnosis)
     signals = {*trace.inputs, *trace.measured}
-    if rig is None or not rig.is_driven or not rig.has_one_motion or diagnosis.bandwidth is not None:
+    if rig is None or not rig.is_driven or diagnosis.bandwidth is not None:
         return ()
-    if not {rig.inputs[0].name, rig.outputs[0].name} <= signals:
+    if rig.has_one_motion and not {rig.inputs[0].name, rig.outputs[0].name} <= signals:
         return ()
-    paths = signal_paths(rig)
+    paths = signal_paths(rig) if rig.has_one_motion else _worst(diagnosis, signal_paths(rig))
     found = []
     measured = _measured(diagnosis, trace, paths)
     stages = stage_names(diagnosis)
@@ -92,6 +97,13 @@ def record_responses(diagnosis: Diagnosis, trace: Trace) -> tuple[PathResponse, 
             simulated[stage] = without_shares(response)
         found.append(PathResponse(path.name, without_shares(own), simulated, decibel))
     return tuple(found)
+
+
+def _worst(diagnosis: Diagnosis, paths: Sequence[SignalPath]) -> tuple[SignalPath, ...]:
+    """Return as many paths as a page can show, those to the sensors with the largest gaps, in their order."""
+    gaps = {output: float(np.nan_to_num(gap.reidentified)) for output, gap in diagnosis.gap.items()}
+    ranked = sorted(paths, key=lambda path: -gaps.get(path.response, 0.0))[:_MOST_PATHS]
+    return tuple(path for path in paths if path in ranked)
 
 
 def _measured(

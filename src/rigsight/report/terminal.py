@@ -19,6 +19,7 @@ from rigsight.report.wording import (
     ambiguity_sentence,
     basis_sentence,
     effects_label,
+    missing_force_sentence,
     named_candidate,
     percent,
     remainder_sentence,
@@ -50,8 +51,8 @@ class Summary:
         yield text(verdict_sentence(diagnosis))
         if remainder_sentence(diagnosis):
             yield text(remainder_sentence(diagnosis))
-        if diagnosis.missing_force is not None:
-            yield text(diagnosis.missing_force.sentence)
+        if missing_force_sentence(diagnosis):
+            yield text(missing_force_sentence(diagnosis))
         if diagnosis.ambiguous_with:
             yield text(ambiguity_sentence(diagnosis))
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap, Stage
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND
+from rigsight.discover import not_contradicted
 from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
 
@@ -219,6 +220,24 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
         left.text
         if left is not None and diagnosis.verdict in ("effect", "unknown") and left.goes_with
         else ""
+    )
+
+
+def missing_force_sentence(diagnosis: Diagnosis) -> str:
+    """Return what is known of the force that is missing where no effect explains the gap; empty where nothing is."""
+    if diagnosis.missing_force is not None:
+        return diagnosis.missing_force.sentence
+    forces = diagnosis.joint_forces
+    if not forces:
+        return ""
+    agreeing = not_contradicted(forces)
+    nearest = min(force.error_over_noise for force in agreeing)
+    names = listed((force.joint for force in agreeing), "or")
+    others = [f"at {force.joint} {force.error_over_noise:.3g}" for force in forces if force not in agreeing]
+    beside = f" ({listed(others)})" if others else ""
+    return (
+        f"A missing force at {names} alone, whatever its course, leaves {times_floor(nearest)} of what all sensors show{beside}. "
+        f"{forces[0].sentence}"
     )
 
 

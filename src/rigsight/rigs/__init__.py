@@ -6,6 +6,7 @@ from rigsight.rigs.built_in import RIGS as RIGS
 from rigsight.rigs.built_in import ROLLING as ROLLING
 from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
 from rigsight.rigs.built_in import declared_rig as declared_rig
+from rigsight.rigs.built_in import is_built_in_motion as is_built_in_motion
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
@@ -46,6 +47,7 @@ __all__ = [
     "evaluated",
     "force_symbol",
     "has_short_inverse",
+    "is_built_in_motion",
     "joint_of",
     "read_rig_file",
     "reading_symbol",

@@ -91,3 +91,14 @@ RUNNING_GEAR = RIGS["running_gear"]
 assert RUNNING_GEAR.follower is not None
 ROLLING = RUNNING_GEAR.follower
 """Its lateral displacement, which follows the yaw angle."""
+
+
+def is_built_in_motion(rig: Rig) -> bool:
+    """Return True if a rig has the equations of a built-in one of one motion, in the same words, whatever it is called itself.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    """
+    return any(rig.mechanism == own.mechanism for own in (AXIS, ELEMENT, RUNNING_GEAR))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from rigsight.errors import InputError
 from rigsight.records import Record
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import RIGS, Rig, is_built_in_motion
 
 _BUILT_IN_ONLY = frozenset({"discover"})
 """Commands that know the parameters of built-in rigs of one motion by their names; one that does not is taken out here."""
@@ -31,12 +31,11 @@ def check_takes(command: str, rig: Rig, records: Iterable[Record] = ()) -> None:
     InputError
         If it was written for other rigs, or records have constants of their own.
     """
-    is_built_in = rig.name in RIGS and RIGS[rig.name].mechanism == rig.mechanism
-    if command in _BUILT_IN_ONLY and rig.has_one_motion and not is_built_in:
+    if command in _BUILT_IN_ONLY and rig.has_one_motion and not is_built_in_motion(rig):
         listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
         raise InputError(
             f"'rigsight {command}' cannot take the rig '{rig.name}' of your own yet: of rigs of one motion it takes {listed}. "
-            "Name one of them in [rig] if the equation is the same."
+            "If the equation is the same, write it in their words."
         )
     for record in records if command in _SAME_CONSTANTS_ONLY else ():
         if record.constants:

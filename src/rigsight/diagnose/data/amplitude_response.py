@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy.stats import f as f_distribution
 from rigsight.diagnose.data.finding import AmplitudeDependence
 from rigsight.diagnose.windows import leading_output
 from rigsight.errors import InputError
-from rigsight.frequency import FrequencyResponse, local_rational_response
+from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.records.reference import instrument_of
@@ -29,8 +29,12 @@ _MATTERS = 0.02
 _FEWEST_LINES = 8
 
 
-def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDependence:
-    """Compare the frequency responses at the lowest and the highest amplitude of one kind of record.
+def amplitude_dependences(
+    rig: Rig, records: Sequence[Record], faulty: Collection[tuple[str, str]] = ()
+) -> tuple[AmplitudeDependence, ...]:
+    """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path.
+
+    Of a rig with one motion the path from its input to its motion is asked, of any other those from each input to each sensor.
 
     Parameters
     ----------
@@ -38,69 +42,91 @@ def amplitude_dependence(rig: Rig, records: Sequence[Record]) -> AmplitudeDepend
         The rig.
     records
         All records of a campaign; steps do not take part.
+    faulty
+        Record and sensor of each reading at fault: it distorts as an effect would.
     """
     if not rig.is_driven:
-        return AmplitudeDependence("cannot tell", "An element has no frequency response of a driven motion.")
-    if len(rig.inputs) != 1 or not records:
-        return AmplitudeDependence(
-            "cannot tell",
-            "Only the frequency responses of a rig with one input are compared between amplitudes.",
+        return (
+            AmplitudeDependence("cannot tell", "An element has no frequency response of a driven motion."),
         )
-    source, response = rig.inputs[0].name, leading_output(rig, records)
+    if not rig.inputs or not records:
+        return (AmplitudeDependence("cannot tell", "Without an input there is no frequency response."),)
+    if rig.has_one_motion:
+        responses = [leading_output(rig, records)]
+    else:
+        responses = [signal.name for signal in rig.outputs if any(signal.name in r for r in records)]
+    return tuple(
+        _of_path(rig, [r for r in records if (r.name, response) not in faulty], source.name, response)
+        for source in rig.inputs
+        for response in responses
+    )
+
+
+def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) -> AmplitudeDependence:
+    path = f"{source} -> {response}"
     records = [record for record in records if response in record and not is_constant(record[source])]
     if not records:
+        what = "Nothing drives the rig" if len(rig.inputs) == 1 else f"'{source}' does not move"
         return AmplitudeDependence(
             "cannot tell",
-            "Nothing drives the rig in the sound records, so that they have no frequency response.",
+            f"{what} in the sound records, so that they have no frequency response {path}.",
+            path=path,
         )
-    pair = _extremes(records, source)
+    alone = len(rig.inputs) == 1
+    pair = _extremes(records, source, alone)
     if pair is None:
         return AmplitudeDependence(
             "cannot tell",
-            "The sound records have one amplitude, so they cannot tell whether the frequency response changes with it. "
-            "Record another one.",
+            f"The sound records have one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the frequency "
+            f"response {path} changes with it. Record another one.",
+            path=path,
         )
     names = (pair[0].name, pair[1].name)
     try:
         low, high, by = _responses(pair, source, response, rig)
     except InputError as error:
         return AmplitudeDependence(
-            "cannot tell", f"The frequency responses cannot be compared: {error}", names
+            "cannot tell", f"The frequency responses {path} cannot be compared: {error}", names, path
         )
     omega, first, second, variance = _common(low, high)
     if omega.size < _FEWEST_LINES:
         return AmplitudeDependence(
             "cannot tell",
-            f"{names[0]} and {names[1]} share too few frequencies at which the response stands out of the noise.",
+            f"{names[0]} and {names[1]} share too few frequencies at which the response {path} stands out of the noise.",
             names,
+            path,
         )
     size = np.maximum(np.abs(first), np.abs(second))
     relative = np.abs(second - first) / size
     freedom = 2.0 * min(low.noise_freedom, high.noise_freedom)
     chance = f_distribution.sf(np.abs(second - first) ** 2 / variance, 2.0, freedom)
     changed = (chance < _LINE_CHANCE) & (relative > _MATTERS)
-    unit = rig.inputs[0].unit if rig.inputs[0].unit != "input" else ""
-    span = f"{_amplitude(pair[0], source):.3g} and {_amplitude(pair[1], source):.3g} {unit}".rstrip()
+    unit = next(signal.unit for signal in rig.inputs if signal.name == source)
+    lowest, highest = (_amplitude(record, source, alone) for record in pair)
+    span = f"{lowest:.3g} and {highest:.3g} {'' if unit == 'input' else unit}".rstrip()
     if np.mean(changed) >= _LINES_CHANGED:
         worst = int(np.argmax(np.where(changed, relative, 0.0)))
         return AmplitudeDependence(
             "yes",
-            f"The frequency response {source} -> {response} changes with the amplitude{by}: between {span} by up to "
+            f"The frequency response {path} changes with the amplitude{by}: between {span} by up to "
             f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect takes part.",
             names,
+            path,
         )
     seen = float(np.median(3.0 * np.sqrt(variance) / size))
     if np.mean(chance < _LINE_CHANCE) < _LINES_CHANGED and seen > 0.1:
         return AmplitudeDependence(
             "cannot tell",
-            f"Between {span} the frequency responses{by} agree within their noise, but that hides changes of {seen:.0%}.",
+            f"Between {span} the frequency responses {path}{by} agree within their noise, but that hides changes of {seen:.0%}.",
             names,
+            path,
         )
     return AmplitudeDependence(
         "no",
-        f"The frequency response {source} -> {response} does not change with the amplitude{by} between {span} "
+        f"The frequency response {path} does not change with the amplitude{by} between {span} "
         f"(by {float(np.median(relative)):.1%} in the median): a linear cause, or an effect too small to be seen there.",
         names,
+        path,
     )
 
 
@@ -110,32 +136,46 @@ def _responses(
     """Return both responses, read in one way, and what to say of it: by the reference of a loop where both records have one."""
     own = [signal.name for signal in (*rig.inputs, *rig.outputs)]
     instruments = [instrument_of(record, own) for record in pair]
-    if all(instruments):
+    if len(rig.inputs) == 1 and all(instruments):
         with suppress(InputError):
             low, high = (
                 local_rational_response(r, source, response, hold=r.hold, instrument=name)
                 for r, name in zip(pair, instruments, strict=True)
             )
             return low, high, f" (with the {instruments[0]} as instrument)"
-    low, high = (local_rational_response(r, source, response, hold=r.hold) for r in pair)
+    low, high = (_response(r, source, response, rig) for r in pair)
     return low, high, ""
 
 
-def _extremes(records: Sequence[Record], source: str) -> tuple[Record, Record] | None:
+def _response(record: Record, source: str, response: str, rig: Rig) -> FrequencyResponse:
+    """Return the response to one input, beside the others that move in the same record."""
+    prescribing = [str(c.prescribed_by) for c in rig.mechanism.prescribed]
+    moving = [signal.name for signal in rig.inputs if not is_constant(record[signal.name])]
+    if len(moving) == 1:
+        # A measured motion is smooth between its samples.
+        hold = "band_limited" if source in prescribing else record.hold
+        return local_rational_response(record, source, response, hold=hold)
+    told = responses_of_inputs([record], moving, [response], smooth=prescribing)
+    if (source, response) not in told.found:
+        raise InputError(f"{record.name}: {told.problems[source, response]}")
+    return told.found[source, response]
+
+
+def _extremes(records: Sequence[Record], source: str, alone: bool) -> tuple[Record, Record] | None:
     """Return the records of lowest and highest amplitude, of the kind whose amplitudes differ most."""
     best: tuple[float, Record, Record] | None = None
     for kind in dict.fromkeys(record.kind for record in records if record.kind != "step"):
-        own = sorted((r for r in records if r.kind == kind), key=lambda r: _amplitude(r, source))
-        smallest = _amplitude(own[0], source)
-        ratio = _amplitude(own[-1], source) / smallest if smallest > 0.0 else 1.0
+        own = sorted((r for r in records if r.kind == kind), key=lambda r: _amplitude(r, source, alone))
+        smallest = _amplitude(own[0], source, alone)
+        ratio = _amplitude(own[-1], source, alone) / smallest if smallest > 0.0 else 1.0
         if ratio >= _DIFFERENT_AMPLITUDE and (best is None or ratio > best[0]):
             best = (ratio, own[0], own[-1])
     return None if best is None else (best[1], best[2])
 
 
-def _amplitude(record: Record, source: str) -> float:
-    """Return the amplitude as given, else that of a sine with the same RMS."""
-    return record.amplitude or float(np.sqrt(2.0) * np.std(record[source]))
+def _amplitude(record: Record, source: str, alone: bool) -> float:
+    """Return the amplitude as given for the only input, else that of a sine with the same RMS."""
+    return (alone and record.amplitude) or float(np.sqrt(2.0) * np.std(record[source]))
 
 
 def _common(
@@ -157,4 +197,14 @@ def _common(
     # A local model spans as many lines as its degrees of freedom and unknowns; neighbors share data.
     width = 1 if low.noise_lines is None else low.noise_lines.shape[1]
     kept = np.flatnonzero(clear)[::width]
+    kept = _apart(kept, omega, max(low.shared_width, high.shared_width))
     return omega[kept], first[kept], second[kept], (first_variance + second_variance)[kept]
+
+
+def _apart(indices: NDArray[np.intp], omega: NDArray[np.float64], width: float) -> NDArray[np.intp]:
+    """Return those indices, from the first on, whose frequencies lie at least a width apart."""
+    kept: list[int] = []
+    for index in indices:
+        if not kept or omega[index] - omega[kept[-1]] >= width:
+            kept.append(int(index))
+    return np.array(kept, dtype=np.intp)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigsight.diagnose.data.amplitude_response import amplitude_dependence
+from rigsight.diagnose.data.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data.finding import DataQuality, Finding
 from rigsight.diagnose.data.input_timing import input_timing
 from rigsight.diagnose.data.offset_question import levels_apart, means_of
 from rigsight.diagnose.data.sensor_faults import sensor_faults
-from rigsight.diagnose.windows import leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.identify import OFFSETS_MEND
 from rigsight.records.record import Record
@@ -34,17 +33,15 @@ def data_quality(bench: Workbench, records: Sequence[Record], linear: Scored) ->
     """
     timing = input_timing(bench, (), linear.fit)
     faults = [finding for record in records for finding in sensor_faults(bench.rig, record)]
-    response = leading_output(bench.rig, records)
-    faulty = {finding.record for finding in faults if finding.signal == response}
-    # A channel at fault distorts as an effect would.
-    healthy = [record for record in records if record.name not in faulty]
     return DataQuality(
         findings=(
             *levels_apart(bench, records),
             *(timing.findings() if timing is not None else ()),
             *faults,
         ),
-        amplitude=amplitude_dependence(bench.rig, healthy),
+        amplitudes=amplitude_dependences(
+            bench.rig, records, {(f.record or "", f.signal or "") for f in faults}
+        ),
     )
 
 

@@ -63,11 +63,14 @@ class AmplitudeDependence:
         The answer with numbers.
     records
         The two records that were compared.
+    path
+        Input and sensor, as in ``"u -> x"``; empty where there is none.
     """
 
     answer: Answer
     sentence: str
     records: tuple[str, ...] = ()
+    path: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,25 +81,29 @@ class DataQuality:
     ----------
     findings
         In the order in which they are worth reading; empty where the records are healthy.
-    amplitude
-        Whether the frequency response changes with the amplitude.
+    amplitudes
+        Whether each frequency response changes with the amplitude.
     """
 
     findings: tuple[Finding, ...]
-    amplitude: AmplitudeDependence
+    amplitudes: tuple[AmplitudeDependence, ...]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences with mends, and the answer about the amplitude; clipping is told where a record is read."""
+        """Sentences with mends, and the answers about the amplitude; clipping is told where a record is read."""
         told = [f"{f.sentence} {f.mend}" for f in self.findings if f.kind != "clipping"]
-        return (*told, self.amplitude.sentence)
+        return (*told, *(answer.sentence for answer in self.amplitudes))
 
     def to_json(self) -> list[dict[str, Any]]:
-        """Return the list ``data_quality`` of ``diagnosis.json``; the last entry is the answer about the amplitude."""
-        answer = {
-            "kind": "amplitude_dependence",
-            "answer": self.amplitude.answer,
-            "sentence": self.amplitude.sentence,
-            "records": list(self.amplitude.records),
-        }
-        return [*(finding.to_json() for finding in self.findings), answer]
+        """Return the list ``data_quality`` of ``diagnosis.json``; the last entries are the answers about the amplitude."""
+        answers = [
+            {
+                "kind": "amplitude_dependence",
+                "path": own.path,
+                "answer": own.answer,
+                "sentence": own.sentence,
+                "records": list(own.records),
+            }
+            for own in self.amplitudes
+        ]
+        return [*(finding.to_json() for finding in self.findings), *answers]

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.data.finding import Finding
+from rigsight.diagnose.drift import can_drift
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.windows import WINDOW
 from rigsight.diagnose.workbench import Scored, Workbench
@@ -71,7 +72,8 @@ def asked_offsets(
 def levels_apart(bench: Workbench, records: Sequence[Record]) -> list[Finding]:
     """Return the sensors whose level differs between records by more than they move in any: no fit begins well from there.
 
-    A spring brings a rig back to one place where its input has one mean; nothing is said where it has not, or of another rig.
+    Springs bring a rig back to one place where its inputs and constants are the same; nothing is said where they are not, or of a
+    rig that can rest anywhere.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def levels_apart(bench: Workbench, records: Sequence[Record]) -> list[Finding]:
         All records of the campaign, whole.
     """
     rig = bench.rig
-    if not (rig.has_one_motion and bench.has_stiffness) or _apart(records, rig.inputs[0].name)[0] > 1.0:
+    if not _comes_back(bench, records) or any(_apart(records, signal.name)[0] > 1.0 for signal in rig.inputs):
         return []
     found = []
     for signal in rig.outputs:
@@ -97,6 +99,17 @@ def levels_apart(bench: Workbench, records: Sequence[Record]) -> list[Finding]:
                 )
             )
     return found
+
+
+def _comes_back(bench: Workbench, records: Sequence[Record]) -> bool:
+    """Return True if springs bring the rig to one place, the same in all records."""
+    rig = bench.rig
+    if rig.has_one_motion:
+        return bench.has_stiffness
+    if not rig.mechanism.free or any(record.constants != records[0].constants for record in records):
+        return False
+    constants = {p.name: bench.start[p.name] for p in rig.constants if p.name in bench.start}
+    return not can_drift(rig, {**constants, **bench.given})
 
 
 def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:

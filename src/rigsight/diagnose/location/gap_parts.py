@@ -94,6 +94,8 @@ class StatePart(GapPart):
     force_mean, force_rms, force_noise
         Force (torque) that the re-identified equations lack there: mean, RMS, and the standard deviation that the sensor's noise
         gives it. NaN where it does not stand out of the noise anywhere, and for an output that no force acts on directly.
+    joint
+        The joint whose motion it is and at which all of the force would act; empty on a rig with one motion.
     """
 
     x_low: float
@@ -104,6 +106,7 @@ class StatePart(GapPart):
     force_mean: float
     force_rms: float
     force_noise: float
+    joint: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

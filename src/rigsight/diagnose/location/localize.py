@@ -17,6 +17,7 @@ from rigsight.diagnose.location.gap_parts import (
     RecordPart,
     TimePart,
 )
+from rigsight.diagnose.location.joint_planes import joint_parts
 from rigsight.diagnose.location.paths import path_parts, path_sentence
 from rigsight.diagnose.location.quantify import budget_intervals
 from rigsight.diagnose.location.state_plane import state_parts
@@ -60,12 +61,13 @@ def localize(
     """
     stretches = {floor.output: _long_enough(floor.stretches) for floor in floors}
     scored = [trace for trace in traces if trace.role == scored_on]
-    by_path = path_parts(bench, before, linear, after) if bench.rig.has_one_motion else ()
+    one_motion = bench.rig.has_one_motion
+    by_path = path_parts(bench, before, linear, after) if one_motion else ()
     return Localization(
         by_record=tuple(_by_record(traces, scored_on, bench.noise, rng)),
         by_amplitude=tuple(_by_amplitude(bench, traces, scored_on)),
         by_band=tuple(_by_band(scored, bench.noise, stretches)),
-        by_state=state_parts(bench, linear, scored) if bench.rig.has_one_motion else (),
+        by_state=(state_parts if one_motion else joint_parts)(bench, linear, scored),
         by_time=tuple(_by_time(scored, bench.noise)),
         by_path=by_path,
         sentence=path_sentence(by_path, bench.rig),

@@ -20,7 +20,7 @@ from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.result import STAGES, Trace
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.metrics import rms
-from rigsight.rigs import Rig, evaluated
+from rigsight.rigs import evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _CELLS = 9
@@ -30,7 +30,8 @@ _MARGIN = 1.5
 _HIGHEST_CUTOFF = 0.8
 """Of the Nyquist frequency."""
 _ORDER = 4
-_NOTHING = float("nan")
+NOTHING = float("nan")
+"""In place of a force that is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,33 @@ class _Motion:
     v: NDArray[np.float64]
     force: NDArray[np.float64]
     force_noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A motion and the force that is lacking there, of all records one after the other.
+
+    Attributes
+    ----------
+    x, v, force
+        Displacement, velocity and force, shape (n_samples,).
+    force_noise
+        Standard deviation that the sensors' noise gives the force.
+    forced
+        Outputs that the force acts on.
+    units
+        Of each key of a part.
+    joint
+        Whose motion; empty on a rig with one.
+    """
+
+    x: NDArray[np.float64]
+    v: NDArray[np.float64]
+    force: NDArray[np.float64]
+    force_noise: float
+    forced: tuple[str, ...]
+    units: Mapping[str, str]
+    joint: str = ""
 
 
 def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
@@ -58,30 +86,50 @@ def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tu
     if not scored:
         return ()
     motions = [_motion(bench, linear.fit.values, trace) for trace in scored]
-    x = np.concatenate([motion.x for motion in motions])
-    v = np.concatenate([motion.v for motion in motions])
-    force = np.concatenate([motion.force for motion in motions])
     # Where no record's residual stands out there is no force to speak of, and of the others the noisiest speaks for all.
     levels = [motion.force_noise for motion in motions if np.isfinite(motion.force_noise)]
-    force_noise = max(levels, default=_NOTHING)
-    columns, x_edges = _cells(x)
-    rows, v_edges = _cells(v)
+    plane = Plane(
+        x=np.concatenate([motion.x for motion in motions]),
+        v=np.concatenate([motion.v for motion in motions]),
+        force=np.concatenate([motion.force for motion in motions]),
+        force_noise=max(levels, default=NOTHING),
+        forced=(bench.rig.outputs[0].name,),
+        units=plane_units(bench.rig.units),
+    )
+    return plane_parts(bench, plane, scored)
+
+
+def plane_parts(bench: Workbench, plane: Plane, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+    """Return the gap of each output over a coarse grid of a plane.
+
+    Parameters
+    ----------
+    bench
+        Rig and noise.
+    plane
+        Motion and force.
+    scored
+        The records that they are of.
+    """
+    columns, x_edges = _cells(plane.x)
+    rows, v_edges = _cells(plane.v)
     cell = columns * _CELLS + rows
     parts = []
-    for index, signal in enumerate(bench.rig.outputs):
+    for signal in bench.rig.outputs:
         holding = np.concatenate([np.full(t.t.size, signal.name in t.measured) for t in scored])
         if not np.any(holding):
             continue
         with_output = [trace for trace in scored if signal.name in trace.measured]
         spread = float(np.std(np.concatenate([t.measured[signal.name] for t in with_output]))) or 1.0
         residuals = {s: np.concatenate([t.residual(s, signal.name) for t in with_output]) for s in STAGES}
-        own_cell, own_force = cell[holding], force[holding]
+        own_cell, own_force = cell[holding], plane.force[holding]
         total = float(np.sum(residuals["reidentified"] ** 2)) or 1.0
         noise = bench.noise[signal.name]
+        is_forced = signal.name in plane.forced
         for i in np.unique(own_cell):
             inside = own_cell == i
             n_samples = int(np.count_nonzero(inside))
-            lacking = own_force[inside] if index == 0 else np.array([_NOTHING])
+            lacking = own_force[inside] if is_forced else np.array([NOTHING])
             column, row = divmod(int(i), _CELLS)
             parts.append(
                 StatePart(
@@ -97,8 +145,9 @@ def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tu
                     n_samples=n_samples,
                     force_mean=_finite_mean(lacking),
                     force_rms=float(np.sqrt(_finite_mean(lacking**2))),
-                    force_noise=force_noise if index == 0 else _NOTHING,
-                    units=_units(bench.rig),
+                    force_noise=plane.force_noise if is_forced else NOTHING,
+                    units=plane.units,
+                    joint=plane.joint,
                 )
             )
     return tuple(parts)
@@ -116,7 +165,7 @@ def _motion(bench: Workbench, values: Mapping[str, float], trace: Trace) -> _Mot
     residual = trace.residual("reidentified", response)
     own = _low_pass(residual, trace.dt, bench.noise[response])
     if own is None:
-        force, noise = np.full(residual.size, _NOTHING), _NOTHING
+        force, noise = np.full(residual.size, NOTHING), NOTHING
     else:
         m, d, k = (
             evaluated(e, values) for e in (rig.motion.inertia, rig.motion.damping, rig.motion.stiffness)
@@ -158,11 +207,18 @@ def _cells(values: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.fl
 
 def _finite_mean(values: NDArray[np.float64]) -> float:
     finite = values[np.isfinite(values)]
-    return float(np.mean(finite)) if finite.size else _NOTHING
+    return float(np.mean(finite)) if finite.size else NOTHING
 
 
-def _units(rig: Rig) -> dict[str, str]:
-    x, time, force = rig.units["x"], rig.units["time"], rig.units["force"]
+def plane_units(units: Mapping[str, str]) -> dict[str, str]:
+    """Return the unit of each key of a part from those of the base quantities where the motion is.
+
+    Parameters
+    ----------
+    units
+        Of ``"x"``, ``"time"`` and ``"force"``.
+    """
+    x, time, force = units["x"], units["time"], units["force"]
     return {
         **dict.fromkeys(("x_low", "x_high"), x),
         **dict.fromkeys(("v_low", "v_high"), f"{x}/{time}"),

@@ -145,7 +145,8 @@ def improved(
     gains = gains_of(cases, _intensities(followed, tried, n_records))
     costs = _squares(cases, gains) + gains.log_variances
     for own, one, ranked in zip(tried, followed, costs.reshape(len(followed), n_records, -1), strict=True):
-        one.decade = float(own[int(np.argmin(np.sum(ranked, axis=0)))])
+        known = np.nan_to_num(np.sum(ranked, axis=0), nan=np.inf)
+        one.decade = float(own[int(np.argmin(known))])
     chosen = np.array([[one.decade] for one in followed])
     gains = gains_of(cases, _intensities(followed, chosen, n_records), keep=True)
     found = smoothed(cases, gains, cases.drive[..., 0], cases.data[..., 0])

@@ -163,7 +163,9 @@ class Gains:
     @property
     def log_variances(self) -> Floats:
         """Sum of the logarithms of all variances, shape (n_cases, n_intensities)."""
-        return np.asarray(np.sum(np.log(self.variance), axis=(0, 3)))
+        # An intensity at which rounding made a variance negative has no likelihood.
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sum(np.log(self.variance), axis=(0, 3)))
 
 
 def gains_of(cases: Cases, intensities: Floats, keep: bool = False) -> Gains:
@@ -218,7 +220,8 @@ def whitened(cases: Cases, gains: Gains, drive: AtSample, data: AtSample, tell: 
         Called with every whitened row, samples in order.
     """
     n_samples, n_cases, n_outputs, n = cases.seen.shape
-    root = np.sqrt(gains.variance)
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(gains.variance)
     state = np.zeros((n_cases, gains.variance.shape[2], n, data(0).shape[2]))
     for k in range(n_samples):
         shown = data(k)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.discover.held_out import split
-from rigsight.discover.joints.joint_force import JointForce, missing_forces
+from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
 from rigsight.discover.regression import information_criterion
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
@@ -41,8 +41,6 @@ from rigsight.simulate.model import Model
 Floats = NDArray[np.float64]
 
 _EVALUATIONS = 100
-_CONTRADICTED = 3.0
-"""Factor over the least contradiction of the sensors at which a joint is ruled out: its law is not polished."""
 _FLOOR = 1.5
 """Noise floors from which on something is missing still."""
 _NO_WORSE = 1.05
@@ -96,10 +94,10 @@ def discover_at_joints(
     centered = without_offsets(polisher.estimation, alone.fit)
     joints = missing_forces(task.rig, centered, known, task.noise, np.random.default_rng(seed))
     say("missing forces")
-    least = min(force.error_over_noise for force in joints)
     found = [alone]
-    for force in joints:
-        if force.law.terms and force.error_over_noise <= _CONTRADICTED * least:
+    # The law of a joint that is ruled out is not polished.
+    for force in not_contradicted(joints):
+        if force.law.terms:
             start = {**known, **force.parameters}
             found.append(polisher.polished(force.law.terms, start))
             say(", ".join(term.effect.name for term in force.law.terms))
@@ -324,10 +322,8 @@ def _warnings(
 ) -> list[str]:
     """Return what a user should know, one sentence each."""
     found = [how] if how else []
-    first = joints[0]
-    ruled_out = [
-        force.joint for force in joints if force.error_over_noise > _CONTRADICTED * first.error_over_noise
-    ]
+    first, agreeing = joints[0], not_contradicted(joints)
+    ruled_out = [force.joint for force in joints if force not in agreeing]
     if ruled_out:
         found.append(
             f"No force at {' or '.join(ruled_out)} alone explains what all sensors show; at {first.joint} one does, "

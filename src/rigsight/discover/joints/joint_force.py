@@ -31,6 +31,8 @@ _RULED_OUT = 3.0
 """Factor over the least contradiction of the sensors (RMS) at which a joint is ruled out."""
 _SETTLED = 0.01
 """Relative change of parameters and coefficients from which another round changes nothing."""
+_CONTRADICTED = 3.0
+"""Factor over the least contradiction of the sensors at which a joint is ruled out in the end."""
 _LARGE = 98.0
 """Percentile of a motion or a force that is its size."""
 
@@ -205,6 +207,18 @@ def missing_forces(
     ]
     still_open = {one.joint.name for one in open_joints}
     return tuple(sorted(forces, key=lambda force: (force.joint not in still_open, force.criterion)))
+
+
+def not_contradicted(forces: Sequence[JointForce]) -> tuple[JointForce, ...]:
+    """Return the missing forces that the sensors contradict no more than a few times as much as the one they contradict least.
+
+    Parameters
+    ----------
+    forces
+        As of `missing_forces`.
+    """
+    least = min((force.error_over_noise for force in forces), default=0.0)
+    return tuple(force for force in forces if force.error_over_noise <= _CONTRADICTED * least)
 
 
 def _improved(

@@ -6,6 +6,7 @@ decides, and it is the same quantity for all joints, so that it also says at whi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -80,12 +81,13 @@ class LawTerm:
         return f"{shape} ({kind}: {numbers})"
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; what stands inside a term has no standard error of its own."""
+        """Return plain data; what stands inside a term has no standard error of its own, nor has what is not determined."""
+        known = {name: std for name, std in self.std.items() if math.isfinite(std)}
         return {
             "name": kind_of(self.effect.name),
             "where": self.effect.at,
             "coefficients": {
-                name: {"value": value, "std": self.std.get(name), "unit": self.units[name]}
+                name: {"value": value, "std": known.get(name), "unit": self.units[name]}
                 for name, value in self.values.items()
             },
         }

@@ -8,6 +8,7 @@ minima are fitted roughly by simulation, and the one that leaves least is the st
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from rigsight.errors import InputError
 from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
-from rigsight.identify.rig_equations import equations_of
+from rigsight.identify.rig_equations import RigEquations, equations_of
 from rigsight.identify.start.linearized_responses import LinearizedResponses
 from rigsight.identify.start.place_scales import scales_at_places
 from rigsight.identify.start.spread_search import AGREEING, PERSISTENT, balanced, ends_of_search
@@ -27,7 +28,7 @@ from rigsight.identify.typical_size import size_of_signal
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-from rigsight.simulate import compose
+from rigsight.simulate import compose, parameter_vector
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 Floats = NDArray[np.float64]
@@ -116,6 +117,8 @@ def _minima(
     rng = np.random.default_rng(_SEED)
     weak = WeakEquations(equations, records, values, names)
     space = balanced(sought, weak.term_sizes)
+    sizes = {**values, **dict(zip(names, map(float, space.expected), strict=True))}
+    space = balanced(_masses_positive(equations, sought, sizes), weak.term_sizes)
 
     def ends(
         errors: Callable[[Floats], Floats], agreeing: int, is_weak: bool
@@ -134,6 +137,20 @@ def _minima(
     yield from ends(linear.errors, PERSISTENT, False)
     if weak.n_records:
         yield from ends(weak.errors, PERSISTENT, True)
+
+
+def _masses_positive(
+    equations: RigEquations, sought: Sequence[Parameter], sizes: Mapping[str, float]
+) -> list[Parameter]:
+    """Return the unknown parameters, those without which something has no mass above zero: a file need not bound them."""
+    still = np.zeros((equations.n_states, 1)), np.zeros((3 * len(equations.rig.inputs), 1))
+
+    def is_massless(without: str) -> bool:
+        p = parameter_vector(equations.structure, {**sizes, without: 0.0})
+        masses = equations.mass(*still, p)
+        return bool(np.all(np.isfinite(masses)) and np.linalg.matrix_rank(masses[0]) < masses.shape[1])
+
+    return [replace(p, lower=0.0) if p.lower < 0.0 and is_massless(p.name) else p for p in sought]
 
 
 class _Rough:

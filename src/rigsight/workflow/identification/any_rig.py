@@ -35,7 +35,7 @@ from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
-from rigsight.rigs import RIGS, Rig
+from rigsight.rigs import Rig, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
@@ -58,20 +58,17 @@ _GROWTHS = 3.0
 
 
 def has_transfer_forms(campaign: Campaign) -> bool:
-    """Return True for the built-in rigs of one motion, whose transfer functions are fitted record by record.
+    """Return True for rigs with the equations of a built-in one of one motion: their transfer functions are fitted by record.
 
     A rig of the same shape from a file has names of its own; records of different constants have no such form together, and one
     in which nothing drives the rig has none. Offsets that differ from record to record are found over time alone.
     """
     rig = campaign.rig
-    if not _is_built_in(rig) or any(record.constants or record.free_offsets for record in campaign.records):
+    if not is_built_in_motion(rig) or any(
+        record.constants or record.free_offsets for record in campaign.records
+    ):
         return False
     return not any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
-
-
-def _is_built_in(rig: Rig) -> bool:
-    """Return True for a built-in rig of one motion."""
-    return rig.has_one_motion and rig.name in RIGS and RIGS[rig.name].mechanism == rig.mechanism
 
 
 def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: Listener) -> Identification:
@@ -171,7 +168,7 @@ def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | No
     """Return parameters that these records say nothing about, and of those that they tell up to a common factor one."""
     rig = campaign.rig
     held = {}
-    if _is_built_in(rig):
+    if is_built_in_motion(rig):
         no_spring = rig.is_driven and campaign.parameters.get(str(rig.motion.stiffness)) == 0.0
         held = held_parameters(campaign, records, no_spring)
     return held if factor is None else {**held, factor.held: factor.value}
