@@ -249,7 +249,7 @@ class Bench:
         It is far behind what was done before or what all of these came to at the same stage, so that the order in which threads
         do them changes nothing.
         """
-        looks = list(self.threads.side_by_side(self._first_look, attempts))
+        looks = self._first_looks(attempts)
         costs = [trial.fit.cost for trial in self.trials.values()] + [look.fit.cost for look in looks]
         hopeless = HOPELESS**2 * min(costs, default=float("inf"))
 
@@ -281,17 +281,38 @@ class Bench:
 
         return list(self.threads.side_by_side(finished, rough))
 
-    def _first_look(self, attempt: Attempt) -> _Look:
-        """Return the better one of the fits from the regression's values and from those of the best support it contains."""
-        structure = self.structure(attempt.support, attempt.release)
-        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
-        free = self.free_parameters(structure, attempt.left_out)
-        starts = [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
-        fits = [
-            problem.fit(start, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
-            for start in starts
+    def _first_looks(self, attempts: Sequence[Attempt]) -> list[_Look]:
+        """Return for each attempt the better one of the fits from the regression's values and from those of the best support
+        that it contains."""
+        structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
+        problems = [
+            GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
+            for structure in structures
         ]
-        return _Look(attempt, problem, min(fits, key=lambda fit: fit.cost))
+        starts = [
+            [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
+            for attempt, structure in zip(attempts, structures, strict=True)
+        ]
+        # Second starts come last: beside the first one they would only wait for the same kernel to be compiled.
+        begun = [
+            (number, own[rank])
+            for rank in range(max(map(len, starts), default=0))
+            for number, own in enumerate(starts)
+            if rank < len(own)
+        ]
+
+        def looked(begin: tuple[int, Mapping[str, float]]) -> FitResult:
+            number, start = begin
+            free = self.free_parameters(structures[number], attempts[number].left_out)
+            return problems[number].fit(
+                start, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
+            )
+
+        best: dict[int, FitResult] = {}
+        for (number, _), fit in zip(begun, self.threads.side_by_side(looked, begun), strict=True):
+            if number not in best or fit.cost < best[number].cost:
+                best[number] = fit
+        return [_Look(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
     def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
         """Return the regression's values, and beside them those of the lowest cost that a contained support came to.
