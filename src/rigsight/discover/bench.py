@@ -25,6 +25,10 @@ HOPELESS = 10.0
 _FAR = 2.0
 """Factor over the best held-out error from which finding better initial states changes no choice."""
 _TOLERANCE = 1e-5
+"""Relative change of the cost at which a fit of the search stops, and a score: with ten thousand independent samples that is a
+hundredth of the difference of criteria that decides."""
+_FULL = 1e-7
+"""The same for what is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +244,8 @@ class Bench:
         return [again if again.excess < first.excess else first for first, again in pairs]
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
-        """Simulate the held-out records with a fit; only their initial states are estimated."""
-        return self._finely_scored(self._roughly_scored(support, fit))
+        """Simulate the held-out records with a fit; only their initial states are estimated, to full precision."""
+        return self._finely_scored(self._roughly_scored(support, fit), _FULL)
 
     def _polished(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
         """Fit and score; what is far behind is left as it is.
@@ -339,10 +343,10 @@ class Bench:
         )
         return _RoughTrial(support, fit, problem, score)
 
-    def _finely_scored(self, trial: _RoughTrial) -> Trial:
+    def _finely_scored(self, trial: _RoughTrial, tolerance: float = _TOLERANCE) -> Trial:
         if not np.isfinite(trial.excess) or trial.score is None:
             return trial.as_it_is()
-        score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states)
+        score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states, tolerance=tolerance)
         if not score.residuals:
             return Trial(trial.support, trial.fit, float("inf"), np.zeros(0))
         output = self.rig.outputs[0].name
