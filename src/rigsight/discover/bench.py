@@ -224,13 +224,17 @@ class Bench:
         return [self.trials[attempt.key] for attempt in attempts]
 
     def shortened(self, supports: Sequence[Support], longer: Trial) -> list[Trial]:
-        """Polish supports once more from the values that a longer one ended at, and keep the better of both."""
-        kept = longer.fit.structure.special_cases
+        """Polish supports once more from the values that a longer one ended at, and keep the better of both.
+
+        What the longer one moved off its special value is moved here too; a term that it lacks stays at its own.
+        """
+        moved = {name for e in longer.fit.structure.effects for name in e.special_cases}
+        moved -= longer.fit.structure.special_cases
         before = self.trials_of([Attempt(support) for support in supports])
         attempts = []
         for support, first in zip(supports, before, strict=True):
             special = {name for n in support for name in self.candidates[n].effect.special_cases}
-            release = frozenset(special - kept)
+            release = frozenset(special & moved)
             structure = self.structure(support, release)
             start = {
                 **self.starts.regressed(structure, support),
