@@ -290,8 +290,7 @@ class Bench:
         return list(self.threads.side_by_side(finished, rough))
 
     def _first_looks(self, attempts: Sequence[Attempt]) -> list[_Look]:
-        """Return for each attempt the better one of the fits from the regression's values and from those of the best support
-        that it contains."""
+        """Return for each attempt the better one of the fits from its starts."""
         structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
         problems = [
             GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
