@@ -6,6 +6,8 @@ import errno
 import os
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,6 +100,29 @@ def test_other_equations_are_another_file(fresh_cache):
     assert len(texts) == 3
     files = {kernel_cache.kernel_of(compose(AXIS, effects)).path for effects in ((), (delay,), (halved,))}
     assert len(files) == 3
+
+
+def test_other_kernels_do_not_wait_for_one_that_is_compiled_and_the_same_one_is_compiled_once(
+    fresh_cache, monkeypatch
+):
+    together, started = threading.Barrier(2, timeout=60.0), []
+    library = kernel_cache.first_library
+
+    def first_library(sources, options):
+        # Passed only if a second compiler is started before the first one is done.
+        together.wait()
+        started.append(sources)
+        return library(sources, options)
+
+    monkeypatch.setattr(kernel_cache, "first_library", first_library)
+    delay = effect_named("input_delay")
+    structures = [compose(AXIS), replace(compose(AXIS)), compose(AXIS, [delay]), compose(AXIS, [delay])]
+    with ThreadPoolExecutor(len(structures)) as threads:
+        kernels = list(threads.map(kernel_cache.kernel_of, structures))
+    assert len(started) == 2
+    assert kernels[0] is kernels[1]
+    assert kernels[2] is kernels[3]
+    assert kernels[0] is not kernels[2]
 
 
 def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):

@@ -25,6 +25,10 @@ HOPELESS = 10.0
 _FAR = 2.0
 """Factor over the best held-out error from which finding better initial states changes no choice."""
 _TOLERANCE = 1e-5
+"""Relative change of the cost at which a fit of the search stops, and a score: with ten thousand independent samples that is a
+hundredth of the difference of criteria that decides."""
+_FULL = 1e-7
+"""The same for what is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,13 +224,17 @@ class Bench:
         return [self.trials[attempt.key] for attempt in attempts]
 
     def shortened(self, supports: Sequence[Support], longer: Trial) -> list[Trial]:
-        """Polish supports once more from the values that a longer one ended at, and keep the better of both."""
-        kept = longer.fit.structure.special_cases
+        """Polish supports once more from the values that a longer one ended at, and keep the better of both.
+
+        What the longer one moved off its special value is moved here too; a term that it lacks stays at its own.
+        """
+        moved = {name for e in longer.fit.structure.effects for name in e.special_cases}
+        moved -= longer.fit.structure.special_cases
         before = self.trials_of([Attempt(support) for support in supports])
         attempts = []
         for support, first in zip(supports, before, strict=True):
             special = {name for n in support for name in self.candidates[n].effect.special_cases}
-            release = frozenset(special - kept)
+            release = frozenset(special & moved)
             structure = self.structure(support, release)
             start = {
                 **self.starts.regressed(structure, support),
@@ -240,8 +248,8 @@ class Bench:
         return [again if again.excess < first.excess else first for first, again in pairs]
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
-        """Simulate the held-out records with a fit; only their initial states are estimated."""
-        return self._finely_scored(self._roughly_scored(support, fit))
+        """Simulate the held-out records with a fit; only their initial states are estimated, to full precision."""
+        return self._finely_scored(self._roughly_scored(support, fit), _FULL)
 
     def _polished(self, attempts: Sequence[Attempt], progress: Progress = lambda _: None) -> list[Trial]:
         """Fit and score; what is far behind is left as it is.
@@ -249,7 +257,7 @@ class Bench:
         It is far behind what was done before or what all of these came to at the same stage, so that the order in which threads
         do them changes nothing.
         """
-        looks = list(self.threads.side_by_side(self._first_look, attempts))
+        looks = self._first_looks(attempts)
         costs = [trial.fit.cost for trial in self.trials.values()] + [look.fit.cost for look in looks]
         hopeless = HOPELESS**2 * min(costs, default=float("inf"))
 
@@ -281,17 +289,37 @@ class Bench:
 
         return list(self.threads.side_by_side(finished, rough))
 
-    def _first_look(self, attempt: Attempt) -> _Look:
-        """Return the better one of the fits from the regression's values and from those of the best support it contains."""
-        structure = self.structure(attempt.support, attempt.release)
-        problem = GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
-        free = self.free_parameters(structure, attempt.left_out)
-        starts = [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
-        fits = [
-            problem.fit(start, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
-            for start in starts
+    def _first_looks(self, attempts: Sequence[Attempt]) -> list[_Look]:
+        """Return for each attempt the better one of the fits from its starts."""
+        structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
+        problems = [
+            GreyBoxFit(structure, self.estimation, self.scales, self.noise, threads=self.threads)
+            for structure in structures
         ]
-        return _Look(attempt, problem, min(fits, key=lambda fit: fit.cost))
+        starts = [
+            [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
+            for attempt, structure in zip(attempts, structures, strict=True)
+        ]
+        # Second starts come last: beside the first one they would only wait for the same kernel to be compiled.
+        begun = [
+            (number, own[rank])
+            for rank in range(max(map(len, starts), default=0))
+            for number, own in enumerate(starts)
+            if rank < len(own)
+        ]
+
+        def looked(begin: tuple[int, Mapping[str, float]]) -> FitResult:
+            number, start = begin
+            free = self.free_parameters(structures[number], attempts[number].left_out)
+            return problems[number].fit(
+                start, free, max_evaluations=_FIRST_EVALUATIONS, tolerance=_TOLERANCE, finish=False
+            )
+
+        best: dict[int, FitResult] = {}
+        for (number, _), fit in zip(begun, self.threads.side_by_side(looked, begun), strict=True):
+            if number not in best or fit.cost < best[number].cost:
+                best[number] = fit
+        return [_Look(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
     def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
         """Return the regression's values, and beside them those of the lowest cost that a contained support came to.
@@ -318,10 +346,10 @@ class Bench:
         )
         return _RoughTrial(support, fit, problem, score)
 
-    def _finely_scored(self, trial: _RoughTrial) -> Trial:
+    def _finely_scored(self, trial: _RoughTrial, tolerance: float = _TOLERANCE) -> Trial:
         if not np.isfinite(trial.excess) or trial.score is None:
             return trial.as_it_is()
-        score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states)
+        score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states, tolerance=tolerance)
         if not score.residuals:
             return Trial(trial.support, trial.fit, float("inf"), np.zeros(0))
         output = self.rig.outputs[0].name

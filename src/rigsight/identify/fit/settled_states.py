@@ -55,7 +55,7 @@ def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
     guesses = [first_state(data.structure, d.record, values) for d in data.records]
     p = parameter_vector(data.structure, values)
     if np.any(data.limited):
-        return [_placed(data, *pair, p, values) for pair in zip(data.records, guesses, strict=True)]
+        return data.of_each_record(lambda i: _placed(data, data.records[i], guesses[i], p, values))
 
     def settled(index: int) -> Floats:
         record = data.records[index]

@@ -43,7 +43,9 @@ _CHECKSUM_SIZE = 64
 
 _kernels: dict[str, Kernel] = {}
 _by_identity: dict[int, tuple[Structure, str]] = {}
-_lock = threading.RLock()
+_lock = threading.Lock()
+_made: dict[str, threading.Lock] = {}
+"""Who makes a kernel; another one may be compiled at the same time."""
 
 
 def cache_folder() -> Path:
@@ -83,22 +85,32 @@ def kernel_of(structure: Structure) -> Kernel:
     MachineError
         If the cache folder cannot be written, or the compiler fails.
     """
-    known = _by_identity.get(id(structure))
-    if known is not None and known[0] is structure and known[1] in _kernels:
-        return _kernels[known[1]]
-    text = kernel_source(structure)
-    key = hashlib.sha256(text.encode()).hexdigest()
+    known = _loaded(structure)
+    if known is not None:
+        return known
     with _lock:
+        known = _loaded(structure)
+        if known is not None:
+            return known
+        # Threads write texts one after the other, which takes no longer: this is all Python. Compilers run side by side.
+        text = kernel_source(structure)
+        key = hashlib.sha256(text.encode()).hexdigest()
+        own = _made.setdefault(key, threading.Lock())
+    with own:
         if key not in _kernels:
             _kernels[key] = Kernel(_library_file(text), structure)
         _by_identity[id(structure)] = (structure, key)
         return _kernels[key]
 
 
+def _loaded(structure: Structure) -> Kernel | None:
+    known = _by_identity.get(id(structure))
+    return _kernels.get(known[1]) if known is not None and known[0] is structure else None
+
+
 def compiled(structure: Structure) -> bool:
     """Return True if this machine holds the machine code of a structure's kernels already."""
-    known = _by_identity.get(id(structure))
-    if known is not None and known[0] is structure and known[1] in _kernels:
+    if _loaded(structure) is not None:
         return True
     text = kernel_source(structure)
     return any(_sound(_path(text, compiler)) for compiler in c_compilers())
