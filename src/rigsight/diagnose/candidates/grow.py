@@ -19,7 +19,8 @@ import numpy as np
 
 from rigsight.diagnose.candidates.characterize import finished, followed, refine
 from rigsight.diagnose.candidates.first_look import Look, look_at, widened
-from rigsight.diagnose.places.search import search_places
+from rigsight.diagnose.places.search import search_partners
+from rigsight.diagnose.places.suspects import structures_of_lineup
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -172,11 +173,14 @@ def _grown_from(
     singles: Sequence[Scored],
     prepare: Prepare | None,
 ) -> list[Scored]:
-    partners = [
+    open_ones = [
         effect
-        for effect in search_places(bench, parent, bench.offered(effects)).effects
+        for effect in bench.offered(effects)
         if effect not in parent.effects and not _known_pair(known, parent, effect)
     ]
+    if prepare is not None:
+        prepare(structures_of_lineup(bench.rig, open_ones, (*bench.modelled, *parent.effects)))
+    partners = search_partners(bench, parent, open_ones)
     return _pairs(bench, parent, partners, singles, prepare)
 
 

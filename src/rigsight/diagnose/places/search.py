@@ -1,4 +1,7 @@
-"""Which places of a rig are worth the fits? Those at which some push takes away nearly as much of the gap as at the best one."""
+"""Which places of a rig, and which effects beside one that is known, are worth the fits?
+
+Those at which some push, or whose own push, takes away nearly as much of what is left as the best one does.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,10 @@ from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 
 _WORTH_LOOKING = 0.5
-"""Share of what the best place takes away from which another place is looked at.
+"""Share of what the best place, or the best partner, takes away from which another one is looked at.
 
 An assumption, made before 80 drive trains were drawn (experiments/places): a push has the form of a start and not of the fit, so
-that the true place of a large gap may come second.
+that the true place of a large gap may come second. For partners it is the same, as a push beside a fitted effect has less to explain.
 """
 
 
@@ -66,8 +69,32 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
     return Search(tuple(places), tuple(first), tuple(effect for effect in effects if effect not in first))
 
 
+def search_partners(bench: Workbench, model: Scored, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects that are worth a look beside those of a model.
+
+    On a rig with several motions they are those at the places that are looked at, on one with one motion those whose own push takes
+    away enough.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    model
+        An effect that leaves something, fitted.
+    effects
+        Candidates at their places.
+    """
+    if not bench.rig.has_one_motion:
+        return search_places(bench, model, effects).effects
+    pushing = [effect for effect in effects if not _stands_for_itself(effect)]
+    shares = {suspect.effect.name: suspect.share for suspect in Lineup(bench, model).suspects(pushing)}
+    enough = _WORTH_LOOKING * max(shares.values(), default=0.0)
+    return tuple(e for e in effects if shares.get(e.name, enough) >= enough)
+
+
 def _stands_for_itself(effect: Effect) -> bool:
-    return effect.pulsation is not None or effect.wave_number is not None
+    """Return True for what pulsates by itself, comes back with the position, or is no push at a joint, a drive or a sensor."""
+    return effect.pulsation is not None or effect.wave_number is not None or effect.lateral is not None
 
 
 def _by_place(bench: Workbench, suspects: Sequence[Suspect]) -> dict[str, float]:

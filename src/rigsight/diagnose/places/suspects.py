@@ -14,7 +14,7 @@ residual.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ class Lineup:
 
     def __init__(self, bench: Workbench, model: Scored) -> None:
         self._answers = Answers(bench, bench.estimation, model.fit, model.effects, model.fit.free)
-        self._bench = self._answers.bench
+        self._bench = replace(self._answers.bench, scales=self._answers.scales)
         self._fit = model.fit
         # Known before threads ask for them side by side.
         _ = self._answers.left, self._answers.motions
@@ -206,7 +206,10 @@ def structures_of_lineup(
     by_themselves = {
         kind_of(effect.name): alone(effect)[0]
         for effect in effects
-        if effect.pulsation is None and effect.wave_number is None and not _is_late(effect)
+        if effect.pulsation is None
+        and effect.wave_number is None
+        and effect.lateral is None
+        and not _is_late(effect)
     }
     return [compose(with_probes(rig), modelled), *by_themselves.values()]
 
