@@ -17,7 +17,7 @@ _WORTH_LOOKING = 0.5
 """Share of what the best place, or the best partner, takes away from which another one is looked at.
 
 An assumption, made before 80 drive trains were drawn (experiments/places): a push has the form of a start and not of the fit, so
-that the true place of a large gap may come second. For partners it is the same, as a push beside a fitted effect has less to explain.
+that the true place of a large gap may come second. The same number serves for partners.
 """
 
 
@@ -72,8 +72,8 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
 def search_partners(bench: Workbench, model: Scored, effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects that are worth a look beside those of a model.
 
-    On a rig with several motions they are those at the places that are looked at, on one with one motion those whose own push takes
-    away enough.
+    On a rig with several motions they are those at the places that are looked at, on one with one motion those whose own push
+    takes away enough.
 
     Parameters
     ----------
