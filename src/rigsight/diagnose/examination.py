@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.adequacy import AGAINST_A_FLOOR, SIGNIFICANCE, Adequacy, adequacy
 from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
-from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candidates, fit_linear, refine
+from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
 from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.candidates.one_law import told_apart
@@ -265,17 +265,16 @@ def _singly(
     if task.given:
         say("given simulation")
     quality = data_quality(bench, task.records, linear)
-    search = search_places(bench, linear, effects)
-    if search.places:
-        say("places")
+    search = search_places(bench, linear, bench.offered(effects))
+    say("suspects")
     if prepare is not None:
         prepare([bench.simplest((effect,)) for effect in search.effects])
     singles = fit_candidates(bench, linear, search.effects, say)
     if search.others and min((model.excess for model in singles), default=np.inf) > AT_FLOOR:
-        # Nothing right may be lost where the places were ranked wrongly.
+        # Nothing right may be lost where places or effects were ranked wrongly.
         if prepare is not None:
             prepare([bench.simplest((effect,)) for effect in search.others])
-        singles = refine(bench, [*singles, *fit_candidates(bench, linear, search.others, say)])
+        singles = fit_candidates(bench, linear, search.others, say, singles)
     return _Singly(windowing, bench, before, linear, quality, singles, search)
 
 

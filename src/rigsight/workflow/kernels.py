@@ -11,7 +11,7 @@ from rigsight.diagnose import candidates_on, structures_of_lineup
 from rigsight.effects import Effect
 from rigsight.errors import check_in_range
 from rigsight.rigs import Rig
-from rigsight.simulate import Structure, compose, special_values
+from rigsight.simulate import Structure, compose
 from rigsight.simulate.compiled.precompile import compile_kernels, compiled
 from rigsight.workflow.progress import Listener, Stage, silent
 
@@ -37,17 +37,9 @@ def checked_jobs(n_jobs: int | None) -> int:
 def structures_to_try(
     rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
 ) -> list[Structure]:
-    """Return the structures that a diagnosis simulates first: as modelled, and with each effect more that makes sense.
-
-    On a rig with several places, where a diagnosis looks for the place first, these are its pushes and each effect by itself.
-    """
+    """Return the structures that a diagnosis simulates first: as modelled, pushed at every place, and each effect by itself."""
     offered = candidates_on(rig, effects, modelled)
-    if not rig.has_one_motion:
-        return [compose(rig, modelled), *structures_of_lineup(rig, offered, modelled)]
-    return [
-        compose(rig, modelled),
-        *(compose(rig, (*modelled, effect), special_values(rig, [effect], modelled)) for effect in offered),
-    ]
+    return [compose(rig, modelled), *structures_of_lineup(rig, offered, modelled)]
 
 
 def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:

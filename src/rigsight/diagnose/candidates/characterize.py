@@ -65,8 +65,9 @@ def fit_candidates(
     linear: Scored,
     effects: Iterable[Effect],
     progress: Callable[[str], None] | None = None,
+    known: Sequence[Scored] = (),
 ) -> list[Scored]:
-    """Fit and score every effect alone.
+    """Return every effect alone, fitted and scored, with those that were before.
 
     Parameters
     ----------
@@ -78,13 +79,17 @@ def fit_candidates(
         Candidates; those that the rig does not offer are left out.
     progress
         Called with the name of each candidate that is done.
+    known
+        Effects that were fitted before: these start from them, and compete with them.
     """
     regression = None
     if bench.rig.has_one_motion and bench.rig.is_driven and bench.driven:
         regression = EffectRegression(bench.rig, bench.driven, linear.fit.values, bench.scales)
-    looks = _looks(bench, linear, bench.offered(effects), regression)
+    before = {model.effects[0].name: model.fit for model in known if np.isfinite(model.fit.cost)}
+    looks = _looks(bench, linear, bench.offered(effects), regression, before)
     wide = {look.newest: look for look in widened(bench, looks)}
-    lowest = min((look.cost for look in wide.values()), default=float("inf"))
+    costs = [*(look.cost for look in wide.values()), *(fit.cost for fit in before.values())]
+    lowest = min(costs, default=float("inf"))
 
     def one(found: Look) -> Scored:
         found = wide.get(found.newest, found)
@@ -97,7 +102,7 @@ def fit_candidates(
         return scored
 
     models = list(bench.threads.side_by_side(one, looks))
-    refined = with_a_mean_that_is_needed(bench, refine(bench, models))
+    refined = with_a_mean_that_is_needed(bench, refine(bench, [*known, *models]))
     late = {m.effects[0].at for m in refined if m.effects[0].measured_late is not None and not _shift(m)}
     return [model for model in refined if not (_shift(model) > 0.0 and model.effects[0].at in late)]
 
@@ -155,8 +160,9 @@ def _looks(
     linear: Scored,
     effects: Sequence[Effect],
     regression: EffectRegression | None,
+    known: Mapping[str, FitResult],
 ) -> list[Look]:
-    """Look at every effect; those that start from a simpler one come after it."""
+    """Look at every effect; those that start from a simpler one, if it is not known, come after it."""
     names = {effect.name for effect in effects}
     done: dict[str, Look] = {}
     waiting = list(effects)
@@ -168,7 +174,8 @@ def _looks(
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]
         ready = ready or waiting
         waiting = [effect for effect in waiting if effect not in ready]
-        parents = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
+        looked = {name: look.fits[0] for name, look in done.items() if np.isfinite(look.cost)}
+        parents = {**known, **looked}
         looks = list(bench.threads.side_by_side(partial(one, parents), ready))
         done.update({effect.name: look for effect, look in zip(ready, looks, strict=True)})
     return [done[effect.name] for effect in effects]

@@ -19,7 +19,7 @@ import numpy as np
 
 from rigsight.diagnose.candidates.characterize import finished, followed, refine
 from rigsight.diagnose.candidates.first_look import Look, look_at, widened
-from rigsight.diagnose.places.search import search_partners
+from rigsight.diagnose.places.search import search_places
 from rigsight.diagnose.places.suspects import structures_of_lineup
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.workbench import Scored, Workbench
@@ -180,7 +180,7 @@ def _grown_from(
     ]
     if prepare is not None:
         prepare(structures_of_lineup(bench.rig, open_ones, (*bench.modelled, *parent.effects)))
-    partners = search_partners(bench, parent, open_ones)
+    partners = search_places(bench, parent, open_ones).effects
     return _pairs(bench, parent, partners, singles, prepare)
 
 

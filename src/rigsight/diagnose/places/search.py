@@ -1,7 +1,4 @@
-"""Which places of a rig, and which effects beside one that is known, are worth the fits?
-
-Those at which some push, or whose own push, takes away nearly as much of what is left as the best one does.
-"""
+"""Which places of a rig, and which effects, are worth the fits? Those whose push takes nearly as much away as the best one."""
 
 from __future__ import annotations
 
@@ -14,10 +11,10 @@ from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 
 _WORTH_LOOKING = 0.5
-"""Share of what the best place, or the best partner, takes away from which another one is looked at.
+"""Share of what the best place, or the best effect, takes away from which another one is looked at.
 
 An assumption, made before 80 drive trains were drawn (experiments/places): a push has the form of a start and not of the fit, so
-that the true place of a large gap may come second. The same number serves for partners.
+that the true place of a large gap may come second. The same number serves for effects on rigs with one motion.
 """
 
 
@@ -30,7 +27,7 @@ class Search:
     places
         All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
     effects
-        Candidates at the places that are looked at.
+        Candidates that are looked at.
     others
         The rest, for a gap that none of these explains.
     """
@@ -41,7 +38,7 @@ class Search:
 
 
 def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) -> Search:
-    """Return the places at which what a model leaves may arise.
+    """Return the places at which what a model leaves may arise, on a rig with one motion the effects that may make it.
 
     Parameters
     ----------
@@ -52,12 +49,13 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
     effects
         Candidates at their places.
     """
-    if bench.rig.has_one_motion:
-        return Search((), tuple(effects))
     # What pulsates by itself goes with no motion, so that no push along one tells of it; what comes back with the position has
     # another form at every wave number.
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]
     suspects = Lineup(bench, model).suspects(pushing)
+    if bench.rig.has_one_motion:
+        promising = _promising(effects, suspects)
+        return Search((), promising, tuple(effect for effect in effects if effect not in promising))
     shares = _by_place(bench, suspects)
     most = max(shares.values(), default=0.0)
     places = sorted(
@@ -69,27 +67,13 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
     return Search(tuple(places), tuple(first), tuple(effect for effect in effects if effect not in first))
 
 
-def search_partners(bench: Workbench, model: Scored, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return the effects that are worth a look beside those of a model.
-
-    On a rig with several motions they are those at the places that are looked at, on one with one motion those whose own push
-    takes away enough.
-
-    Parameters
-    ----------
-    bench
-        Records, scales and noise.
-    model
-        An effect that leaves something, fitted.
-    effects
-        Candidates at their places.
-    """
-    if not bench.rig.has_one_motion:
-        return search_places(bench, model, effects).effects
-    pushing = [effect for effect in effects if not _stands_for_itself(effect)]
-    shares = {suspect.effect.name: suspect.share for suspect in Lineup(bench, model).suspects(pushing)}
+def _promising(effects: Sequence[Effect], suspects: Sequence[Suspect]) -> tuple[Effect, ...]:
+    """Return the effects whose push takes away enough, those that no push tells of, and the simpler ones that they start from."""
+    shares = {suspect.effect.name: suspect.share for suspect in suspects}
     enough = _WORTH_LOOKING * max(shares.values(), default=0.0)
-    return tuple(e for e in effects if shares.get(e.name, enough) >= enough)
+    found = [effect for effect in effects if shares.get(effect.name, enough) >= enough]
+    parents = {name for effect in found for name in effect.parents}
+    return tuple(effect for effect in effects if effect in found or effect.name in parents)
 
 
 def _stands_for_itself(effect: Effect) -> bool:
