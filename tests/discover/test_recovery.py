@@ -105,20 +105,20 @@ def test_too_much_noise_to_decide_is_said(make_task: Make) -> None:
 
 
 def test_one_amplitude_is_warned_of(make_task: Make) -> None:
-    _, task = make_task("linear", 2e-5, amplitudes=(0.6,))
+    _, task = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.6,))
     assert any("one amplitude" in warning for warning in discover(task).warnings)
     # What can be told apart there, and what cannot, is said with it.
-    _, task = make_task("cubic", 2e-5, amplitudes=(0.6,))
+    _, task = make_task("cubic", 2e-5, seconds=5.0, amplitudes=(0.6,))
     assert any("told apart" in w and "elsewhere they are untested" in w for w in discover(task).warnings)
     _, task = make_task("Coulomb", 1e-3, amplitudes=(0.6,), seconds=5.0)
     assert any("Nearly as good there is" in warning for warning in discover(task).warnings)
 
 
 def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_task: Make) -> None:
-    _, task = make_task("linear", 2e-5, amplitudes=(0.3, 0.6))
+    _, task = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.3, 0.6))
     assert not any("input of fitted ones" in warning for warning in discover(task).warnings)
     # Another measurement of the same sweep: other noise, and it starts a second later.
-    _, again = make_task("linear", 2e-5, amplitudes=(0.6,), seed=1, validation=False)
+    _, again = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.6,), seed=1, validation=False)
     twin = replace(again.records[0].slice(200, None), name="again", role="validation")
     estimation = tuple(record for record in task.records if record.role == "estimation")
     found = discover(replace(task, records=(*estimation, twin)))
@@ -126,7 +126,7 @@ def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_task
 
 
 def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None:
-    values, task = make_task("linear", 2e-5)
+    values, task = make_task("linear", 2e-5, seconds=5.0)
     found = discover(task, "full")
     inclusion = {term.name: term.inclusion for term in found.terms}
     assert inclusion["d"] > 0.9
@@ -135,7 +135,7 @@ def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None
 
 
 def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_task: Make) -> None:
-    values, task = make_task("cubic", 2e-6)
+    values, task = make_task("cubic", 2e-6, seconds=5.0)
     found = discover(task, pointwise=True)
     assert [term.name for term in found.kept] == ["cubic_stiffness"]
     assert found.kept[0].coefficients["k_3"].value == pytest.approx(values["k_3"], rel=1e-3)
@@ -162,7 +162,7 @@ def test_the_held_out_error_is_that_of_the_polished_equation(
 
 
 def test_without_validation_a_record_is_set_aside_and_this_is_said(make_task: Make) -> None:
-    _, task = make_task("cubic", 2e-5, validation=False)
+    _, task = make_task("cubic", 2e-5, seconds=5.0, validation=False)
     found = discover(task)
     assert found.held_out == ("sweep_0.6",)
     assert any("set aside" in warning for warning in found.warnings)
