@@ -35,7 +35,8 @@ demo: $(RUNNABLE) $(COMPILER)  ## run the whole chain on the built-in virtual ri
 	@begun=$$($(NOW)); $(BIN)/rigsight demo --out demo && echo "The demo took $$(($$($(NOW)) - begun)) s."
 
 test: $(DEVELOPMENT)  ## run all tests
-	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+	@# Tests start dozens of processes, each of which would compile a thousand Python files anew if Python could not keep them.
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 check: $(DEVELOPMENT)  ## format, lint, types, layers
 	$(BIN)/ruff format --check .

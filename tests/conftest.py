@@ -42,7 +42,7 @@ if hasattr(signal, "SIGHUP"):
 SHARED_DATA = Path(__file__).parents[1] / "../shared/data"
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The third-party records, which are not part of the repository."""
     if not SHARED_DATA.is_dir():

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Task, diagnose
+from rigsight.diagnose import Diagnosis, Task, diagnose
 from rigsight.diagnose.candidates.starts import restart_values
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
@@ -30,6 +31,11 @@ def fit_at():
 
 
 NEARLY_ALL_MEMORY = {**RIG, "k": 2500.0, "a": 0.03, "x_s": 0.002, "q": -0.4}
+TRUTHS = {
+    "nearly all memory": NEARLY_ALL_MEMORY,
+    "sliders of any size": {**RIG, "k": 180.0, "a": 0.55, "x_s": 0.008, "q": -0.7},
+    "large sliders": {**RIG, "k": 150.0, "a": 0.75, "x_s": 0.006, "q": 0.5},
+}
 
 
 def recorded(truth: Mapping[str, float], draw: int = 0, disturbance: int = 0) -> Task:
@@ -51,19 +57,20 @@ def recorded(truth: Mapping[str, float], draw: int = 0, disturbance: int = 0) ->
     return Task("memory", AXIS, {"gain": 1.0}, {}, tuple(records))
 
 
-@pytest.mark.parametrize(
-    ("k", "a", "x_s", "q"),
-    [(2500.0, 0.03, 0.002, -0.4), (180.0, 0.55, 0.008, -0.7), (150.0, 0.75, 0.006, 0.5)],
-    ids=["nearly all memory", "sliders of any size", "large sliders"],
-)
-def test_its_numbers_come_back(k: float, a: float, x_s: float, q: float) -> None:
-    truth = {**RIG, "k": k, "a": a, "x_s": x_s, "q": q}
-    found = diagnose(recorded(truth), [IWAN])
+@cache
+def diagnosed(name: str) -> Diagnosis:
+    """Return the diagnosis of undisturbed records, made once for the tests that look at it."""
+    return diagnose(recorded(TRUTHS[name]), [IWAN])
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_its_numbers_come_back(name: str) -> None:
+    truth, found = TRUTHS[name], diagnosed(name)
     assert found.effects == ("iwan_hysteresis",)
     best = found.candidates[0]
     assert best.excess < 1.1
-    for name in ("k", "a", "x_s", "q"):
-        assert best.parameters[name].value == pytest.approx(truth[name], rel=0.02), name
+    for number in ("k", "a", "x_s", "q"):
+        assert best.parameters[number].value == pytest.approx(truth[number], rel=0.02), number
 
 
 @pytest.mark.parametrize("draw", [4, 5, 6])
@@ -75,17 +82,12 @@ def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
         assert best.parameters[name].value == pytest.approx(NEARLY_ALL_MEMORY[name], rel=0.02), name
 
 
-@pytest.mark.parametrize(
-    "truth",
-    [NEARLY_ALL_MEMORY, {**RIG, "k": 180.0, "a": 0.55, "x_s": 0.008, "q": -0.7}],
-    ids=["nearly all memory", "sliders of any size"],
-)
-def test_rounding_moves_no_number(truth: Mapping[str, float]) -> None:
+@pytest.mark.parametrize("case", ["nearly all memory", "sliders of any size"])
+def test_rounding_moves_no_number(case: str) -> None:
     """A disturbance of 1e-9 of the noise stands for another processor; no number moves by a hundredth of its standard error."""
-    plain, *disturbed = (
-        diagnose(recorded(truth, disturbance=d), [IWAN]).candidates[0].parameters for d in (0, 1, 2)
-    )
-    for found in disturbed:
+    plain = diagnosed(case).candidates[0].parameters
+    for disturbance in (1, 2):
+        found = diagnose(recorded(TRUTHS[case], disturbance=disturbance), [IWAN]).candidates[0].parameters
         for name, estimate in plain.items():
             assert abs(found[name].value - estimate.value) < 0.01 * estimate.std, name
 

@@ -57,7 +57,7 @@ def _multisine(amplitude: float, seconds: float, rng: np.random.Generator) -> np
     return amplitude * u / np.std(u)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
     """Return the true values and the task of an axis: sweeps of several amplitudes, and a multisine that is held out."""
 

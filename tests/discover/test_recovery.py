@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from rigsight.discover import Task, discover
+from rigsight.discover import Discovery, Task, discover
 from rigsight.effects import effect_named
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
 
 Make = Callable[..., tuple[dict[str, float], Task]]
+Discovered = Callable[[str, float], tuple[dict[str, float], Task, Discovery]]
 Z_MAX = 4.5
 """Standard errors by which an estimate may be off: one in 10^5 by chance."""
 
@@ -31,15 +33,26 @@ CASES = {
 }
 
 
+@pytest.fixture(scope="module")
+def discovered(make_task: Make) -> Discovered:
+    """Return true values, task and discovery of an axis, discovered once for all tests of this file that look at it."""
+
+    @cache
+    def found(truth: str, noise: float) -> tuple[dict[str, float], Task, Discovery]:
+        values, task = make_task(truth, noise)
+        return values, task, discover(task)
+
+    return found
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "noise"),
     [*((truth, 2e-4) for truth in CASES), ("cubic", 2e-5), ("Bouc-Wen, n = 1", 2e-5), ("Iwan", 2e-5)],
 )
-def test_support_and_coefficients_are_recovered(truth: str, noise: float, make_task: Make) -> None:
+def test_support_and_coefficients_are_recovered(truth: str, noise: float, discovered: Discovered) -> None:
     effects, tolerance = CASES[truth]
-    values, task = make_task(truth, noise)
-    found = discover(task)
+    values, _, found = discovered(truth, noise)
     assert {term.name for term in found.kept} == effects
     assert found.held_out_error < 1.1
     coefficients = dict(found.rig_parameters)
@@ -67,10 +80,9 @@ def test_support_and_coefficients_are_recovered(truth: str, noise: float, make_t
     ],
 )
 def test_one_hysteresis_is_not_taken_for_the_other(
-    truth: str, there: str, rival: str, make_task: Make
+    truth: str, there: str, rival: str, discovered: Discovered
 ) -> None:
-    _, task = make_task(truth, 2e-5)
-    found = discover(task)
+    found = discovered(truth, 2e-5)[2]
     assert [term.name for term in found.kept] == [there]
     assert found.held_out_error < 1.1
     assert {term.name: term.inclusion for term in found.terms}.get(rival, 0.0) < 0.5
@@ -93,20 +105,20 @@ def test_too_much_noise_to_decide_is_said(make_task: Make) -> None:
 
 
 def test_one_amplitude_is_warned_of(make_task: Make) -> None:
-    _, task = make_task("linear", 2e-5, amplitudes=(0.6,))
+    _, task = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.6,))
     assert any("one amplitude" in warning for warning in discover(task).warnings)
     # What can be told apart there, and what cannot, is said with it.
-    _, task = make_task("cubic", 2e-5, amplitudes=(0.6,))
+    _, task = make_task("cubic", 2e-5, seconds=5.0, amplitudes=(0.6,))
     assert any("told apart" in w and "elsewhere they are untested" in w for w in discover(task).warnings)
     _, task = make_task("Coulomb", 1e-3, amplitudes=(0.6,), seconds=5.0)
     assert any("Nearly as good there is" in warning for warning in discover(task).warnings)
 
 
 def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_task: Make) -> None:
-    _, task = make_task("linear", 2e-5, amplitudes=(0.3, 0.6))
+    _, task = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.3, 0.6))
     assert not any("input of fitted ones" in warning for warning in discover(task).warnings)
     # Another measurement of the same sweep: other noise, and it starts a second later.
-    _, again = make_task("linear", 2e-5, amplitudes=(0.6,), seed=1, validation=False)
+    _, again = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.6,), seed=1, validation=False)
     twin = replace(again.records[0].slice(200, None), name="again", role="validation")
     estimation = tuple(record for record in task.records if record.role == "estimation")
     found = discover(replace(task, records=(*estimation, twin)))
@@ -114,7 +126,7 @@ def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_task
 
 
 def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None:
-    values, task = make_task("linear", 2e-5)
+    values, task = make_task("linear", 2e-5, seconds=5.0)
     found = discover(task, "full")
     inclusion = {term.name: term.inclusion for term in found.terms}
     assert inclusion["d"] > 0.9
@@ -123,15 +135,14 @@ def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None
 
 
 def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_task: Make) -> None:
-    values, task = make_task("cubic", 2e-6)
+    values, task = make_task("cubic", 2e-6, seconds=5.0)
     found = discover(task, pointwise=True)
     assert [term.name for term in found.kept] == ["cubic_stiffness"]
     assert found.kept[0].coefficients["k_3"].value == pytest.approx(values["k_3"], rel=1e-3)
 
 
-def test_terms_that_the_records_cannot_tell_apart_are_named(make_task: Make) -> None:
-    _, task = make_task("cubic", 2e-5)
-    found = discover(task)
+def test_terms_that_the_records_cannot_tell_apart_are_named(discovered: Discovered) -> None:
+    found = discovered("cubic", 2e-5)[2]
     assert any("gravity_pendulum" in warning for warning in found.warnings)
 
 
@@ -151,7 +162,7 @@ def test_the_held_out_error_is_that_of_the_polished_equation(
 
 
 def test_without_validation_a_record_is_set_aside_and_this_is_said(make_task: Make) -> None:
-    _, task = make_task("cubic", 2e-5, validation=False)
+    _, task = make_task("cubic", 2e-5, seconds=5.0, validation=False)
     found = discover(task)
     assert found.held_out == ("sweep_0.6",)
     assert any("set aside" in warning for warning in found.warnings)

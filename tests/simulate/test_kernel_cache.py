@@ -10,6 +10,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,29 +24,41 @@ from rigsight.simulate.compiled import kernel_cache
 from rigsight.simulate.compiled.compiler import c_compilers, library
 from rigsight.simulate.compiled.kernel_source import kernel_source
 
-PROGRAM = """
+MOTION = """
 import hashlib
+import os
+import sys
 import numpy as np
 from rigsight.effects import effect_named
 from rigsight.records.record import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
-from rigsight.simulate.compiled.kernel_cache import compiled
-t = 5e-3 * np.arange(4000)
-record = Record(name="r", dt=5e-3, signals={"u": 0.5 * np.sin(t + 0.6 * t**2)}, units={})
-values = dict(v=1.0, r_0=0.1, b=0.3, k_tau=0.27, J_z=0.56, k_c=81.0, k_d=2.0, l_0=0.25, c_y=0.98, psi_off=1e-3, y_off=1e-3)
-structure = compose(RUNNING_GEAR, [effect_named("coulomb_friction")])
-before = compiled(structure)
-psi = simulate(structure, {**values, "T_c": 0.02}, record)["psi"]
-print(before, hashlib.sha256(psi.tobytes()).hexdigest())
+from rigsight.simulate.compiled import kernel_cache
+def motion():
+    t = 5e-3 * np.arange(4000)
+    record = Record(name="r", dt=5e-3, signals={"u": 0.5 * np.sin(t + 0.6 * t**2)}, units={})
+    values = dict(
+        v=1.0, r_0=0.1, b=0.3, k_tau=0.27, J_z=0.56, k_c=81.0, k_d=2.0, l_0=0.25, c_y=0.98, psi_off=1e-3, y_off=1e-3
+    )
+    structure = compose(RUNNING_GEAR, [effect_named("coulomb_friction")])
+    before = kernel_cache.compiled(structure)
+    psi = simulate(structure, {**values, "T_c": 0.02}, record)["psi"]
+    return f"{before} {hashlib.sha256(psi.tobytes()).hexdigest()}"
+"""
+ONCE = f"{MOTION}print(motion())"
+WITH_EACH_CACHE = f"""{MOTION}
+for folder in sys.argv[1:]:
+    os.environ[kernel_cache.CACHE_VARIABLE] = folder
+    kernel_cache._kernels.clear()
+    print(motion())
 """
 
 
-def start(folder: Path) -> subprocess.Popen[str]:
+def start(folder: Path, program: str = ONCE, *arguments: object) -> subprocess.Popen[str]:
     source = str(Path(rigsight.__file__).parents[1])
     environment = {**os.environ, "RIGSIGHT_CACHE_DIR": str(folder), "PYTHONPATH": source}
     return subprocess.Popen(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", program, *map(str, arguments)],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -53,44 +66,57 @@ def start(folder: Path) -> subprocess.Popen[str]:
     )
 
 
-def run(folder: Path) -> subprocess.CompletedProcess[str]:
-    process = start(folder)
+def run(*arguments: Any) -> subprocess.CompletedProcess[str]:
+    process = start(*arguments)
     stdout, stderr = process.communicate()
     return subprocess.CompletedProcess(process.args, process.returncode, stdout, stderr)
 
 
-def test_second_process_does_not_compile_and_gives_the_same_bits_and_damaged_code_is_replaced(tmp_path):
-    first = run(tmp_path)
-    assert first.returncode == 0, first.stderr
-    second = run(tmp_path)
-    found, result = second.stdout.split()
-    assert first.stdout.split() == ["False", result]
-    assert found == "True"
-    (file,) = tmp_path.iterdir()
-    whole = file.read_bytes()
-    # A part of a library would end the process that loads it.
-    for damaged in (whole[: len(whole) // 2], b"", whole.replace(b"simulate_one", b"simulate_two")):
-        file.write_bytes(damaged)
-        again = run(tmp_path)
-        assert again.returncode == 0, again.stderr
-        assert again.stdout.split() == ["False", result]
-
-
-def test_processes_that_compile_the_same_kernel_at_once_do_not_harm_each_other(tmp_path):
-    processes = [start(tmp_path) for _ in range(2)]
-    said = [process.communicate() for process in processes]
-    assert [process.returncode for process in processes] == [0, 0], said
-    assert len({stdout.split()[1] for stdout, _ in said}) == 1
-    (file,) = tmp_path.iterdir()
-    assert run(tmp_path).stdout.split()[0] == "True", file
+def motion_here() -> list[str]:
+    """Return what this process says, which is another than those that are started."""
+    names: dict[str, Any] = {}
+    exec(MOTION, names)
+    said: list[str] = names["motion"]().split()
+    return said
 
 
 @pytest.fixture
 def fresh_cache(tmp_path, monkeypatch):
     """Point at an empty folder and forget what is loaded in this process."""
-    monkeypatch.setenv(kernel_cache.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv(kernel_cache.CACHE_VARIABLE, str(tmp_path / "kernels"))
     monkeypatch.setattr(kernel_cache, "_kernels", {})
-    return tmp_path
+    return tmp_path / "kernels"
+
+
+def test_second_process_does_not_compile_and_gives_the_same_bits_and_damaged_code_is_replaced(
+    fresh_cache, tmp_path
+):
+    first = run(fresh_cache)
+    assert first.returncode == 0, first.stderr
+    found, result = motion_here()
+    assert first.stdout.split() == ["False", result]
+    assert found == "True"
+    (file,) = fresh_cache.iterdir()
+    whole = file.read_bytes()
+    folders = []
+    for damaged in (whole[: len(whole) // 2], b"", whole.replace(b"simulate_one", b"simulate_two")):
+        folders.append(tmp_path / f"damaged_{len(folders)}")
+        folders[-1].mkdir()
+        (folders[-1] / file.name).write_bytes(damaged)
+    # A part of a library would end the process that loads it.
+    again = run(fresh_cache, WITH_EACH_CACHE, *folders)
+    assert again.returncode == 0, again.stderr
+    assert again.stdout.splitlines() == 3 * [f"False {result}"]
+    assert all(len((folder / file.name).read_bytes()) == len(whole) for folder in folders)
+
+
+def test_processes_that_compile_the_same_kernel_at_once_do_not_harm_each_other(fresh_cache):
+    processes = [start(fresh_cache) for _ in range(2)]
+    said = [process.communicate() for process in processes]
+    assert [process.returncode for process in processes] == [0, 0], said
+    (result,) = {stdout.split()[1] for stdout, _ in said}
+    (file,) = fresh_cache.iterdir()
+    assert motion_here() == ["True", result], file
 
 
 def test_other_equations_are_another_file(fresh_cache):
@@ -135,22 +161,27 @@ def test_the_code_of_another_processor_is_not_run(fresh_cache, monkeypatch):
 
 
 def test_source_does_not_depend_on_the_order_of_hashes():
-    program = (
-        "from rigsight.effects import CATALOGUE; from rigsight.rigs import RUNNING_GEAR\n"
-        "from rigsight.simulate import compose; from rigsight.simulate.compiled.kernel_source import kernel_source\n"
-        "gear = compose(RUNNING_GEAR, [effect for effect in CATALOGUE if RUNNING_GEAR.offers(effect)])\n"
-        "import hashlib; print(hashlib.sha256(kernel_source(gear).encode()).hexdigest())"
-    )
-    source = str(Path(rigsight.__file__).parents[1])
-    hashes = {
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": source},
-            capture_output=True, text=True, check=True,
-        ).stdout
-        for seed in ("1", "2")
-    }  # fmt: skip
-    assert len(hashes) == 1
+    program = """
+import hashlib
+from rigsight.effects import CATALOGUE
+from rigsight.rigs import RUNNING_GEAR
+from rigsight.simulate import compose
+from rigsight.simulate.compiled.kernel_source import kernel_source
+gear = compose(RUNNING_GEAR, [effect for effect in CATALOGUE if RUNNING_GEAR.offers(effect)])
+order = hash("order")
+source = hashlib.sha256(kernel_source(gear).encode()).hexdigest()
+"""
+    here: dict[str, Any] = {}
+    exec(program, here)
+    # The order of this process is drawn, or it was chosen for it: one of two others is another.
+    seed = next(str(number) for number in (1, 2) if os.environ.get("PYTHONHASHSEED", "random") != str(number))
+    other = subprocess.run(
+        [sys.executable, "-c", f"{program}print(order, source)"],
+        env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(rigsight.__file__).parents[1])},
+        capture_output=True, text=True, check=True,
+    ).stdout.split()  # fmt: skip
+    assert other[0] != str(here["order"])
+    assert other[1] == here["source"]
 
 
 def test_cache_that_cannot_be_written_is_explained(tmp_path, monkeypatch):

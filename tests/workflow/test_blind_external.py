@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from rigsight.errors import InputError
@@ -288,9 +287,11 @@ def test_a_drawn_bench_and_one_of_a_lab_do_not_share_a_folder(lab: ExternalBench
 
 
 @pytest.mark.slow
-def test_a_lab_hides_its_effect_and_finds_it_named(
-    lab: ExternalBench, axis_rows: dict[str, np.ndarray]
-) -> None:
+def test_a_lab_hides_its_effect_and_finds_it_named(lab: ExternalBench) -> None:
+    # The first half of each sweep passes the resonance, and the whole catalogue is tried on it.
+    for file in (*lab.campaign(NAME).glob("*.csv"), lab.sealed / "withheld.csv"):
+        lines = file.read_text().splitlines(keepends=True)
+        file.write_text("".join(lines[:1100]))
     write_key(lab, withheld=[{"file": "withheld.csv", "kind": "sweep"}], parameters={"k_3": 5e6, "m": 2.0})
     content = run(lab)
     (found,) = content["trials"]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import read_record
 from rigsight.rigs import ELEMENT
@@ -80,6 +81,15 @@ def campaign(folder: Path, level: float | None = None, more: str = "", **missing
     return folder
 
 
+# Of all that the rig offers, what comes nearest to each of the three, and what has to be passed over where no input moves.
+RIVALS = {
+    "coulomb_friction": "load_dependent_friction stribeck_friction iwan_hysteresis bouc_wen_hysteresis presliding_friction",
+    "cubic_stiffness": "power_law_stiffness asymmetric_stiffness torque_ripple encoder_eccentricity flexible_mode end_stop",
+    "quadratic_damping": "bouc_wen_hysteresis presliding_friction position_dependent_damping flexible_mode sensor_lag",
+}
+OF_AN_INPUT = "input_delay actuator_lag input_saturation speed_limit input_dead_zone"
+
+
 @pytest.mark.parametrize(
     ("effect", "level", "missing", "parameter", "value"),
     [
@@ -97,7 +107,8 @@ def campaign(folder: Path, level: float | None = None, more: str = "", **missing
 def test_what_bends_a_decay_is_named(
     tmp_path: Path, effect: str, level: float | None, missing: dict[str, object], parameter: str, value: float
 ) -> None:
-    found = run_diagnose(campaign(tmp_path / "c", level, **missing), n_jobs=1)
+    tried = [effect_named(name) for name in (*RIVALS, *RIVALS[effect].split(), *OF_AN_INPUT.split())]
+    found = run_diagnose(campaign(tmp_path / "c", level, **missing), effects=tried, n_jobs=1)
     assert (found.verdict, found.effects, found.where) == ("effect", (effect,), ("dynamics",))
     best = found.candidates[0].parameters
     assert best[parameter].value == pytest.approx(value, abs=4.0 * best[parameter].std, rel=1e-3)

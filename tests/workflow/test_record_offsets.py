@@ -40,10 +40,12 @@ RIVALS = ("coulomb_friction", "bouc_wen_hysteresis", "sensor_delay", "asymmetric
 
 
 def records(
-    effects: Sequence[tuple[str, Mapping[str, float]]] = (FRICTION,), factor: float = 1.0
+    effects: Sequence[tuple[str, Mapping[str, float]]] = (FRICTION,),
+    factor: float = 1.0,
+    seconds: float = 5.0,
 ) -> list[Record]:
     """Two sweeps to fit and two to score, whose sensor was zeroed anew in between."""
-    rng, t = np.random.default_rng(0), DT * np.arange(2000)
+    rng, t = np.random.default_rng(0), DT * np.arange(round(seconds / DT))
     structure = compose(AXIS, [effect_named(name) for name, _ in effects])
     values = AXIS_VALUES | {name: value for _, own in effects for name, value in own.items()}
     found = []

@@ -157,11 +157,14 @@ def _shrinking(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pysindy import SSR
+        from sklearn import config_context
 
         optimizer = SSR(
             alpha=_RIDGE, max_iter=max(1, matrix.shape[1]), criteria="model_residual", unbias=False
         )
-        optimizer.fit(matrix, target)
+        # Each of its hundreds of regressions of a few rows would be examined for longer than it takes.
+        with config_context(skip_parameter_validation=True, assume_finite=True):
+            optimizer.fit(matrix, target)
     return _supports(optimizer.history_)
 
 
@@ -169,9 +172,12 @@ def _growing(matrix: NDArray[np.float64], target: NDArray[np.float64]) -> list[t
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pysindy import FROLS
+        from sklearn import config_context
 
         optimizer = FROLS(alpha=_RIDGE, max_iter=min(6, matrix.shape[1]), unbias=False)
-        optimizer.fit(matrix, target)
+        # Each of its hundreds of regressions of a few rows would be examined for longer than it takes.
+        with config_context(skip_parameter_validation=True, assume_finite=True):
+            optimizer.fit(matrix, target)
     return _supports(optimizer.history_)
 
 

@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin, upfirdn
 
 Hold = Literal["zoh", "foh", "band_limited"]
 
@@ -169,6 +168,8 @@ def _band_limited_nodes(
     samples: NDArray[np.float64], dt: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return values and slopes at the interval boundaries, from a windowed-sinc interpolation."""
+    from scipy.signal import upfirdn
+
     values, slopes = _interpolation_taps()
     pad = min(_HALF_LENGTH + 2, samples.size - 1)
     before = 2.0 * samples[0] - samples[pad:0:-1]
@@ -188,6 +189,8 @@ def _interpolation_taps() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
     The slope is the difference quotient of fourth order of a finer interpolation, which is never computed between these.
     """
+    from scipy.signal import firwin
+
     fine = _OVERSAMPLING * BAND_LIMITED_INTERVALS
     taps = fine * firwin(2 * _HALF_LENGTH * fine + 1, 1.0 / fine, window=("kaiser", 10.0))
     around = np.pad(taps, 2)
