@@ -31,8 +31,6 @@ _RULED_OUT = 3.0
 """Factor over the least contradiction of the sensors (RMS) at which a joint is ruled out."""
 _SETTLED = 0.01
 """Relative change of parameters and coefficients from which another round changes nothing."""
-_CONTRADICTED = 3.0
-"""Factor over the least contradiction of the sensors at which a joint is ruled out in the end."""
 _LARGE = 98.0
 """Percentile of a motion or a force that is its size."""
 
@@ -218,7 +216,7 @@ def not_contradicted(forces: Sequence[JointForce]) -> tuple[JointForce, ...]:
         As of `missing_forces`.
     """
     least = min((force.error_over_noise for force in forces), default=0.0)
-    return tuple(force for force in forces if force.error_over_noise <= _CONTRADICTED * least)
+    return tuple(force for force in forces if force.error_over_noise <= _RULED_OUT * least)
 
 
 def _improved(

@@ -1,0 +1,75 @@
+"""On a rig with one motion: how often is the true effect among those that a diagnosis looks at first?
+
+    python experiments/places/one_motion.py --draws 50 --seed 3
+
+A draw is a trial of the small blind bench with one hidden effect. Writes one_motion.md beside this file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+from rigsight.blind import draw_trial
+from rigsight.blind.subjects import subject_of
+from rigsight.diagnose import Task
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.places.search import search_places
+from rigsight.diagnose.preparation import workbench_of
+from rigsight.diagnose.windows import Windowing
+from rigsight.effects import CATALOGUE
+from rigsight.identify import IdleThreads
+
+DESIGN = "small"
+HEAD = """# On a rig with one motion: is the true effect looked at first?
+
+`one_motion.py --draws {draws} --seed {seed}`: {kept} of {all} true effects are among those that are looked at first, which are
+{share:.0%} of the candidates.
+
+| trial | rig | effect | gap (noise floors) | looked at | of | the true one among them | seconds |
+|---:|---|---|---:|---:|---:|---|---:|
+"""
+
+
+def row(seed: int, number: int) -> tuple[int, int, bool, str]:
+    """Return how many effects are looked at first, of how many, whether the true one is among them, and a row of the table."""
+    trial = draw_trial(DESIGN, seed, number)
+    rig = trial.linear.rig
+    constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
+    task = Task(str(number), rig, constants, trial.given, trial.records)
+    noise = {floor.output: floor.std for floor in noise_floors(rig, task.records, task.drifts, True)}
+    bench = workbench_of(task, noise, Windowing(), None, IdleThreads(1))
+    linear = fit_linear(bench, bench.start)
+    offered = bench.offered(CATALOGUE)
+    begun = time.process_time()
+    found = search_places(bench, linear, offered)
+    seconds = time.process_time() - begun
+    (true,) = trial.key["effects"]
+    kept = true in {effect.name for effect in found.effects}
+    told = f"| {number} | {rig.name} | {true} | {linear.excess:.3g} | {len(found.effects)} | {len(offered)} "
+    return len(found.effects), len(offered), kept, f"{told}| {'yes' if kept else '**no**'} | {seconds:.1f} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--draws", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=3)
+    asked = parser.parse_args()
+    numbers = [n for n in range(asked.draws) if subject_of(DESIGN, asked.seed, n).kind == "single"]
+    rows = []
+    for number in numbers:
+        rows.append(row(asked.seed, number))
+        print(rows[-1][-1], flush=True)
+    looked, offered, kept, lines = zip(*rows, strict=True)
+    head = HEAD.format(
+        draws=asked.draws, seed=asked.seed, kept=sum(kept), all=len(rows), share=sum(looked) / sum(offered)
+    )
+    Path(__file__).with_name("one_motion.md").write_text(head + "\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

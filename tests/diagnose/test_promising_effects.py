@@ -1,0 +1,89 @@
+"""One motion: effects whose push goes with the gap are looked at first, the others where none of these explains the records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.places.search import Search, search_places
+from rigsight.diagnose.workbench import Workbench
+from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.excitation import linear_sweep
+from rigsight.identify import characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+DT, N, NOISE = 5e-3, 2000, 2e-5
+VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+HIDDEN: list[tuple[str, Mapping[str, float]]] = [
+    ("cubic_stiffness", {"k_3": 5e6}),
+    ("coulomb_friction", {"T_c": 0.3}),
+    ("input_dead_zone", {"u_0": 0.4}),
+    ("sensor_lag", {"T_m": 0.01}),
+]
+
+
+def records(effects: Sequence[str], values: Mapping[str, float]) -> tuple[Record, ...]:
+    """Sweeps after a second of rest: two to fit and one to score."""
+    rng, t = np.random.default_rng(0), DT * np.arange(N)
+    structure = compose(AXIS, [effect_named(name) for name in effects])
+    found = []
+    for name, role, amplitude in (
+        ("1", "estimation", 2.0),
+        ("2", "estimation", 4.0),
+        ("3", "validation", 3.0),
+    ):
+        u = np.concatenate([np.zeros(200), linear_sweep(t[200:], amplitude, 3.0, 60.0)])
+        driven = Record(name, DT, {"u": u}, {"u": "N"}, role=role, kind="sweep", amplitude=amplitude)
+        clean = simulate(structure, {**VALUES, **values}, driven)
+        found.append(clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=N)))
+    return tuple(found)
+
+
+def diagnosed(effects: Sequence[str], values: Mapping[str, float], tried: Sequence[str]) -> Diagnosis:
+    task = Task("stage", AXIS, {"gain": 1.0}, {}, records(effects, values))
+    return diagnose(task, [effect_named(name) for name in tried])
+
+
+def looked_at(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effect]]:
+    fitted = tuple(record for record in records([name], values) if record.role == "estimation")
+    scales = characteristic_scales(AXIS, fitted, VALUES)
+    bench = Workbench(AXIS, fitted, fitted, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
+    offered = bench.offered(CATALOGUE)
+    return search_places(bench, fit_linear(bench, VALUES), offered), offered
+
+
+@pytest.mark.parametrize(("name", "values"), HIDDEN, ids=[name for name, _ in HIDDEN])
+def test_the_true_one_is_looked_at_first(name: str, values: Mapping[str, float]) -> None:
+    search, offered = looked_at(name, values)
+    first = {effect.name for effect in search.effects}
+    assert name in first
+    assert len(first) <= len(offered) / 2
+    assert first | {effect.name for effect in search.others} == {effect.name for effect in offered}
+    # What pulsates by itself goes with no motion; a relative starts from the fit of the simpler one.
+    assert "periodic_disturbance" in first
+    parents = {parent for effect in search.effects for parent in effect.parents}
+    assert parents & {effect.name for effect in offered} <= first
+
+
+def test_the_others_follow_where_none_explains_the_records() -> None:
+    tried = ("quadratic_damping", "input_saturation", "sensor_lag", "free_play", "coulomb_friction")
+    found = diagnosed(["cubic_stiffness"], {"k_3": 5e6}, tried)
+    assert {name for candidate in found.candidates for name in candidate.effects} >= set(tried)
+
+
+@pytest.mark.parametrize(
+    ("at_once", "values"), [("input_dead_zone", {"u_0": 0.4}), ("input_saturation", {"u_max": 2.2})]
+)
+def test_a_lag_beside_a_limited_drive_is_no_other_form_of_it(
+    at_once: str, values: Mapping[str, float]
+) -> None:
+    hidden = (at_once, "actuator_lag")
+    tried = (*hidden, "coulomb_friction", "cubic_stiffness", "quadratic_damping")
+    found = diagnosed(hidden, {**values, "T_a": 0.01}, tried)
+    assert set(found.effects) == set(hidden)
