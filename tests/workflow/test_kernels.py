@@ -19,13 +19,14 @@ from rigsight.effects import effect_named
 from rigsight.identify import GreyBoxFit
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT
-from rigsight.workflow.kernels import prepare_kernels, structures_to_try
+from rigsight.simulate import compose
+from rigsight.workflow.kernels import prepare_kernels
 
 cache = Path(sys.argv[1])
 def machine_code():
     return sorted(path.name for path in cache.iterdir())
 
-structures = structures_to_try(ELEMENT, [effect_named("quadratic_damping")])
+structures = [compose(ELEMENT), compose(ELEMENT, [effect_named("quadratic_damping")])]
 steps = []
 prepare_kernels(structures, 2, steps.append)
 prepared = machine_code()

@@ -228,14 +228,12 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
         Any.
     """
     place = answers.bench.rig.acts_at(effect)
-    # What is limited or dead at once is no other form of what comes late.
-    is_late = bool(effect.states) or effect.delay is not None or effect.measured_late is not None
     if effect.place in (Place.SENSOR, Place.ACTUATOR):
-        is_reading = effect.place is Place.SENSOR
-        at_once = (_readings_of if is_reading else _signals_of)(answers, place)
-        if not is_late:
-            return at_once
-        return np.column_stack([at_once, (_changes_of if is_reading else _signal_changes_of)(answers, place)])
+        # What is limited or dead at once is no other form of what comes late, nor the other way round.
+        is_late = bool(effect.states) or effect.delay is not None or effect.measured_late is not None
+        if effect.place is Place.SENSOR:
+            return (_changes_of if is_late else _readings_of)(answers, place)
+        return (_signal_changes_of if is_late else _signals_of)(answers, place)
     laws = [law for law in (effect.torque, effect.spring, effect.deflection) if law is not None]
     read = {symbol for law in laws for symbol in law.free_symbols}
     found = []
