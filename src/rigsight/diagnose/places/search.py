@@ -52,7 +52,8 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
     # What pulsates by itself goes with no motion, so that no push along one tells of it; what comes back with the position has
     # another form at every wave number.
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]
-    suspects = Lineup(bench, model).suspects(pushing)
+    # One mass shows in seconds what goes with its motion; what tells joints apart may stand in one of the records.
+    suspects = Lineup(bench, model, liveliest=bench.rig.has_one_motion).suspects(pushing)
     if bench.rig.has_one_motion:
         promising = _promising(effects, suspects)
         return Search((), promising, tuple(effect for effect in effects if effect not in promising))

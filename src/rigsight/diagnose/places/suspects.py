@@ -72,12 +72,20 @@ class Lineup:
         Records, scales and noise.
     model
         The equations that leave something, fitted.
+    liveliest
+        Look along the liveliest stretches of the records alone.
     """
 
-    def __init__(self, bench: Workbench, model: Scored) -> None:
-        self._answers = Answers(bench, bench.estimation, model.fit, model.effects, model.fit.free)
+    def __init__(self, bench: Workbench, model: Scored, liveliest: bool = False) -> None:
+        records, fit = bench.estimation, model.fit
+        if liveliest:
+            in_stretches = bench.problem(fit.structure, bench.look).fit(fit.values, [])
+            if in_stretches.residuals:
+                records, fit = bench.look, in_stretches
+        self._free = model.fit.free
+        self._answers = Answers(bench, records, fit, model.effects, self._free)
         self._bench = replace(self._answers.bench, scales=self._answers.scales)
-        self._fit = model.fit
+        self._fit = fit
         # Known before threads ask for them side by side.
         _ = self._answers.left, self._answers.motions
 
@@ -106,7 +114,7 @@ class Lineup:
         start = {**self._answers.values, PUSH_SIZE: push_size}
         fit = self._bench.problem(self._answers.structure, records).fit(
             start,
-            [*self._fit.free, PUSH_SIZE],
+            [*self._free, PUSH_SIZE],
             self._answers.fitted_states,
             _EVALUATIONS,
             _TOLERANCE,
