@@ -254,6 +254,23 @@ def test_a_fit_sees_no_jumps_as_joints_let_go(train: Rig, levels: dict[str, floa
     assert np.max(np.ptp(slopes, axis=1)) < 1e-2 * np.max(np.abs(slopes))
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_joints_that_let_go_at_the_same_instant_move_from_there(tmp_path: Path, seed: int) -> None:
+    """Four frictions on two motions: one that lets go is held by the others until all of them let go, within the same substep."""
+    path = tmp_path / "train.toml"
+    more = '[joints.sum]\nmotion = "phi_m + 2*phi_l"\n'
+    path.write_text((FILES / "drive_train.toml").read_text("utf-8") + more, "utf-8")
+    rng = np.random.default_rng(seed)
+    levels = {name: float(rng.uniform(3e-3, 3e-2)) for name in (*JOINTS, "sum")}
+    structure, values = with_friction(read_rig_file(path), levels, TRAIN)
+    record = driven({"u": rng.uniform(0.5, 1.0) * CURRENT})
+    exact = simulate(structure, values, record, np.zeros(4), accuracy=1e-8)
+    p = parameter_vector(structure, values)[:, None]
+    found = simulate_sets(structure, record_input(structure, record), p, np.zeros((4, 1)), N, 4)
+    for i, name in enumerate(("motor_angle", "load_angle")):
+        assert np.max(np.abs(found[:, i, 0] - exact[name])) < 1e-7 * np.ptp(exact[name]), name
+
+
 def test_what_holds_joints_at_rest_moves_nothing(train: Rig) -> None:
     structure, values = with_friction(train, THREE, TRAIN)
     weak = driven({"u": 0.25 * np.sin(9.0 * T)}, hold="zoh")
