@@ -11,6 +11,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +51,7 @@ def ways(seeds: int) -> list[tuple[str, int, int]]:
     ]
 
 
-def line(case: str, repeated: list[dict[str, Any]]) -> str:
+def line(case: str, repeated: Sequence[dict[str, Any]]) -> str:
     """Return a row of the table."""
     first, *others = repeated
     same = all(other["verdict"] == first["verdict"] for other in others)
@@ -81,15 +83,18 @@ def main() -> None:
             print(json.dumps(outcome(case, seed, n_jobs)), flush=True)
         return
     shared = ["--draws", str(asked.draws), "--trials", *map(str, asked.trials)]
-    table: list[list[dict[str, Any]]] = [[] for _ in chosen]
-    for build, seed, n_jobs in ways(asked.seeds):
+
+    def repetition(way: tuple[str, int, int]) -> list[dict[str, Any]]:
         # A process each: a kernel that is loaded stays, whatever the variables say later.
+        build, seed, n_jobs = way
         command = [sys.executable, __file__, *shared, "--part", build, str(seed), str(n_jobs)]
         told = subprocess.run(
             command, env={**os.environ, **BUILDS[build]}, check=True, capture_output=True, text=True
         )
-        for row, text in zip(table, told.stdout.splitlines(), strict=True):
-            row.append(json.loads(text))
+        return [json.loads(text) for text in told.stdout.splitlines()]
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        table = list(zip(*pool.map(repetition, ways(asked.seeds)), strict=True))
     lines = [line(case.name, row) for case, row in zip(chosen, table, strict=True)]
     head = (
         "# Does a diagnosis depend on rounding?\n\n"
