@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
 from rigsight.diagnose.candidates.constant_force import known_constant_forces
 from rigsight.diagnose.workbench import Workbench
-from rigsight.effects import effect_named
+from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record
 from rigsight.rigs import RIGS
@@ -34,20 +35,24 @@ def test_a_rest_position_is_known_only_where_it_is_given() -> None:
     assert known_constant_forces(RIGS["drive_train"], shaft, {}, has_spring=True) == {}
 
 
-@pytest.mark.parametrize(("effect", "own"), [(LOPSIDED, {"T_fwd": 0.2, "T_bwd": 0.1}), (EVEN, {"T_c": 0.15})])
-def test_it_competes_only_where_even_friction_would_need_a_force(effect, own) -> None:
+def bench_of(effect: Effect, values: Mapping[str, float], given: Mapping[str, float]) -> Workbench:
+    """Two runs of many tones."""
     rng, structure = np.random.default_rng(5), compose(AXIS, [effect])
     t, records = 0.01 * np.arange(800), []
     for number in range(2):
         waves = [np.cos(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.4, 2.0, 0.25)]
         record = Record(f"run {number}", 0.01, {"u": np.sum(waves, axis=0) / 3.0}, {})
-        x = simulate(structure, {**VALUES, **own}, record)["x"]
+        x = simulate(structure, values, record)["x"]
         records.append(record.with_signals(x=x + NOISE * np.std(x) * rng.standard_normal(t.size)))
     scales = characteristic_scales(AXIS, records, VALUES)
     noise = {"x": NOISE * float(np.std(records[0]["x"]))}
-    bench = Workbench(
-        AXIS, tuple(records), tuple(records), tuple(records), scales, noise, frozenset({"k"}), VALUES
-    )
+    fitted = tuple(records)
+    return Workbench(AXIS, fitted, fitted, fitted, scales, noise, frozenset({"k"}), VALUES, given=given)
+
+
+@pytest.mark.parametrize(("effect", "own"), [(LOPSIDED, {"T_fwd": 0.2, "T_bwd": 0.1}), (EVEN, {"T_c": 0.15})])
+def test_it_competes_only_where_even_friction_would_need_a_force(effect, own) -> None:
+    bench = bench_of(effect, {**VALUES, **own}, {})
     found = {m.names[0]: m for m in fit_candidates(bench, fit_linear(bench, VALUES), [EVEN, LOPSIDED])}
     assert (LOPSIDED.name in found) == (effect is LOPSIDED)
     if effect is LOPSIDED:
@@ -57,3 +62,14 @@ def test_it_competes_only_where_even_friction_would_need_a_force(effect, own) ->
             assert abs(fits[0].values[name] - value) < 3.0 * fits[0].standard_errors[name]
     other = replace(bench, given={"force_off": 0.05})
     assert other.constant_forces_beside([LOPSIDED])["force_off"] == 0.05
+
+
+@pytest.mark.parametrize("effect", [EVEN, LOPSIDED], ids=["even", "each way"])
+def test_a_force_that_was_estimated_is_known_as_well_as_the_other_numbers(effect: Effect) -> None:
+    """All given numbers are a little wrong and the force no more than they are; or all others are right."""
+    truth = {**VALUES, "force_off": 0.05, "T_c": 0.15, "T_fwd": 0.2, "T_bwd": 0.1}
+    wrong = 1.02 if effect is EVEN else 1.0
+    given = {"m": wrong * truth["m"], "d": wrong * truth["d"], "force_off": wrong * truth["force_off"]}
+    bench = bench_of(effect, truth, given)
+    found = {m.names[0] for m in fit_candidates(bench, fit_linear(bench, VALUES), [EVEN, LOPSIDED])}
+    assert (LOPSIDED.name in found) == (effect is LOPSIDED)

@@ -10,7 +10,8 @@ import pytest
 from rigsight.diagnose import Diagnosis, Task, diagnose
 from rigsight.diagnose.candidates.characterize import fit_linear
 from rigsight.diagnose.places.search import Search, search_places
-from rigsight.diagnose.workbench import Workbench
+from rigsight.diagnose.places.suspects import Lineup
+from rigsight.diagnose.workbench import Workbench, liveliest
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales
@@ -69,6 +70,18 @@ def test_the_true_one_is_looked_at_first(name: str, values: Mapping[str, float])
     assert "periodic_disturbance" in first
     parents = {parent for effect in search.effects for parent in effect.parents}
     assert parents & {effect.name for effect in offered} <= first
+
+
+def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
+    """Numbers that suit all records do not suit the stretches of resonance in them: any push comes with other ones there."""
+    fitted = tuple(r for r in records(["cubic_stiffness"], {"k_3": 2e7}) if r.role == "estimation")
+    scales = characteristic_scales(AXIS, fitted, VALUES)
+    bench = Workbench(
+        AXIS, fitted, fitted, liveliest(fitted, AXIS, 600), scales, {"x": NOISE}, frozenset(), VALUES
+    )
+    at_the_drive = [effect_named(name) for name in ("input_delay", "actuator_lag", "input_dead_zone")]
+    lineup = Lineup(bench, fit_linear(bench, VALUES), liveliest=True)
+    assert all(suspect.share < 0.1 for suspect in lineup.suspects(at_the_drive))
 
 
 def test_the_others_follow_where_none_explains_the_records() -> None:

@@ -48,7 +48,11 @@ _CONTENDER = 1.5
 _WORTH_RELEASING = 1.05
 """Excess over the floor above which a fixed exponent is released."""
 _SIGNIFICANT = 3.0
-"""Standard errors by which a constant force must differ from what is known of it to be one that is needed: one chance in 370."""
+"""Standard errors by which a constant force must differ from what is known of it to be one that is needed: one chance in 370.
+
+One that was estimated, as its value other than the default tells, is known no better than the other numbers of the simulation in
+question: it must differ by as many times their root mean square.
+"""
 _RELEASE_GAIN = 1.02
 """Factor by which a released exponent must lower the held-out error to be kept."""
 
@@ -142,17 +146,30 @@ def with_a_mean_that_is_needed(bench: Workbench, models: Sequence[Scored]) -> li
     def is_needed(model: Scored) -> bool:
         held = bench.constant_forces_beside(model.effects)
         plainer = [alone[name,] for name in model.effects[0].parents if (name,) in alone]
-        return not held or not plainer or any(_moves(fit, held) for fit in plainer)
+        return not held or not plainer or any(_moves(bench, fit, held) for fit in plainer)
 
     return [model for model in models if is_needed(model)]
 
 
-def _moves(fit: FitResult, known: Mapping[str, float]) -> bool:
+def _moves(bench: Workbench, fit: FitResult, known: Mapping[str, float]) -> bool:
+    """Return True if a fit moves a constant force that is known: farther than others that somebody estimated are wrong."""
+    defaults = {p.name: p.default for p in bench.rig.parameters}
+    estimated = {name: value for name, value in bench.given.items() if value != defaults.get(name)}
+    others = _moves_of(fit, {name: value for name, value in estimated.items() if name not in known})
+    usual = max(1.0, float(np.sqrt(np.mean(np.square(list(others.values())))))) if others else 1.0
     return any(
-        abs(fit.values[name] - value) > _SIGNIFICANT * fit.standard_errors[name]
-        for name, value in known.items()
-        if name in fit.free
+        move > _SIGNIFICANT * (usual if name in estimated else 1.0)
+        for name, move in _moves_of(fit, known).items()
     )
+
+
+def _moves_of(fit: FitResult, known: Mapping[str, float]) -> dict[str, float]:
+    """Return how far a fit lies from known values, in standard errors."""
+    return {
+        name: abs(fit.values[name] - value) / fit.standard_errors[name]
+        for name, value in known.items()
+        if name in fit.free and fit.standard_errors[name] > 0.0
+    }
 
 
 def _looks(

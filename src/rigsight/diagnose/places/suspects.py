@@ -34,6 +34,7 @@ from rigsight.diagnose.places.probes import (
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect, Place, kind_of, placed_dimension
 from rigsight.effects import symbols as canonical
+from rigsight.identify import FitResult
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
@@ -86,6 +87,10 @@ class Lineup:
         self._answers = Answers(bench, records, fit, model.effects, self._free)
         self._bench = replace(self._answers.bench, scales=self._answers.scales)
         self._fit = fit
+        self._cost = fit.cost
+        if liveliest:
+            # Numbers that suit all records need not suit stretches of them: what other numbers take away no push may claim.
+            self._cost = min(self._cost, self._pushed(self._answers.records, self._free, 0.0).cost)
         # Known before threads ask for them side by side.
         _ = self._answers.left, self._answers.motions
 
@@ -111,17 +116,19 @@ class Lineup:
             record.with_signals(**{push(place): signal})
             for record, signal in zip(self._answers.records, signals, strict=True)
         ]
-        start = {**self._answers.values, PUSH_SIZE: push_size}
-        fit = self._bench.problem(self._answers.structure, records).fit(
-            start,
-            [*self._free, PUSH_SIZE],
+        fit = self._pushed(records, [*self._free, PUSH_SIZE], push_size)
+        return max(0.0, 1.0 - fit.cost / self._cost) if np.isfinite(fit.cost) else 0.0
+
+    def _pushed(self, records: Sequence[Record], free: Sequence[str], push_size: float) -> FitResult:
+        return self._bench.problem(self._answers.structure, records).fit(
+            {**self._answers.values, PUSH_SIZE: push_size},
+            free,
             self._answers.fitted_states,
             _EVALUATIONS,
             _TOLERANCE,
             False,
             self._fit.substeps,
         )
-        return max(0.0, 1.0 - fit.cost / self._fit.cost) if np.isfinite(fit.cost) else 0.0
 
     def _signals(self, effect: Effect) -> list[list[Floats]]:
         """Return what an effect by itself adds along each record, from each of its starts."""
