@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from cases import Case, cases
+from threadpoolctl import threadpool_limits
 
 from rigsight.diagnose import diagnose
 
@@ -32,7 +33,8 @@ ENOUGH = 0.01
 
 def outcome(case: Case, seed: int, n_jobs: int) -> dict[str, Any]:
     """Return what is compared of one diagnosis."""
-    found = diagnose(case.disturbed(SHARE, seed), case.effects, n_jobs=n_jobs)
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = diagnose(case.disturbed(SHARE, seed), case.effects, n_jobs=n_jobs)
     best = next((c for c in found.candidates if c.effects == found.effects), found.candidates[0])
     return {
         "verdict": " + ".join((found.verdict, *found.effects)),
