@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from rigsight.rigs import RIGS
+
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "src").rglob("*.py"))
 LONGEST_FILE = 600
+NAME_A_RIG = {
+    "api/example.py": "the records of the ten lines of the README come from a virtual axis",
+    "blind/campaign.py": "designs small and standard draw axes and running gears",
+    "blind/draw.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
+    "blind/laboratory/stands.py": "the stands of the laboratory design are built-in rigs",
+    "blind/laboratory/subjects.py": "which stand each hidden effect of the laboratory design has",
+    "discover/terms/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",
+    "identify/hysteresis/derived.py": "a loop of hysteresis alone is the built-in element with one spring",
+    "identify/transfer/axis_parameters.py": "API: the parameters of an axis from a transfer function",
+    "identify/transfer/physical.py": "API: equation (2.21) of the thesis, the yaw parameters from a transfer function",
+    "records/formats/isolated_reader.py": "an axis of time, no rig",
+    "rigs/__init__.py": "the built-in rigs",
+    "rigs/built_in.py": "the built-in rigs",
+    "rigs/conicity.py": "conicity by Klingel's formula, of the running gear's wheels",
+    "workflow/demo.py": "the demo is the running gear of the thesis",
+    "workflow/own/effect_promises.py": "effects of one's own are tried on three built-in rigs",
+    "workflow/virtual_rig.py": "the demo is the running gear of the thesis",
+}
 NAMES_WITHOUT_A_QUESTION = {"utils", "util", "common", "core", "helpers", "misc"}
 
 
@@ -49,3 +70,20 @@ def test_every_language_is_printed_in_one_place() -> None:
         if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
     }
     assert {name for name in printers if not name.startswith("simulate/printing/")} == set()
+
+
+def test_no_other_module_knows_a_rig_by_name() -> None:
+    """A user's rig is treated as the built-in ones are."""
+    constants = {name.upper() for name in RIGS}
+
+    def names_one(node: ast.AST) -> bool:
+        if isinstance(node, ast.ImportFrom):
+            return any(alias.name in constants for alias in node.names)
+        return isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in RIGS
+
+    found = {
+        module.relative_to(ROOT / "src" / "rigsight").as_posix()
+        for module in MODULES
+        if any(map(names_one, ast.walk(ast.parse(module.read_text(encoding="utf-8")))))
+    }
+    assert found == NAME_A_RIG.keys()
