@@ -27,7 +27,7 @@ NAME_A_RIG = {
     "records/formats/isolated_reader.py": "an axis of time, no rig",
     "rigs/__init__.py": "the built-in rigs",
     "rigs/built_in.py": "the built-in rigs",
-    "rigs/conicity.py": "conicity by Klingel's formula, of the running gear's wheels",
+    "rigs/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "workflow/demo.py": "the demo is the running gear of the thesis",
     "workflow/own/effect_promises.py": "effects of one's own are tried on three built-in rigs",
     "workflow/virtual_rig.py": "the demo is the running gear of the thesis",

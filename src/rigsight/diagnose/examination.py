@@ -256,10 +256,11 @@ def _singly(
         raise SimulationError(
             f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
         )
-    if not task.rig.has_one_motion:
-        # What moves between the sensors, and which forces do it, is known once the equations fit.
-        fitted = {**task.constants, **linear.fit.values}
-        bench = replace(bench, scales=characteristic_scales(task.rig, task.estimation, fitted))
+    bent = bool(task.given) and bench.leaves_numbers_open(linear.fit)
+    if bent or not task.rig.has_one_motion:
+        # What moves between the sensors, and which forces do it, is known once the equations fit, or from the given simulation.
+        known = {**task.constants, **linear.fit.values, **(task.given if bent else {})}
+        bench = replace(bench, scales=characteristic_scales(task.rig, task.estimation, known))
     say("re-identified")
     before = _before(task, bench, linear)
     if task.given:

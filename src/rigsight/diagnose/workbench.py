@@ -194,6 +194,13 @@ class Workbench:
         has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
         return known_constant_forces(self.rig, effect, self.given, has_spring)
 
+    def leaves_numbers_open(self, fit: FitResult) -> bool:
+        """Return True if a fit does not determine the size of a mass, a stiffness or a damping: a missing effect may have bent it."""
+        positive = {p.name for p in self.rig.parameters if p.lower >= 0.0}
+        return any(
+            name in positive and not fit.standard_errors[name] < abs(fit.values[name]) for name in fit.free
+        )
+
     def releasable_parameters(self, structure: Structure) -> list[str]:
         """Return what a fit may move once it has settled: a constant force that a bent spring tells from its rest position.
 

@@ -105,6 +105,9 @@ def look_at(
     structure = bench.simplest(effects)
     free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
     starts = list(start_values(bench, structure, effects[-1], base, parents))
+    if bench.given and bench.leaves_numbers_open(base):
+        from_given = replace(base, values={**base.values, **bench.given})
+        starts += start_values(bench, structure, effects[-1], from_given, {})
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
