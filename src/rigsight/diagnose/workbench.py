@@ -195,7 +195,7 @@ class Workbench:
         return known_constant_forces(self.rig, effect, self.given, has_spring)
 
     def leaves_numbers_open(self, fit: FitResult) -> bool:
-        """Return True if a fit does not determine the size of a mass, a stiffness or a damping: a missing effect may have bent it."""
+        """Return True if a fit leaves a mass, a stiffness or a damping undetermined: a missing effect may have bent it."""
         positive = {p.name for p in self.rig.parameters if p.lower >= 0.0}
         return any(
             name in positive and not fit.standard_errors[name] < abs(fit.values[name]) for name in fit.free
