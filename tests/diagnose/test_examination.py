@@ -13,13 +13,14 @@ PAIR = ("periodic_disturbance", "cubic_stiffness")
 
 
 @pytest.mark.parametrize(
-    ("single", "pair", "lower_bound", "is_driven", "competes"),
+    ("single", "pair", "adequate", "is_driven", "competes"),
     [
-        pytest.param(1.9, 1.02, True, True, True, id="reaches the very bound"),
-        pytest.param(1.9, 1.3, True, True, False, id="may as well fit noise"),
-        pytest.param(1.9, 1.02, True, False, False, id="a form of the same force"),
-        pytest.param(20.0, 1.3, True, True, True, id="more is left than noise could be"),
-        pytest.param(1.9, 1.3, False, True, True, id="a measured floor"),
+        pytest.param(1.9, 1.02, False, True, True, id="reaches the very bound"),
+        pytest.param(1.9, 1.3, False, True, False, id="may as well fit noise"),
+        pytest.param(1.9, 1.02, True, True, False, id="nothing but noise is left already"),
+        pytest.param(1.9, 1.02, False, False, False, id="a form of the same force"),
+        pytest.param(20.0, 1.3, False, True, True, id="more is left than noise could be"),
+        pytest.param(1.9, 1.3, None, True, True, id="a measured floor"),
     ],
 )
 def test_above_a_lower_bound_a_pair_must_reach_it(
@@ -27,12 +28,13 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     monkeypatch: pytest.MonkeyPatch,
     single: float,
     pair: float,
-    lower_bound: bool,
+    adequate: bool | None,
     is_driven: bool,
     competes: bool,
 ) -> None:
     found = [scored(PAIR, excess=pair)]
     monkeypatch.setattr(examination, "grown", lambda *_: found)
     models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)])
-    kept = examination._grown(models, [], None, lower_bound, is_driven, None)
+    checks = None if adequate is None else SimpleNamespace(is_adequate=lambda _: adequate)
+    kept = examination._grown(models, [], None, checks, is_driven, None)
     assert kept == (found if competes else [])

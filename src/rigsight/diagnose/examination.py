@@ -25,7 +25,7 @@ from rigsight.diagnose.plausibility import doubts, plausible_first
 from rigsight.diagnose.preparation import start_values_of, workbench_of
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
-from rigsight.diagnose.second_cause import OtherForms
+from rigsight.diagnose.second_cause import OtherForms, beyond_disturbance
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, MOST_LEFT, Judgement, judge, most_left
 from rigsight.diagnose.windows import Windowing, leading_output
@@ -146,8 +146,9 @@ def examine(
         cut = _cut(task, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
+    checks = Checks(models.bench, rng, np.inf if lower_bound else MOST_LEFT)
     if not in_windows:
-        pairs = _grown(models, effects, forms, lower_bound, task.rig.is_driven, ready)
+        pairs = _grown(models, effects, forms, checks if lower_bound else None, task.rig.is_driven, ready)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
         if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
@@ -161,9 +162,11 @@ def examine(
     pairs, imitations = told_apart(pairs, models.singles, allowed)
     if not in_windows:
         pairs = forms.with_own_evidence(models.singles, pairs)
+        pairs = beyond_disturbance(bench, linear, models.singles, pairs)
 
+    if in_windows:
+        checks = Checks(bench, rng, np.inf if lower_bound else MOST_LEFT)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    checks = Checks(bench, rng, np.inf if lower_bound else MOST_LEFT)
     ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
@@ -283,18 +286,21 @@ def _grown(
     models: _Singly,
     effects: Sequence[Effect],
     forms: OtherForms,
-    lower_bound: bool,
+    of_unknown_noise: Checks | None,
     is_driven: bool,
     prepare: Prepare | None,
 ) -> list[Scored]:
     """Return pairs where a single effect leaves something to explain.
 
-    Above a lower bound of the floor what a single one leaves may be noise, so that a pair must reach that very bound to say
-    otherwise. An element's equations are no more exact than that bound, and its pairs no more than other forms of them.
+    Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
+    An element's equations are no more exact than that bound, and its pairs no more than other forms of them.
     """
-    is_excused = lower_bound and min((m.excess for m in models.singles), default=np.inf) <= AT_LOWER_BOUND
-    if is_excused and not is_driven:
-        return []
+    is_excused = False
+    if of_unknown_noise is not None and models.singles:
+        best = min(models.singles, key=lambda model: model.excess)
+        is_excused = best.excess <= AT_LOWER_BOUND
+        if is_excused and (not is_driven or of_unknown_noise.is_adequate(best)):
+            return []
     pairs = grown(models.bench, models.singles, effects, AT_FLOOR, forms, prepare)
     return [pair for pair in pairs if not is_excused or pair.excess <= AT_FLOOR]
 

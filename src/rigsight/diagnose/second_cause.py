@@ -13,6 +13,7 @@ import numpy as np
 
 from rigsight.diagnose.adequacy import law_columns
 from rigsight.diagnose.candidates.one_law import are_one_law, is_one_law
+from rigsight.diagnose.evidence import Evidence
 from rigsight.diagnose.places.answers import Answers, orthonormal
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -78,3 +79,27 @@ class OtherForms:
             return self.gain(single) < _OTHER_FORM * (single.excess**2 - pair.excess**2)
 
         return [pair for pair in pairs if stands(pair)]
+
+
+def beyond_disturbance(
+    bench: Workbench, linear: Scored, singles: Sequence[Scored], pairs: Sequence[Scored]
+) -> list[Scored]:
+    """Return the pairs that explain more than any single effect does beside a disturbance.
+
+    A disturbance swings a rig at its resonances, and a second effect with a motion of its own follows that in each record.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    linear
+        The re-identified equations.
+    singles, pairs
+        Fitted and scored.
+    """
+    alone = [model for model in singles if model.residuals]
+    if not pairs or not alone:
+        return list(pairs)
+    evidence = Evidence(bench, linear, min(alone, key=lambda model: model.excess))
+    least = min(evidence.criterion(model) for model in alone)
+    return [pair for pair in pairs if not pair.residuals or evidence.criterion(pair) < least]

@@ -1,0 +1,78 @@
+"""A second effect that follows a force from outside explains nothing; one that is there does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.candidates.characterize import fit_candidate, fit_linear
+from rigsight.diagnose.evidence import Evidence
+from rigsight.diagnose.second_cause import beyond_disturbance
+from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.effects import effect_named
+from rigsight.identify import characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+DT, N, NOISE = 0.01, 2000, 1e-5
+VALUES = {"gain": 1.0, "m": 1.0, "d": 0.2, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
+CUBIC, TONE, FRICTION = (
+    effect_named(name) for name in ("cubic_stiffness", "periodic_disturbance", "coulomb_friction")
+)
+
+
+def bench_of(own: Mapping[str, float], force: float, seed: int = 2) -> Workbench:
+    """Four runs of many tones; a white force from outside swings the mass, and nobody records it."""
+    rng, t = np.random.default_rng(seed), DT * np.arange(N)
+    effects = [effect for effect in (CUBIC, FRICTION) if effect.parameters[0].name in own]
+    structure, records = compose(AXIS, effects), []
+    for number in range(4):
+        u = sum(0.3 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.4, 4.0, 0.3))
+        asked = Record(f"run {number}", DT, {"u": np.asarray(u)}, {}, hold="zoh")
+        pushed = asked.with_signals(u=u + rng.normal(scale=force, size=N))
+        x = simulate(structure, {**VALUES, **own}, pushed)["x"]
+        records.append(asked.with_signals(x=x + rng.normal(scale=NOISE, size=N)))
+    fitted, scored = tuple(records[:2]), tuple(records[2:])
+    scales = characteristic_scales(AXIS, fitted, VALUES)
+    return Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
+
+
+def modelled(bench: Workbench) -> tuple[Scored, Scored, Scored, Scored]:
+    """The equations, a spring that hardens, a tone beside it and friction beside it."""
+    linear = fit_linear(bench, VALUES)
+    single = fit_candidate(bench, (CUBIC,), linear.fit)
+    return (
+        linear,
+        single,
+        *(fit_candidate(bench, (CUBIC, second), single.fit) for second in (TONE, FRICTION)),
+    )
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing(seed: int) -> None:
+    bench = bench_of({"k_3": 2e3}, 0.01, seed)
+    linear, single, tone, _ = modelled(bench)
+    assert single.excess > 3.0
+    assert tone.excess < 0.98 * single.excess
+    assert beyond_disturbance(bench, linear, [single], [tone]) == []
+
+
+@pytest.mark.parametrize("force", [0.0, 0.01])
+def test_a_second_effect_that_is_there_stands_with_and_without_a_disturbance(force: float) -> None:
+    bench = bench_of({"k_3": 2e3, "T_c": 0.02}, force)
+    linear, single, tone, friction = modelled(bench)
+    assert beyond_disturbance(bench, linear, [single], [tone, friction])[-1] is friction
+    evidence = Evidence(bench, linear, single)
+    assert evidence.criterion(friction) < min(evidence.criterion(single), evidence.criterion(tone)) - 100.0
+
+
+def test_the_powers_of_force_and_noise_are_told_apart() -> None:
+    bench = bench_of({"k_3": 2e3}, force=0.01)
+    linear, single, *_ = modelled(bench)
+    ((noise, force),) = Evidence(bench, linear, single).powers
+    # Lines are scaled so that white noise has its variance; a tenth of a record is faded.
+    assert np.sqrt(noise) == pytest.approx(NOISE, rel=0.1)
+    assert np.sqrt(force) == pytest.approx(0.01, rel=0.15)
