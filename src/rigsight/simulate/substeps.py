@@ -28,6 +28,11 @@ class Substeps(int):
         made._schedule = None
         return made
 
+    @property
+    def mean(self) -> float:
+        """Steps per piece on average: what a simulation costs."""
+        return float(self) if self.needs is None else float(np.mean(self.per_piece(self.needs.size)))
+
     def with_most(self, most: int) -> Substeps:
         """Return the same needs with another number of steps at the most."""
         return Substeps(most, self.needs)

@@ -222,24 +222,33 @@ def fit_candidate(
 
 
 def refine(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
-    """Fit those models to full precision whose held-out error is close to the best."""
+    """Fit those models to full precision whose held-out error is close to the best; the best of them to the end."""
     best = min((m.excess for m in models), default=float("inf"))
 
     def one(model: Scored) -> Scored:
         if not (np.isfinite(model.excess) and model.excess <= _CONTENDER * best):
             return model
-        fit = bench.problem(model.fit.structure, bench.estimation)
-        result = fit.fit(
-            model.fit.values,
-            model.fit.free,
-            initial_states=model.fit.initial_states,
-            max_evaluations=max(_FEWEST_REFINE_EVALUATIONS, _REFINE_EVALUATIONS // max(model.fit.substeps)),
-        )
-        if not result.residuals or result.cost > model.fit.cost * (1.0 + 1e-3):
-            return model
-        return bench.score(model.effects, result)
+        steps = max(substeps.mean for substeps in model.fit.substeps)
+        return _refined(bench, model, max(_FEWEST_REFINE_EVALUATIONS, round(_REFINE_EVALUATIONS / steps)))
 
-    return list(bench.threads.side_by_side(one, models))
+    refined = list(bench.threads.side_by_side(one, models))
+    leading = min(range(len(refined)), key=lambda i: refined[i].excess, default=None)
+    if leading is not None and np.isfinite(refined[leading].excess) and not refined[leading].fit.success:
+        refined[leading] = _refined(bench, refined[leading], _REFINE_EVALUATIONS)
+    return refined
+
+
+def _refined(bench: Workbench, model: Scored, max_evaluations: int) -> Scored:
+    fit = bench.problem(model.fit.structure, bench.estimation)
+    result = fit.fit(
+        model.fit.values,
+        model.fit.free,
+        initial_states=model.fit.initial_states,
+        max_evaluations=max_evaluations,
+    )
+    if not result.residuals or result.cost > model.fit.cost * (1.0 + 1e-3):
+        return model
+    return bench.score(model.effects, result)
 
 
 def followed(bench: Workbench, look: Look, promising: bool, finish: bool = True) -> Scored:

@@ -187,7 +187,9 @@ class GreyBoxFit:
                 if not (finish and substeps is None and problem.refined(theta)):
                     break
             if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
-                theta = off_kinks(problem, theta, (lower, upper), self.n_samples)
+                settled = off_kinks(problem, theta, (lower, upper), self.n_samples)
+                if settled is not None:
+                    return settled, True, "Steps made of long differences have vanished."
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))

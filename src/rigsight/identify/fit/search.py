@@ -66,7 +66,7 @@ def off_kinks(
     theta: NDArray[np.float64],
     bounds: tuple[NDArray[np.float64], NDArray[np.float64]],
     n_samples: int,
-) -> NDArray[np.float64]:
+) -> NDArray[np.float64] | None:
     """Return the place near the end of a search where Gauss-Newton steps made of long differences vanish.
 
     Parameters
@@ -80,20 +80,19 @@ def off_kinks(
 
     Returns
     -------
-    Shape (n,); the end of the search itself where the steps lead to a higher cost or come to no end.
+    Shape (n,); None where the steps lead to a higher cost or come to no end.
     """
     before = problem.at(theta)
     variance = before.cost / max(n_samples, 1)
     if not (np.isfinite(before.cost) and variance > 0.0):
-        return theta
+        return None
     problem.steps = _differences(before, bounds, variance)
     try:
-        settled = _settled(problem, theta, bounds, variance)
+        return _settled(problem, theta, bounds, variance)
     except SimulationError:
-        settled = None
+        return None
     finally:
         problem.steps = np.full(theta.size, STEP)
-    return theta if settled is None else settled
 
 
 def _settled(
