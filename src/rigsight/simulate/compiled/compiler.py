@@ -165,7 +165,9 @@ def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]
             for file, text in sources.items():
                 Path(place, file).write_text(text, encoding="utf-8")
             target = Path(place, f"library{suffix}")
-            command = [*compiler.command, *flags, *shared, "-o", target.name, next(iter(sources)), "-lm"]
+            # Without being asked zig writes where it compiled for debuggers: other bytes each time.
+            options = ("-g0", *flags, *shared)
+            command = [*compiler.command, *options, "-o", target.name, next(iter(sources)), "-lm"]
             code, said = _run(command, place)
             if code == 0 and target.is_file():
                 return target.read_bytes()
