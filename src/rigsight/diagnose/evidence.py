@@ -2,7 +2,7 @@
 
 A force from outside swings a rig at its resonances, and the error is large there whatever the model: what merely follows that
 swing gains little, what explains the records gains over all of the spectrum. So what a model leaves is taken for noise of the
-spectrum that it shows, a smooth one once the rig's own resonances are divided out (prewhitening). No floor is needed.
+spectrum that it shows, a smooth one once the resonances of the linearized rig are divided out (prewhitening). No floor is needed.
 
 References
 ----------
@@ -33,10 +33,11 @@ _SMOOTHED = 9
 _TAPER = 0.1
 """Share of a record that is faded in and out: 10 percent is usual, so that slow errors do not leak into fast ones."""
 _FEWEST = 4 * _SMOOTHED
+"""Samples of a record below which its spectrum would be one average."""
 _BESIDE = 1e-2
 """Share of the power at which the search starts for the sources beside the main one."""
-_FAINT = 1e-12
-"""Share of the power of what is left that a source is never fainter than: its logarithm is fitted."""
+_FAINT, _STRONG = 1e-12, 1e3
+"""Bounds of a source's power, in units of the power that is left. The first keeps spectra regular as well."""
 
 
 class Evidence:
@@ -50,6 +51,12 @@ class Evidence:
         The re-identified equations: their resonances are divided out.
     reference
         The model whose remainder tells how large the forces from outside are and how large the sensors' noise.
+
+    Attributes
+    ----------
+    powers
+        Variance per sample of each sensor's own noise and of a white force at each joint, as each sensor tells it, in SI units,
+        shape (n_outputs, 1 + n_joints).
     """
 
     def __init__(self, bench: Workbench, linear: Scored, reference: Scored) -> None:
@@ -153,7 +160,7 @@ def _most_likely(seen: Sequence[tuple[Floats, Floats]]) -> Floats:
         return float(np.sum(np.log(expected) + power / expected)), slope
 
     n_sources = gains.shape[1]
-    bounds = [(np.log(_FAINT), np.log(1e3))] * n_sources
+    bounds = [(np.log(_FAINT), np.log(_STRONG))] * n_sources
     # Of several valleys each has another source that is the main one.
     starts = np.log(_BESIDE) * (1.0 - np.eye(n_sources))
     ends = [minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds) for start in starts]
