@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.candidates.characterize import fit_candidate, fit_linear
 from rigsight.diagnose.data.data_quality import data_quality, with_best_model
@@ -22,7 +23,7 @@ from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales, linear_start
 from rigsight.records import Hold, Record
-from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig
+from rigsight.rigs import AXIS, ELEMENT, RIGS, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaigns.campaign import read_campaign
 
@@ -311,3 +312,13 @@ def test_an_element_has_no_frequency_response(shared_data: Path):
     _, _, quality = measured(shared_data / "mr_damper/campaign_on.toml")
     assert ELEMENT.is_driven is False
     assert quality.amplitudes[0].answer == "cannot tell"
+
+
+def test_a_reading_that_an_input_may_move_at_once_is_not_told_to_jump():
+    """An acceleration jumps with the force; a displacement does not."""
+    rng = np.random.default_rng(0)
+    travel, body = (np.cumsum(rng.normal(size=4000)) for _ in range(2))
+    travel, body = (uniform_filter1d(samples, 50) for samples in (travel, body))
+    jumps = np.where(np.arange(4000) > 2000, np.ptp(travel) + np.ptp(body), 0.0)
+    record = Record("r", DT, {"travel": travel + jumps, "body": body + jumps}, {})
+    assert [found.signal for found in sensor_faults(RIGS["quarter_car"], record)] == ["travel"]

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from rigsight.diagnose import Task, diagnose
+from rigsight.diagnose.horizon import windowing_of
 from rigsight.diagnose.observer import Observer, followed_sensors, structures_to_fit
-from rigsight.effects import CATALOGUE, effect_named
+from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import AXIS, ELEMENT
+from rigsight.rigs import AXIS, ELEMENT, read_rig_file
 from rigsight.simulate import compose, record_values, simulate, simulate_outputs, structure_of_fit
 from rigsight.simulate.simulation import parameter_vector, record_input
 
@@ -157,3 +159,76 @@ def test_a_spring_that_nobody_left_out_and_that_is_not_there_is_found_to_be_none
     assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
     stiffness = found.candidates[0].parameters["k"]
     assert abs(stiffness.value) < 3.0 * stiffness.std < 2.0
+
+
+CYLINDER = """
+name = "cylinder"
+summary = "A valve feeds a cylinder that moves a mass."
+[inputs.u]
+unit = "V"
+[parameters.c]
+unit = "Pa/m"
+lower = 0.0
+[parameters.k_v]
+unit = "Pa/(s V)"
+lower = 0.0
+[parameters.leak]
+unit = "1/s"
+lower = 0.0
+[parameters.m]
+unit = "kg"
+lower = 0.0
+[parameters.d]
+unit = "N s/m"
+lower = 0.0
+[constants.area]
+unit = "m^2"
+default = 1e-3
+[coordinates.x]
+unit = "m"
+[energy]
+kinetic = "m*d(x)^2/2"
+[states.p]
+rate = "k_v*valve - c*d(x) - leak*p"
+unit = "Pa"
+[joints.piston]
+motion = "x"
+damping = "d"
+[drives.valve]
+signal = "u"
+force = "area*p"
+along = "x"
+[sensors.pressure]
+reads = "p"
+unit = "Pa"
+[sensors.position]
+reads = "x"
+unit = "m"
+"""
+
+
+def test_noise_that_is_followed_shows_in_a_pressure_and_counts_as_its_floor(tmp_path: Path) -> None:
+    """A cylinder hands the noise of its position on to its pressure; a true model cannot leave less."""
+    (tmp_path / "cylinder.toml").write_text(CYLINDER)
+    rig = read_rig_file(tmp_path / "cylinder.toml")
+    truth = {"area": 1e-3, "c": 6e8, "k_v": 4e7, "leak": 3.0, "m": 60.0, "d": 900.0, "T_c": 150.0}
+    noise = {"pressure": 300.0, "position": 1e-5}
+    structure = compose(rig, [placed(effect_named("coulomb_friction"), "piston")])
+    rng, records = np.random.default_rng(4), []
+    for amplitude, role in ((1.0, "estimation"), (2.0, "estimation"), (1.5, "validation")):
+        u = amplitude * np.sin(2.0 * np.pi * (0.3 * T + 0.12 * T**2))
+        run = simulate(structure, truth, Record(f"at_{amplitude:g}", DT, {"u": u}, {}, role=role))
+        shown = {name: run[name] + rng.normal(scale=std, size=T.size) for name, std in noise.items()}
+        records.append(run.with_signals(**shown))
+    given = {name: value for name, value in truth.items() if name not in ("area", "T_c")}
+    task = Task("cylinder", rig, {"area": 1e-3}, given, tuple(records))
+    windowing, amplified = windowing_of(task, noise, 1)
+    left = {}
+    for bandwidth in (100.0, windowing.bandwidth):
+        (record,) = Observer(("position",), bandwidth).following(records[1:2])
+        following = structure_of_fit(structure, [record])
+        p = parameter_vector(following, record_values(following, truth, record))
+        out = simulate_outputs(following, record_input(following, record), p, np.zeros(3), T.size, 1e-8)
+        left[bandwidth] = float(np.std(record["pressure"] - out[:, 0])) / noise["pressure"]
+    assert left[100.0] > 2.0
+    assert left[windowing.bandwidth] == pytest.approx(amplified["pressure"], rel=0.1)

@@ -129,7 +129,11 @@ def examine(
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    windowing = windowing_of(task, noise, n_jobs) if drifts else Windowing()
+    windowing = Windowing()
+    if drifts:
+        windowing, amplified = windowing_of(task, noise, n_jobs)
+        floors = tuple(_amplified(floor, amplified.get(floor.output, 1.0)) for floor in floors)
+        noise = {floor.output: floor.std for floor in floors}
     ready = preparing(prepare, windowing.cut(task.records))
     models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
     allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
@@ -203,6 +207,11 @@ def examine(
         tuple(doubt.text for doubt in doubts(judgement.model, linear)) if judgement.model.effects else (),
         checks.of(linear).place if judgement.verdict == "unknown" else "",
     )
+
+
+def _amplified(floor: NoiseFloor, factor: float) -> NoiseFloor:
+    low, high = floor.interval
+    return replace(floor, std=factor * floor.std, interval=(factor * low, factor * high))
 
 
 def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:

@@ -12,10 +12,12 @@ from rigsight.diagnose.observer import Observer, followed_sensors
 from rigsight.diagnose.preparation import start_values_of, workbench_of
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.windows import Windowing, typical_period, window_length
-from rigsight.identify import IdleThreads
+from rigsight.diagnose.workbench import Workbench
+from rigsight.errors import SimulationError
+from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import evaluated
-from rigsight.simulate import structure_of_fit
+from rigsight.simulate import parameter_vector, simulate_outputs, structure_of_fit
 
 _CLOSE, _LOOSE = 6.0, 0.1
 """Bandwidths of the closest and the loosest observer, in units of the typical frequency of the velocity.
@@ -26,6 +28,12 @@ drift stays small against motion.
 _LOOSER = 2.0
 _OF_SAMPLING = 0.2
 """Largest bandwidth times sample time: an observer that is closer follows the noise of single samples."""
+_AMPLIFIED = 1.1
+"""Most that a true model may leave of a sensor's noise, in units of that noise, as it follows the noise of others.
+
+A pressure or a speed is moved by the noise of the position that is followed. With a tenth more a true model still counts as one
+that reaches the floor, see `AT_FLOOR`.
+"""
 _CLEAR = 10.0
 """Gap, in units of the noise floor, that shows its cause: benches of the catalogue are judged from ten floors on."""
 
@@ -40,11 +48,12 @@ def brings_back(task: Task) -> bool:
     return bool(np.min(np.abs(np.roots(numbers))) >= _LOOSE * typical)
 
 
-def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowing:
+def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[Windowing, dict[str, float]]:
     """Return how records of a rig that drifts are compared with models: by an observer.
 
     The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
-    it. Where no sensor shows the motion by itself, records are cut into windows.
+    it, but not so close that the noise that it follows shows in what a true model leaves. Where no sensor shows the motion by
+    itself, records are cut into windows.
 
     Parameters
     ----------
@@ -54,10 +63,17 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowi
         Noise floor of each output.
     n_jobs
         Threads that help with the records of a fit.
+
+    Returns
+    -------
+    windowing
+        How they are compared.
+    amplified
+        What a true model then leaves of each output's noise, in units of it; at least 1.
     """
     sensors = followed_sensors(task)
     if not sensors:
-        return Windowing(window_length(task.rig, task.estimation))
+        return Windowing(window_length(task.rig, task.estimation)), dict.fromkeys(noise, 1.0)
     typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
     bandwidth = min(_CLOSE * typical, _OF_SAMPLING / max(record.dt for record in task.records))
     values: Mapping[str, float] | None = None
@@ -65,10 +81,51 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> Windowi
         windowing = Windowing(observer=Observer(sensors, bandwidth))
         bench = workbench_of(task, noise, windowing, None, IdleThreads(n_jobs))
         linear = fit_linear(bench, values or bench.start)
-        if linear.excess >= _CLEAR or bandwidth <= _LOOSE * typical:
-            return windowing
+        amplified = noise_of_following(bench, linear.fit)
+        shows = linear.excess >= _CLEAR and max(amplified.values()) <= _AMPLIFIED
+        if shows or bandwidth <= _LOOSE * typical:
+            return windowing, {name: max(1.0, factor) for name, factor in amplified.items()}
         values = linear.fit.values if linear.residuals else None
         bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
+
+
+def noise_of_following(bench: Workbench, fit: FitResult) -> dict[str, float]:
+    """Return what a true model that follows noisy sensors leaves of the noise of each, in units of it.
+
+    The true numbers are unknown: the larger of two, with those that were given and with the fitted ones.
+
+    Parameters
+    ----------
+    bench
+        Records with what models follow, noise of each sensor.
+    fit
+        The equations without an effect, fitted to the records.
+    """
+    record, rng = bench.estimation[0], np.random.default_rng(0)
+    sensors = [signal.name for signal in bench.rig.outputs]
+    added = {
+        name: rng.normal(scale=bench.noise[name], size=record.n_samples) for name in sensors if name in record
+    }
+    noisy = record.with_signals(**{name: record[name] + noise for name, noise in added.items()})
+    data = bench.problem(fit.structure, [record, noisy], DEFAULT_ACCURACY).data
+
+    def left(values: Mapping[str, float]) -> dict[str, float]:
+        p = parameter_vector(data.structure, values)
+        state = fit.initial_states[0]
+        try:
+            quiet, moved = (
+                simulate_outputs(
+                    data.structure, d.held, d.parameters(p), state, record.n_samples, DEFAULT_ACCURACY
+                )
+                for d in data.records
+            )
+        except SimulationError:
+            return dict.fromkeys(added, 0.0)
+        shown = dict(zip(sensors, (moved - quiet).T, strict=True))
+        return {name: float(np.std(own - shown[name])) / bench.noise[name] for name, own in added.items()}
+
+    fitted, given = left(fit.values), left({**fit.values, **bench.given})
+    return {name: max(fitted[name], given[name]) for name in added}
 
 
 def preparing(prepare: Prepare | None, records: Sequence[Record]) -> Prepare | None:

@@ -9,6 +9,7 @@ from rigsight.diagnose.data.finding import Finding
 from rigsight.records.plausibility import clipping
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
+from rigsight.simulate import compose
 
 _SHORTEST_STUCK = 20
 _LONGEST_SHARE_STILL = 0.5
@@ -30,6 +31,7 @@ def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
     found = []
     signals = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
     outputs = [signal.name for signal in rig.outputs if signal.name in record]
+    smooth = _of_displacement(rig) if rig.is_driven else frozenset()
     for name, unit in signals.items():
         found += _clipped(record, name, unit)
     for name in outputs:
@@ -38,11 +40,25 @@ def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
             continue
         coarse = _quantized(record, name, signals[name])
         found += coarse
-        # A coarse channel stands still and jumps by itself; the force of an element may do both.
-        if not coarse and rig.is_driven:
+        # A coarse channel stands still and jumps by itself; a force may do both, and a pressure or a speed when an input steps.
+        if not coarse and name in smooth:
             # A stuck channel jumps where it comes loose.
             found += _stuck(record, name) or _jumping(record, name, signals[name])
     return found
+
+
+def _of_displacement(rig: Rig) -> frozenset[str]:
+    """Return the sensors whose rate of change no input can set at once: those that read coordinates, or what follows them."""
+    structure = compose(rig)
+    tree = structure.tree
+    following = {*tree.motion.coordinates, *structure.parameter_symbols}
+    moving = {*following, *tree.motion.velocities, *(state.symbol for state in tree.states)}
+    following |= {state.symbol for state in tree.states if tree.flattened(state.rate).free_symbols <= moving}
+    return frozenset(
+        sensor.name
+        for sensor, reading in zip(rig.mechanism.sensors, structure.outputs, strict=True)
+        if reading.free_symbols <= following
+    )
 
 
 def _clipped(record: Record, name: str, unit: str) -> list[Finding]:

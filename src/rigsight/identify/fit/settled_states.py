@@ -1,7 +1,8 @@
 """Which initial state does the beginning of a record speak for? From a guess over ever longer stretches to the whole record.
 
 What a state does is known over a short stretch better than over a long one, above all where the motion is unstable or chaotic: a
-descent that begins with the whole record would not come back from a guess that is a little off.
+descent that begins with the whole record would not come back from a guess that is a little off. Where what a state does dies
+away, the fit itself comes back, and longer stretches are left to it.
 """
 
 from __future__ import annotations
@@ -18,13 +19,17 @@ from rigsight.simulate import parameter_vector, simulate_sets
 Floats = NDArray[np.float64]
 
 _FIRST_SAMPLES = 25
-"""Samples of the first stretch; each further one is twice as long."""
+"""Samples of the first stretch."""
 _STEP = 1e-6
 """Difference of a state in units of its size."""
 _STEPS = 4
 """Gauss-Newton steps on each stretch."""
-_DAMPINGS = (1.0, 0.3, 0.1, 0.03)
-"""Shares of a step that are tried side by side."""
+_SHORTER = (0.3, 0.1, 0.03)
+"""Shares of a step that are tried beside the whole one."""
+_WORTH_A_STEP = 0.1
+"""Share of the squared error that a step has to take for another one: the fit goes on from here."""
+_LONGER = 4
+"""Length of a stretch in units of the one before."""
 _PULL = 1e-3
 """Weight of the guess against an error of size one: it decides what the stretch does not tell."""
 _LARGEST = 1e9
@@ -34,6 +39,8 @@ _FIRST_PLACES = (0.0, -1.0, -0.5, 0.5, 1.0)
 """Where limited states may stand when a record begins, as shares of their range: a descent from a wrong end stays there."""
 _LOST = 2.0
 """Growth of the error per sample at which a longer stretch is not followed: the parameters are not good enough for it."""
+_STEADY = 0.5
+"""Share of the squared sensitivity in the second half of a stretch where what a state does neither grows nor dies away."""
 
 
 def guessed_states(data: FitData, values: Mapping[str, float]) -> list[Floats]:
@@ -107,19 +114,19 @@ def settled_state(data: FitData, record: RecordData, p: Floats, guess: Floats) -
     sizes = np.where(sizes > 0.0, sizes, 1.0)
     state, n_samples, before = guess, min(_FIRST_SAMPLES, record.record.n_samples), np.inf
     while True:
-        found, error = _fitted(data, record, own, state, sizes, n_samples)
+        found, error, slopes = _fitted(data, record, own, state, sizes, n_samples)
         if not error <= _LOST * max(before, 1.0):
             return state
         state, before = found, error
-        if n_samples == record.record.n_samples:
+        if n_samples == record.record.n_samples or _dies_away(slopes, n_samples):
             return state
-        n_samples = min(2 * n_samples, record.record.n_samples)
+        n_samples = min(_LONGER * n_samples, record.record.n_samples)
 
 
 def _fitted(
     data: FitData, record: RecordData, p: Floats, start: Floats, sizes: Floats, n_samples: int
-) -> tuple[Floats, float]:
-    """Return the state that fits the first samples best, and the root mean square of the weighted error there."""
+) -> tuple[Floats, float, Floats]:
+    """Return the state that fits the first samples best, the root mean square of the weighted error there, and its slopes."""
     n, place, beginning = start.size, np.zeros(start.size), record.first(n_samples)
 
     def errors(places: Floats) -> Floats:
@@ -131,18 +138,39 @@ def _fitted(
             left = np.column_stack([first, first[:, None] + against])
         return np.vstack([np.clip(np.nan_to_num(left, nan=_LARGEST), -_LARGEST, _LARGEST), _PULL * places])
 
-    cost = np.inf
+    around = np.column_stack([np.zeros(n), _STEP * np.eye(n)])
+    lanes = errors(place[:, None] + around)
     for _ in range(_STEPS):
-        lanes = errors(place[:, None] + np.column_stack([np.zeros(n), _STEP * np.eye(n)]))
-        cost = float(lanes[:, 0] @ lanes[:, 0])
-        step = np.linalg.lstsq((lanes[:, 1:] - lanes[:, :1]) / _STEP, -lanes[:, 0], rcond=None)[0]
-        tried = place[:, None] + np.outer(step, _DAMPINGS)
-        costs = np.sum(errors(tried) ** 2, axis=0)
-        best = int(np.argmin(costs))
+        cost, slopes = float(lanes[:, 0] @ lanes[:, 0]), (lanes[:, 1:] - lanes[:, :1]) / _STEP
+        step = np.linalg.lstsq(slopes, -lanes[:, 0], rcond=None)[0]
+        # A whole step is mostly the best, and the next one needs the slopes there.
+        tried = np.column_stack([(place + step)[:, None] + around, place[:, None] + np.outer(step, _SHORTER)])
+        ahead = errors(tried)
+        costs = np.sum(ahead**2, axis=0)
+        best = min((0, *range(n + 1, tried.shape[1])), key=lambda lane: costs[lane])
         if not costs[best] < cost:
             break
-        gained, cost, place = cost - float(costs[best]), float(costs[best]), tried[:, best]
-        if gained < 1e-3 * cost:
+        place, gained = tried[:, best], cost - float(costs[best])
+        lanes = ahead[:, : n + 1] if best == 0 else errors(place[:, None] + around)
+        if gained < _WORTH_A_STEP * cost:
             break
+    cost, slopes = float(lanes[:, 0] @ lanes[:, 0]), (lanes[:, 1:] - lanes[:, :1]) / _STEP
     n_measured = max(1, n_samples * int(np.count_nonzero(record.weights)))
-    return start + sizes * place, float(np.sqrt(cost / n_measured))
+    return start + sizes * place, float(np.sqrt(cost / n_measured)), slopes
+
+
+def _dies_away(slopes: Floats, n_samples: int) -> bool:
+    """Return whether what any change of the state does is smaller in the second half of a stretch than in the first.
+
+    Parameters
+    ----------
+    slopes
+        Change of all errors with each state, the samples of one output after the other and the pull behind them, shape
+        (n_errors, n_states).
+    n_samples
+        Samples of the stretch.
+    """
+    n_states = slopes.shape[1]
+    directions = np.linalg.qr(slopes)[0][:-n_states].reshape(-1, n_samples, n_states)
+    late = directions[:, n_samples // 2 :].reshape(-1, n_states)
+    return bool(np.linalg.norm(late, ord=2) ** 2 <= _STEADY)
