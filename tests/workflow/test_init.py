@@ -13,7 +13,6 @@ from rigsight.errors import InputError
 from rigsight.rigs import rig_file_text
 from rigsight.workflow.campaigns.campaign import read_campaign
 from rigsight.workflow.campaigns.init import run_init
-from rigsight.workflow.own.own_rigs import own_rigs
 
 from ..records.formats import write_mdf, write_parquet, write_text
 
@@ -270,16 +269,19 @@ def test_a_rig_of_ones_own_is_named_by_its_file(tmp_path: Path) -> None:
     assert read_campaign(tmp_path).rig.name == "train"
 
 
-def test_a_rig_file_elsewhere_is_named_with_what_to_do(tmp_path: Path) -> None:
+def test_a_rig_file_elsewhere_is_copied_into_the_campaign(tmp_path: Path) -> None:
     (tmp_path / "records").mkdir()
     write_text(tmp_path / "records" / "a.csv", {"t": T, "u": SWEEP, "motor_angle": ANSWER}, {})
     file = own_train(tmp_path)
+    copy = tmp_path / "records" / file.name
+    copy.write_text("another")
+    with pytest.raises(InputError, match=r"is another file than"):
+        run_init(tmp_path / "records", model="train", rig_files=[file])
+    assert not (tmp_path / "records" / "campaign.toml").exists()
+    copy.unlink()
     run_init(tmp_path / "records", model="train", rig_files=[file])
-    with pytest.raises(InputError, match=r"rig\.model: is 'train'"):
-        read_campaign(tmp_path / "records")
-    assert read_campaign(tmp_path / "records", own_rigs=own_rigs([file]).values()).rig.name == "train"
-    text = (tmp_path / "records" / "campaign.toml").read_text(encoding="utf-8")
-    assert "name it with --rigs, or copy it here" in text
+    assert copy.read_text() == file.read_text()
+    assert read_campaign(tmp_path / "records").rig.name == "train"
 
 
 @pytest.mark.parametrize("name", ["ref", "setpoint", "goal", "reference"])

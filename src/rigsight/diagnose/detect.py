@@ -78,8 +78,10 @@ def _interval(std: float, stretches: Stretches, lower_bound: bool) -> tuple[floa
     if lower_bound or not stretches:
         return std, np.inf
     squares = block_means([samples**2 for samples, _ in stretches])
-    degrees = squares.size
-    spread = float(np.std(squares) / np.mean(squares)) / np.sqrt(degrees) if degrees > 1 else np.inf
+    degrees, mean = squares.size, float(np.mean(squares))
+    if mean == 0.0:
+        return std, np.inf
+    spread = float(np.std(squares)) / mean / np.sqrt(degrees) if degrees > 1 else np.inf
     low, high = np.maximum(1.0 - 1.96 * spread, 0.0), 1.0 + 1.96 * spread
     return float(std * np.sqrt(low)), float(std * np.sqrt(high))
 

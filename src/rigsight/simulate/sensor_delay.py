@@ -60,7 +60,9 @@ def _shifted(
         s = place - start
         x, v = value[:, i], rise[:, i]
         a, b, va, vb = x[start], x[start + 1], v[start], v[start + 1]
-        inside = a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb)))
+        # A set that diverges holds numbers beyond the range.
+        with np.errstate(over="ignore", invalid="ignore"):
+            inside = a + s * (va + s * (3.0 * (b - a) - 2.0 * va - vb + s * (2.0 * (a - b) + va + vb)))
         before = np.where(s < 0.0, x[0] + v[0] * place, inside)
         shifted[:, i] = np.where(s > 1.0, x[-1] + v[-1] * (place - (n_samples - 1)), before)
     return shifted

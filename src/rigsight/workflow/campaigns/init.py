@@ -52,7 +52,7 @@ class Draft:
 
 
 def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterable[Path] = ()) -> Draft:
-    """Write a `campaign.toml` for the measured files of a folder.
+    """Write a `campaign.toml` for the measured files of a folder, and a copy of a rig file from elsewhere beside it.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     Raises
     ------
     InputError
-        If there is a campaign already, no file can be used, or nothing can be written there.
+        If there is a campaign already, no file can be used, another file is in the way, or nothing can be written there.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -98,8 +98,10 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     rig = proposals[0].guess.rig
     others = () if model is not None else tuple(name for name in known if name != rig.name)
     source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
-    text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, source, others), proposals, left_out)
-    write_together(folder, {CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
+    beside = {} if source is None else _copied(folder, source)
+    inside = source and (folder / source.name if beside else source)
+    text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, inside, others), proposals, left_out)
+    write_together(folder, {**beside, CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
     return Draft(
         path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks, others
     )
@@ -201,14 +203,20 @@ def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str])
         )
     if file is None:
         return ["[rig]", f'model = "{rig.name}"  {remark}']
+    inside = file.resolve().relative_to(folder.resolve()).as_posix()
+    return ["[rig]", f"file = {quoted(inside)}  {remark}"]
+
+
+def _copied(folder: Path, file: Path) -> dict[str, str]:
+    """Return what to write beside a campaign so that it holds its rig file; nothing where that is inside already."""
     if file.resolve().is_relative_to(folder.resolve()):
-        inside = file.resolve().relative_to(folder.resolve()).as_posix()
-        return ["[rig]", f"file = {quoted(inside)}  {remark}"]
-    return [
-        f"# The rig is declared in {file}: name it with --rigs, or copy it here and write file = {quoted(file.name)}.",
-        "[rig]",
-        f'model = "{rig.name}"  {remark}',
-    ]
+        return {}
+    text, copy = file.read_text(encoding="utf-8"), folder / file.name
+    if copy.exists() and copy.read_text(encoding="utf-8", errors="replace") != text:
+        raise InputError(
+            f"{copy} is another file than {file}, of which a campaign needs a copy; name that one, or remove it."
+        )
+    return {file.name: text}
 
 
 def _times(count: int) -> str:
