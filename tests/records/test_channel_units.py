@@ -105,3 +105,10 @@ def test_a_unit_in_a_name_that_is_not_read_is_asked_about() -> None:
         assert si_mapping("run.mat", "t", "s", said, "t_ms", None)[1] == ()
     for name in ("t", "time_s", "Time [s]", "x_A"):
         assert si_mapping("run.mat", "t", "s", ColumnMapping(name), name, None)[1] == ()
+
+
+def test_a_unit_of_the_campaign_that_contradicts_the_column_is_told() -> None:
+    _, (note,) = si_mapping("run.csv", "t", "s", ColumnMapping("Time [s]", unit="ms"), "Time [s]", None)
+    assert "taken in ms, as the campaign says, though its name ends with s." in note
+    _, (note,) = si_mapping("run.mf4", "x", "m", ColumnMapping("x", unit="mm"), "x", "um")
+    assert "though the file states um" in note

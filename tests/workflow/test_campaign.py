@@ -45,7 +45,7 @@ def campaign(tmp_path: Path, write_csv: Callable[..., Path]) -> Callable[..., Pa
 
     def write(text: str = HEAD + RECORDS, change: Callable[[Lines], None] | None = None) -> Path:
         write_csv("sweep.csv", change=change)
-        write_csv("step.csv")
+        write_csv("step.csv", change=lambda lines: lines.pop())
         (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
         return tmp_path
 
@@ -358,3 +358,15 @@ def test_a_rig_whose_own_input_is_called_reference_means_that(
     assert (names, list(record.signals)) == (["reference"], ["reference", "angle"])
     assert instrument_of(record, names) is None
     assert closed_loop_notes(campaign.records, campaign.rig, "") == []
+
+
+def test_time_is_no_signal(campaign: Callable[..., Path]) -> None:
+    folder = campaign(HEAD + RECORDS + '[records.columns]\nu = "t"\n')
+    with pytest.raises(InputError, match=r"step\.csv: u and t are both column 't': a signal is no time"):
+        read_campaign(folder)
+
+
+def test_a_fitted_record_that_is_to_validate_too_is_told(campaign: Callable[..., Path]) -> None:
+    folder = campaign(HEAD + RECORDS.replace('"step.csv"', '"sweep.csv"'))
+    (note,) = read_campaign(folder).notes
+    assert "is for validation and holds the very samples of 'sweep', which is fitted" in note

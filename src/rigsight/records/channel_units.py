@@ -184,6 +184,12 @@ def si_mapping(
             f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 for the values as they stand.'
         ) from None
     converted = ColumnMapping(mapping.name, scale=scale)
-    if mapping.unit is not None or scale == 1.0:
+    if mapping.unit is not None:
+        said = split_unit(label)[1] if stated is None else stated
+        if said is None or not is_a(said, si) or factor(said, si) == scale:
+            return converted, ()
+        by = "its name ends with" if stated is None else "the file states"
+        return converted, (f"{where}: taken in {unit}, as the campaign says, though {by} {said}.",)
+    if scale == 1.0:
         return converted, ()
     return converted, (f"{where}: converted from {unit}, the unit that the file states, to {si}.",)

@@ -171,6 +171,7 @@ def read_stretches(
         raise InputError(
             f"{path.name} has none of the outputs {listed}. Its columns: {listed_columns(table)}. Map one at least under columns."
         )
+    _refuse_time_as_signal(path.name, table)
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     # One that nothing is computed in has the unit that it was said to have.
     units |= {name: wanted[name].unit or "" for name in beside}
@@ -266,6 +267,17 @@ def _table(
         return table
     stamps = dt * np.arange(table.lines.size, dtype=np.float64)
     return replace(table, values={TIME: stamps, **table.values}, labels={TIME: "dt", **table.labels})
+
+
+def _refuse_time_as_signal(file: str, table: Columns) -> None:
+    same = [
+        signal for signal, label in table.labels.items() if signal != TIME and label == table.labels.get(TIME)
+    ]
+    if same:
+        raise InputError(
+            f"{file}: {same[0]} and {TIME} are both column '{table.labels[TIME]}': a signal is no time. Map each to a column "
+            "of its own under columns."
+        )
 
 
 def _refuse_dialect(path: Path, dialect: _Dialect) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -154,7 +154,12 @@ def read_campaign(
     constants, differing = of_first_record(given, records)
     notes = [
         note
-        for note in (differing, _rates_apart(records), *(_other_amplitude(r, rig) for r in records))
+        for note in (
+            differing,
+            _rates_apart(records),
+            *(_other_amplitude(r, rig) for r in records),
+            *_fitted_again(path.name, records),
+        )
         if note
     ]
     if all(record.role != "validation" for record in records):
@@ -168,6 +173,22 @@ def read_campaign(
         parameters=given.parameters,
         records=_with_distinct_names(read),
         notes=tuple(notes),
+    )
+
+
+def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
+    for scored in (record for record in records if record.role == "validation"):
+        for fitted in (record for record in records if record.role == "estimation"):
+            if _holds_same_samples(scored, fitted):
+                yield (
+                    f"{file}: '{scored.name}' is for validation and holds the very samples of '{fitted.name}', which is fitted: "
+                    "its error proves nothing. Name another file."
+                )
+
+
+def _holds_same_samples(record: Record, other: Record) -> bool:
+    return record.signals.keys() == other.signals.keys() and all(
+        np.array_equal(samples, other[name]) for name, samples in record.signals.items()
     )
 
 
