@@ -17,7 +17,7 @@ from rigsight.workflow.campaigns.campaign import read_campaign
 from rigsight.workflow.simulate import simulate_model
 
 PAGE = (Path(__file__).parents[2] / "docs/rigs.md").read_text(encoding="utf-8")
-RIG, CAMPAIGN = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+RIG, DRIVEN_STATE, CAMPAIGN = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
 def test_the_campaign_of_the_page_is_read_and_its_simulation_runs(tmp_path: Path) -> None:
@@ -40,6 +40,35 @@ def test_the_campaign_of_the_page_is_read_and_its_simulation_runs(tmp_path: Path
     force, mass, damping = 0.08 / 0.02, 1.5 + 2e-4 / 0.02**2, 8.0 + 1e-3 / 0.02**2
     expected = force / damping * (0.199 - mass / damping * -np.expm1(-damping * 0.199 / mass))
     assert moved["position"][-1] == pytest.approx(expected, rel=0.01)
+
+
+def test_a_drive_that_acts_through_a_state_is_read() -> None:
+    units = {
+        "beta": "Pa",
+        "V": "m^3",
+        "k_v": "m^3/(s V)",
+        "A": "m^2",
+        "c_l": "m^3/(s Pa)",
+        "m": "kg",
+        "d": "N s/m",
+    }
+    numbers = "".join(f'[parameters.{name}]\nunit = "{unit}"\n' for name, unit in units.items())
+    text = f"""name = "cylinder"
+summary = "s"
+[inputs.u]
+unit = "V"
+{numbers}[coordinates.x]
+unit = "m"
+[energy]
+kinetic = "m*d(x)^2/2"
+[joints.piston]
+motion = "x"
+damping = "d"
+{DRIVEN_STATE}[sensors.position]
+reads = "x"
+unit = "m"
+"""
+    assert compose(rig_of_text(text, "docs/rigs.md")).state_names[-1] == "p"
 
 
 def test_the_page_names_every_table_of_a_rig_file() -> None:

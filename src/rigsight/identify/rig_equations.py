@@ -81,19 +81,23 @@ class RigEquations:
         """Return the parameter vector of values by name with the record's own constants; a missing one has its default."""
         return parameter_vector(self.structure, record_values(self.structure, values, record))
 
-    def shows_all_coordinates(self, measured: set[str]) -> bool:
-        """Return True if the readings of these sensors alone give all coordinates, whatever the parameters are."""
+    def shows_all_states(self, measured: set[str]) -> bool:
+        """Return True if these sensors alone give all coordinates and own states, whatever the parameters are."""
         mechanism = self.rig.mechanism
-        coordinates = [coordinate.symbol for coordinate in mechanism.free]
-        if mechanism.states:
-            return False
+        shown = [c.symbol for c in mechanism.free] + [state.symbol for state in mechanism.states]
         read = [
             sensor.reads
             for sensor in mechanism.sensors
-            if sensor.name in measured and sensor.reads.free_symbols <= set(coordinates)
+            if sensor.name in measured and sensor.reads.free_symbols <= set(shown)
         ]
-        slopes = sp.Matrix(read).jacobian(coordinates) if read else sp.Matrix(0, 0, [])
-        return bool(slopes.is_symbolic() is False and slopes.rank() == len(coordinates))
+        slopes = sp.Matrix(read).jacobian(shown) if read else sp.Matrix(0, 0, [])
+        return bool(slopes.is_symbolic() is False and slopes.rank() == len(shown))
+
+    @cached_property
+    def of_own_states(self) -> frozenset[str]:
+        """Sensors that read a state beside the motion: how fast it changes hangs on the parameters."""
+        own = {state.symbol for state in self.rig.mechanism.states}
+        return frozenset(s.name for s in self.rig.mechanism.sensors if s.reads.free_symbols & own)
 
     def inputs_of(self, record: Record) -> tuple[HeldInput, Floats]:
         """Return a record's inputs between samples, and at them with their derivatives, shape (3 n_inputs, n_samples)."""

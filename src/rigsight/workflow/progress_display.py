@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from typing import IO, Any, cast
 
 import typer
@@ -13,26 +14,39 @@ from rigsight.workflow.progress import Listener, Step, silent
 
 _REMEMBERED = 24 * 3600.0
 """Time [s] over which the speed of steps is averaged."""
+_BETWEEN_LINES = 30.0
+"""Time [s] after which a log is told how far the work is: often enough to see that it goes on, and no more."""
 
 
 @contextlib.contextmanager
 def listening(quiet: bool) -> Iterator[Listener]:
-    """Show progress on stderr: a bar on a terminal, a line per stage where the output is kept, nothing if quiet."""
+    """Show progress on stderr: a bar on a terminal, a line now and then where the output is kept, nothing if quiet."""
     # A process without a terminal may have no stderr at all.
     if quiet or sys.stderr is None:
         yield silent
     elif not sys.stderr.isatty():
-        yield _say_stage
+        yield _lines()
     else:
         with _bar() as listener:
             yield listener
 
 
-def _say_stage(step: Step) -> None:
-    if step.done == 0:
+def _lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time.monotonic) -> Listener:
+    """Return what says a line at the start of a stage, and later at most one in so many seconds."""
+    last = clock()
+
+    def say(step: Step) -> None:
+        nonlocal last
+        if step.done > 0 and clock() - last < between:
+            return
+        last = clock()
+        detail = f": {step.detail}" if step.detail else ""
+        line = f"{step.stage} ..." if step.done == 0 else f"{step.stage} ({step.done} of {step.total}){detail}"
         # A log that is full, or a terminal that went away, ends no work of hours.
         with contextlib.suppress(OSError):
-            typer.echo(f"{step.stage} ...", err=True)
+            typer.echo(line, err=True)
+
+    return say
 
 
 class _Lasting:

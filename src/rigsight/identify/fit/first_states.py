@@ -113,13 +113,14 @@ def rig_state(
     -------
     Shape (n_states,).
     """
-    if not equations.shows_all_coordinates(set(record.signals)):
-        return _rig_state(equations, record, values, resting)
+    if not equations.shows_all_states(set(record.signals)):
+        return _rig_state(equations, record, values, resting, equations.sensor_names)
     # Then it does not depend on the values, and every candidate asks for the same records.
+    moving = [name for name in equations.sensor_names if name not in equations.of_own_states]
     known = _known.setdefault(record, {})
     key = (id(equations), resting)
     if key not in known:
-        known[key] = _rig_state(equations, record, values, resting)
+        known[key] = _rig_state(equations, record, values, resting, moving)
     return known[key].copy()
 
 
@@ -127,8 +128,13 @@ _known: WeakKeyDictionary[Record, dict[tuple[int, int | None], Floats]] = WeakKe
 
 
 def _rig_state(
-    equations: RigEquations, record: Record, values: Mapping[str, float], resting: int | None
+    equations: RigEquations,
+    record: Record,
+    values: Mapping[str, float],
+    resting: int | None,
+    moving: Sequence[str],
 ) -> Floats:
+    """Return the state that agrees best with the readings of all sensors, and with the slopes of those that are `moving`."""
     p = equations.parameters(values, record)
     u = equations.inputs_of(record.slice(0, min(record.n_samples, _FIRST_SAMPLES)))[1][:, :1]
     begin = _equilibrium(equations, u, p)
@@ -136,6 +142,7 @@ def _rig_state(
     if not seen or begin.size == 0:
         return begin
     names = [equations.sensor_names[i] for i in seen]
+    sloping = np.array([name in moving for name in names])
     shown = np.array([_level_and_slope(record[name], record.dt, resting) for name in names])
     sizes = np.array([_sizes(record[name], record.dt) for name in names])
     scale = _state_scale(equations, begin, u, p, seen, sizes)
@@ -153,7 +160,7 @@ def _rig_state(
         if still:
             return np.concatenate([level, _PULL * moved])
         slope = (equations.reading_slopes(z, u, p)[seen, 0] - shown[:, 1]) / sizes[:, 1]
-        return _finite(np.concatenate([level, slope, _PULL * moved]))
+        return _finite(np.concatenate([level, slope[sloping], _PULL * moved]))
 
     return full(least_squares(left, np.zeros(begin.size), max_nfev=_MOST_EVALUATIONS).x)
 

@@ -69,7 +69,7 @@ def break_frequency(response: FrequencyResponse) -> float:
     if below.size == 0 or below[0] == 0:
         raise InputError(
             f"The phase of {response.source} -> {response.response} does not pass -90 degrees between "
-            f"{response.omega[0]:.4g} and {response.omega[-1]:.4g} rad/s: give a wider band."
+            f"{response.omega[0]:.4g} and {response.omega[-1]:.4g} rad/s: there is no natural frequency to read off."
         )
     after = int(below[0])
     pair = slice(after - 1, after + 1)

@@ -1,0 +1,17 @@
+"""A log is told that work goes on, and is not filled with it."""
+
+from __future__ import annotations
+
+import pytest
+
+from rigsight.workflow.progress import Step
+from rigsight.workflow.progress_display import _lines
+
+
+def test_a_log_gets_a_line_per_stage_and_one_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    now = 0.0
+    say = _lines(between=30.0, clock=lambda: now)
+    say(Step("Diagnosing", "", 0, 3))
+    for now, detail in ((10.0, "noise floor"), (31.0, "suspects"), (45.0, "backlash")):
+        say(Step("Diagnosing", detail, 1, 40))
+    assert capsys.readouterr().err.splitlines() == ["Diagnosing ...", "Diagnosing (1 of 40): suspects"]
