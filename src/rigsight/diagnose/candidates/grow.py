@@ -96,12 +96,11 @@ def grown(
     close = [model for model in usable if model.excess <= _BEAM * usable[0].excess]
     # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
     # many, the one that the catalogue has first is the plainer.
-    order = {effect.name: place for place, effect in enumerate(effects)}
     best = min(close, key=lambda model: (model.n_free, model.excess))
-    tied = [model for model in close if model.n_free == best.n_free and model.excess <= _TIE * best.excess]
-    first = min(tied, key=lambda model: order[model.names[0]])
+    first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
     others = [model for model in close if model is not first and not _alike(first, model)]
-    beam = [first, *[model for model in others if max(model.fit.substeps) <= _FINEST_STEPS][:1]]
+    others = [model for model in others if max(model.fit.substeps) <= _FINEST_STEPS]
+    beam = [first, *([_plainest(others, others[0], effects)] if others else [])]
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
     # An effect that was left out of the singles, as another says the same, may still be half of a pair.
     alone = {effect.name: np.inf for effect in effects} | {model.names[0]: model.excess for model in singles}
@@ -129,6 +128,13 @@ def grown(
         for pair in refine(bench, pairs)
         if pair.excess <= allowed
     ]
+
+
+def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect]) -> Scored:
+    """Return of the models that explain as much as one of them that with the fewest numbers, the first in the catalogue."""
+    order = {effect.name: place for place, effect in enumerate(effects)}
+    tied = [model for model in models if model.excess <= _TIE * like.excess]
+    return min(tied, key=lambda model: (model.n_free, order[model.names[0]]))
 
 
 def pruned(bench: Workbench, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
