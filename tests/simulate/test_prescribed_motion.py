@@ -43,10 +43,10 @@ def test_a_rough_motion_is_not_flattened():
     assert np.std(value - x) < 0.1 * np.std(x)
 
 
-@pytest.mark.parametrize("noise", [1e-5, 1e-3])
-@pytest.mark.parametrize("frequency", [1.0, 3.0])
+@pytest.mark.parametrize("noise", [1e-8, 1e-5, 1e-3])
+@pytest.mark.parametrize("frequency", [1.0, 3.0, 8.0])
 def test_the_ends_of_a_motion_are_known_nearly_as_well_as_its_middle(frequency: float, noise: float) -> None:
-    """A natural spline is straight there: it missed the last velocities by 20 to 240 times its error inside."""
+    """A natural spline is straight there: it missed the last velocities by 4 to 500 times its error inside."""
     rng, dt = np.random.default_rng(3), 5e-3
     t = dt * np.arange(4000)
     ratios = []
@@ -56,4 +56,4 @@ def test_the_ends_of_a_motion_are_known_nearly_as_well_as_its_middle(frequency: 
         error = velocity - 2.0 * np.pi * frequency * np.cos(turns)
         ends = np.concatenate([error[:3], error[-3:]])
         ratios.append(float(np.sqrt(np.mean(ends**2)) / np.std(error[100:-100])))
-    assert np.median(ratios) < 12.0
+    assert np.median(ratios) < 3.0

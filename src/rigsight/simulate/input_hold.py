@@ -15,6 +15,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.simulate.linear_prediction import continued
+
 Hold = Literal["zoh", "foh", "band_limited"]
 
 BAND_LIMITED_INTERVALS = 2
@@ -82,7 +84,7 @@ def hold_input(samples: NDArray[np.float64], dt: float, hold: Hold) -> HeldInput
         Sample time [s].
     hold
         ``"zoh"`` (constant until the next sample), ``"foh"`` (linear) or ``"band_limited"`` (sampled analog signal: windowed
-        sinc interpolation; beyond the ends the signal is continued by its point reflection).
+        sinc interpolation; beyond the ends the signal is predicted).
     """
     samples = np.ascontiguousarray(samples, dtype=np.float64)
     if samples.size > _LONGEST_KEPT:
@@ -171,10 +173,8 @@ def _band_limited_nodes(
     from scipy.signal import upfirdn
 
     values, slopes = _interpolation_taps()
-    pad = min(_HALF_LENGTH + 2, samples.size - 1)
-    before = 2.0 * samples[0] - samples[pad:0:-1]
-    after = 2.0 * samples[-1] - samples[-2 : -pad - 2 : -1]
-    extended = np.concatenate([before, samples, after])
+    pad = _HALF_LENGTH + 2
+    extended = continued(samples, pad)
     start = (_HALF_LENGTH + pad) * BAND_LIMITED_INTERVALS
     nodes = slice(start, start + (samples.size - 1) * BAND_LIMITED_INTERVALS + 1)
     at_nodes, rising = (

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
 from hashlib import sha256
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.interpolate import make_smoothing_spline
 from scipy.optimize import minimize_scalar
+
+from rigsight.simulate.linear_prediction import continued
 
 _cache: OrderedDict[bytes, tuple[NDArray[np.float64], NDArray[np.float64]]] = OrderedDict()
 _CACHED_RECORDS = 64
 _PENALTIES = (-16.0, 25.0)
 """Natural logarithm of the weights tried: from no smoothing at all to a straight line."""
 _TRIALS = 42
-_ENDS, _FEWEST = 6.0, 6
-"""Samples from which the curvature at an end is read: so many in units of those over which the spline averages, the fourth root
-of its penalty. Of sines of 1 to 8 Hz at 200 Hz with noise of 1e-5 to 1e-3, three to eight did nearly as well."""
+_BEYOND = 48
+"""Samples that are predicted beyond either end: a spline that averages over a dozen has forgotten its own end there."""
 _END = 21
 """Samples from which the slope at an end is read."""
 
@@ -62,31 +61,14 @@ def smooth_motion(
 
 
 def _spline(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    index = np.arange(samples.size, dtype=np.float64)
     scale = float(np.std(samples)) or 1.0
-    penalty = _penalty(samples / scale)
-    bend = _end_curvatures(samples / scale, penalty)
-    spline = make_smoothing_spline(index, samples / scale - bend(index), lam=penalty)
-    values = scale * (spline(index) + bend(index))
-    slopes = scale * (spline.derivative()(index) + bend.deriv()(index))
+    # A smoothing spline is straight at its ends, and no motion is: they lie beyond those of the record.
+    longer = continued(samples / scale, _BEYOND)
+    index, recorded = np.arange(longer.size, dtype=np.float64), slice(_BEYOND, -_BEYOND)
+    spline = make_smoothing_spline(index, longer, lam=_penalty(longer))
+    values, slopes = scale * spline(index)[recorded], scale * spline.derivative()(index)[recorded]
     values.setflags(write=False)
     return values, slopes
-
-
-def _end_curvatures(samples: NDArray[np.float64], penalty: float) -> Polynomial:
-    """Return a cubic with the samples' curvatures at both ends.
-
-    A smoothing spline is straight at its ends. Where the motion is not, it would miss the last velocities by up to hundreds of
-    their errors inside.
-    """
-    count = min(max(_FEWEST, math.ceil(_ENDS * penalty**0.25)), samples.size)
-    last = samples.size - 1
-    if count < _FEWEST:
-        return Polynomial([0.0])
-    index = np.arange(count, dtype=np.float64)
-    begin = float(Polynomial.fit(index, samples[:count], 3).deriv(2)(0.0))
-    end = float(Polynomial.fit(index, samples[-count:], 3).deriv(2)(count - 1.0))
-    return Polynomial([0.0, 0.0, begin / 2.0, (end - begin) / (6.0 * last)])
 
 
 def _penalty(samples: NDArray[np.float64]) -> float:

@@ -41,7 +41,9 @@ def _lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time.mo
             return
         last = clock()
         detail = f": {step.detail}" if step.detail else ""
-        line = f"{step.stage} ..." if step.done == 0 else f"{step.stage} ({step.done} of {step.total}){detail}"
+        line = (
+            f"{step.stage} ..." if step.done == 0 else f"{step.stage} ({step.done} of {step.total}){detail}"
+        )
         # A log that is full, or a terminal that went away, ends no work of hours.
         with contextlib.suppress(OSError):
             typer.echo(line, err=True)
