@@ -9,9 +9,9 @@ from rigsight.workflow.progress_display import _lines
 
 
 def test_a_log_gets_a_line_per_stage_and_one_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
-    now = 0.0
-    say = _lines(between=30.0, clock=lambda: now)
+    times = iter((0.0, 0.0, 10.0, 31.0, 31.0, 45.0))
+    say = _lines(between=30.0, clock=lambda: next(times))
     say(Step("Diagnosing", "", 0, 3))
-    for now, detail in ((10.0, "noise floor"), (31.0, "suspects"), (45.0, "backlash")):
+    for detail in ("noise floor", "suspects", "backlash"):
         say(Step("Diagnosing", detail, 1, 40))
     assert capsys.readouterr().err.splitlines() == ["Diagnosing ...", "Diagnosing (1 of 40): suspects"]
