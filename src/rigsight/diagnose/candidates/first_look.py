@@ -103,7 +103,9 @@ def look_at(
         Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
     """
     structure = bench.simplest(effects)
-    free = tuple(name for name in bench.free_parameters(structure) if name not in hold)
+    known = bench.constant_forces_beside(structure.effects)
+    moved = {*bench.free_parameters(structure), *base.free} - {*hold, *known}
+    free = tuple(name for name in structure.names if name in moved)
     starts = list(start_values(bench, structure, effects[-1], base, parents))
     if bench.given and bench.leaves_numbers_open(base):
         from_given = replace(base, values={**base.values, **bench.given})
@@ -111,7 +113,6 @@ def look_at(
     regressed = regression.start(effects[-1]) if regression is not None else None
     if regressed is not None:
         starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
-    known = bench.constant_forces_beside(structure.effects)
     starts = [{**start, **known} for start in starts]
     nearest = _looked(bench, structure, free, starts, substeps)
     if not np.isfinite(nearest[0].cost) and bench.start:

@@ -101,12 +101,17 @@ def grown(
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= _FINEST_STEPS]
     beam = [first, *([_plainest(others, others[0], effects)] if others else [])]
+    # Where neither leads to a pair: an effect's form, fitted by itself, may stand off for what a second one does to it.
+    last_resort = [min(others, key=lambda model: (model.n_free, model.excess))] if others else []
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
     # An effect that was left out of the singles, as another says the same, may still be half of a pair.
     alone = {effect.name: np.inf for effect in effects} | {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []
     for parent in beam:
         if min((pair.excess for pair in pairs), default=np.inf) > _NOTHING_LEFT:
+            pairs += _grown_from(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
+    for parent in last_resort:
+        if parent not in beam and min((pair.excess for pair in pairs), default=np.inf) > allowed:
             pairs += _grown_from(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
@@ -122,7 +127,10 @@ def grown(
             break
         pairs += _more_general(bench, best_pair, usable, effects, pairs, prepare)
     pairs.sort(key=lambda pair: pair.excess)
-    pairs = [*(finished(bench, pair) for pair in pairs[:_MOST_FINISHED]), *pairs[_MOST_FINISHED:]]
+    # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
+    last = pairs[:_MOST_FINISHED][-1].excess if pairs else 0.0
+    n_finished = sum(pair.excess <= _TIE * last for pair in pairs)
+    pairs = [*(finished(bench, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
     return [
         replace(pair, effects=tuple(sorted(pair.effects, key=lambda effect: alone[effect.name])))
         for pair in refine(bench, pairs)
