@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.observer import Observer
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
+from rigsight.simulate.prescribed_motion import smooth_motion
 
 WINDOW = " window "
 """Stands between a record's name and the number of its window."""
@@ -129,11 +130,11 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
 
 
 def typical_period(rig: Rig, records: Sequence[Record]) -> float:
-    """Return the reciprocal of the middle frequency of the velocity [s]."""
+    """Return the reciprocal of the middle frequency of the velocity [s], of which smoothing leaves the noise out."""
     periods = []
     for record, output in zip(records, shown_by(rig, records), strict=True):
-        velocity = np.gradient(record[output], record.dt)
-        velocity -= np.mean(velocity)
+        velocity = smooth_motion(record[output], record.dt)[1]
+        velocity = velocity - np.mean(velocity)
         power = np.abs(np.fft.rfft(velocity)) ** 2
         frequency = np.fft.rfftfreq(velocity.size, record.dt)
         power[0] = 0.0
