@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rigsight.blind.outside import OUTSIDE, STRUCTURAL_DAMPING
+from rigsight.blind.outside import OUTSIDE
 from rigsight.blind.subjects import NOISES, Kind, Noise, Tier
 from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.effects import CATALOGUE, Effect, Place, kind_of, placed
@@ -116,11 +116,8 @@ def _elsewhere(rig: Rig, one: Effect, other: Effect) -> bool:
 
 def _outside_on(rig: Rig) -> list[Effect]:
     """Return the effects from outside at the joints at which they do something: one of a spring needs a spring."""
-    found = []
-    for effect in OUTSIDE:
-        # Where all of the load is that of the spring, friction that goes with the deflection goes with the load.
-        if effect.place is not Place.DYNAMICS or (effect is STRUCTURAL_DAMPING and not rig.is_driven):
-            continue
+    found: list[Effect] = []
+    for effect in (effect for effect in OUTSIDE if effect.place is Place.DYNAMICS):
         if rig.has_one_motion:
             found.append(effect)
             continue

@@ -1,10 +1,11 @@
 """Which effects does the catalogue not hold? A diagnosis that meets one of them should say `unknown`.
 
 Four resemble nothing in the catalogue: a stiffness that pulsates, a drive that weakens as it warms up, one whose gain depends on
-the displacement, a sensor that drifts. Six resemble something: each has the sign, symmetry and loss of a catalogue effect, but
+the displacement, a sensor that drifts. Five resemble something: each has the sign, symmetry and loss of a catalogue effect, but
 another law. None of them becomes a catalogue equation, alone or with other linear parameters, for any value drawn here (a van
 der Pol term, for instance, is position-dependent damping beside less viscous damping, and friction of one direction is Coulomb
-friction beside an offset: they are not in).
+friction beside an offset; a resistance that grows with the deflection is friction that goes with a spring's load: none of these
+is in).
 """
 
 from __future__ import annotations
@@ -105,15 +106,6 @@ CUBIC_DAMPING = Effect(
     signature=Signature(GainTrend.FALLS),
     torque=_strength * v**3,
 )
-STRUCTURAL_DAMPING = Effect(
-    name="structural_damping",
-    place=Place.DYNAMICS,
-    summary="A resistance that grows with the deflection and opposes the motion, whatever its speed.",
-    parameters=(_strength_of("share of the stiffness", "force x^-1", 0.1, 0.25),),
-    energy=Energy.DISSIPATIVE,
-    signature=_STEADY,
-    torque=_strength * sp.Abs(x) * sp.sign(v),
-)
 DRIVE_OVER_SPEED = Effect(
     name="drive_over_speed",
     place=Place.ACTUATOR,
@@ -143,7 +135,6 @@ LIKE_THE_CATALOGUE: tuple[Effect, ...] = (
     LEVELING_STIFFNESS,
     THINNING_BRANCH,
     CUBIC_DAMPING,
-    STRUCTURAL_DAMPING,
     DRIVE_OVER_SPEED,
     FRICTION_ON_ONE_SIDE,
 )
