@@ -146,7 +146,7 @@ def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect])
 
 
 def pruned(bench: Workbench, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
-    """Return the singles, those refitted that do better from where they stand in a pair than from where they were found.
+    """Return the singles, refitted where they do better from where they stand in a pair than from where they were found.
 
     A second effect may do no more than lift a fit of the first over a ridge; without it the first then explains as much.
 
@@ -163,19 +163,20 @@ def pruned(bench: Workbench, singles: Sequence[Scored], pairs: Sequence[Scored])
     for pair in sorted(pairs, key=lambda pair: pair.excess)[:_MOST_PRUNED]:
         for effect in pair.effects:
             known = better.get((effect.name,))
-            if known is None or known.excess <= _TIE * pair.excess:
+            if known is not None and known.excess <= _TIE * pair.excess:
                 continue
-            structure = known.fit.structure
+            structure = bench.simplest((effect,)) if known is None else known.fit.structure
+            free = tuple(bench.free_parameters(structure)) if known is None else known.fit.free
             values = {
-                **known.fit.values,
+                **(known or pair).fit.values,
                 **dict(structure.fixed),
                 **carried_over(pair.fit.values, pair.fit.structure, structure),
             }
-            start = replace(known.fit, values=values)
-            look = Look(known.effects, structure, known.fit.free, (start,), float("inf"))
-            alone = followed(bench, look, promising=True)
-            if alone.excess < known.excess / _TIE:
-                better[known.names] = alone
+            start = replace((known or pair).fit, values={name: values[name] for name in structure.names})
+            alone = followed(bench, Look((effect,), structure, free, (start,), float("inf")), promising=True)
+            # One that was left out of the singles, as another said the same, comes back only where it is all that is needed.
+            if alone.excess <= (_TIE * pair.excess if known is None else known.excess / _TIE):
+                better[alone.names] = alone
     return list(better.values())
 
 
