@@ -8,7 +8,7 @@ import pytest
 from rigsight.diagnose.remainder import Remainder
 from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
-from rigsight.report.wording import percent, remainder_sentence, verdict_sentence
+from rigsight.report.wording import percent, remainder_sentence, verdict_name, verdict_sentence
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,15 @@ def test_an_unknown_cause_says_with_what_the_rest_goes(variant: Callable[[str], 
 def test_a_number_that_differs_by_record_is_told_as_such() -> None:
     left = Remainder(0.02, (), "record: T_c", 0.001)
     assert "still goes with the record: T_c differs from one to another" in left.text
+
+
+def test_no_more_than_the_noise_is_no_second_cause(variant: Callable[[str], Diagnosis]) -> None:
+    """What goes with something below the floor is told of the numbers, and not as something smaller that is missing too."""
+    left = Remainder(0.0, (), "record: d_r", 0.003)
+    assert "no more than the noise floor, but it still goes with the record" in left.text
+    found = replace(variant("effect"), adequate=False, remainder=left)
+    assert verdict_name(found) == "Missing effect"
+    assert verdict_name(replace(found, remainder=replace(left, share=0.02))) == "Main cause"
 
 
 def test_nearly_all_is_not_rounded_to_all() -> None:

@@ -39,6 +39,11 @@ class Remainder:
                 "What is left goes with no motion, drive, reading, time or record that was looked at "
                 f"(p = {self.p_value:.2g}): it counts as noise and disturbance."
             )
+        if self.share == 0.0:
+            return (
+                f"What is left is no more than the noise floor, but it still goes with {_in_words(self.goes_with)} "
+                f"(p = {self.p_value:.2g}): numbers may be off by more than their standard errors."
+            )
         left = (
             f"What is left, {100.0 * self.share:.2g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
             f"(p = {self.p_value:.2g})"

@@ -68,9 +68,15 @@ def place_label(where: str) -> str:
 
 def verdict_name(diagnosis: Diagnosis) -> str:
     """Return the verdict in two words."""
-    if diagnosis.verdict == "effect" and diagnosis.adequate is False:
+    if diagnosis.verdict == "effect" and _leaves_more(diagnosis):
         return "Main cause"
     return _VERDICT_NAMES[diagnosis.verdict]
+
+
+def _leaves_more(diagnosis: Diagnosis) -> bool:
+    """Return whether the named cause leaves more than noise and disturbance."""
+    left = diagnosis.remainder
+    return diagnosis.adequate is False and (left is None or left.share > 0.0)
 
 
 def after_label(diagnosis: Diagnosis) -> str:
@@ -183,7 +189,7 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
     left = times_floor(excess(diagnosis, "after"))
-    if diagnosis.adequate is False:
+    if _leaves_more(diagnosis):
         sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
         f"The gap is {sure} by {effects_label(diagnosis.effects)}{' ' if places else ''}{places}; "
