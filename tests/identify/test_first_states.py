@@ -1,0 +1,71 @@
+"""Where sensors show the whole state, a record begins in the same one whatever the parameters are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigsight.identify.fit.first_states import rig_state
+from rigsight.identify.rig_equations import equations_of
+from rigsight.records import Record
+from rigsight.rigs.reading.rig_file import rig_of_text
+from rigsight.simulate import compose, simulate
+
+MOTOR = """
+name = "motor"
+summary = "A motor whose current follows its voltage late."
+[inputs.u]
+unit = "V"
+[parameters.L]
+unit = "H"
+[parameters.R]
+unit = "V/A"
+[parameters.K]
+unit = "N m/A"
+[parameters.J]
+unit = "kg m^2"
+[parameters.d]
+unit = "N m s/rad"
+[coordinates.phi]
+unit = "rad"
+[energy]
+kinetic = "J*d(phi)^2/2"
+[states.i]
+unit = "A"
+rate = "(voltage - R*i - K*d(phi))/L"
+[joints.bearing]
+motion = "phi"
+damping = "d"
+[drives.voltage]
+signal = "u"
+force = "K*i"
+along = "phi"
+[sensors.angle]
+reads = "phi"
+unit = "rad"
+[sensors.current]
+reads = "i"
+unit = "A"
+"""
+VALUES = {"L": 0.05, "R": 1.0, "K": 0.5, "J": 0.01, "d": 0.02}
+
+
+@pytest.fixture
+def run() -> Record:
+    t = 1e-3 * np.arange(400)
+    drive = Record("run", 1e-3, {"u": np.sin(9.0 * t)}, {})
+    return simulate(compose(rig_of_text(MOTOR, "motor.toml")), VALUES, drive, initial_state=[0.3, 4.0, 0.7])
+
+
+def test_it_is_found_once_and_right(run: Record) -> None:
+    equations = equations_of(rig_of_text(MOTOR, "motor.toml"))
+    found = rig_state(equations, run, VALUES)
+    np.testing.assert_allclose(found, [0.3, 4.0, 0.7], rtol=0.05)
+    np.testing.assert_array_equal(rig_state(equations, run, {**VALUES, "R": 5.0}), found)
+
+
+def test_without_a_sensor_of_the_current_it_goes_by_the_parameters(run: Record) -> None:
+    equations = equations_of(rig_of_text(MOTOR, "motor.toml"))
+    record = Record("run", run.dt, {"u": run["u"], "angle": run["angle"]}, {})
+    assert not equations.shows_all_states(set(record.signals))
+    assert rig_state(equations, record, VALUES)[1] == pytest.approx(4.0, rel=0.05)
