@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 _STEP = 1e-4
 """Relative change of a parameter for a difference: rounding and curvature both leave 1e-8 of it."""
 _ROUNDING = 1e-9
+_IMAGES = 50
+"""Multiples of the sampling frequency that are looked at: of a response that falls as 1/f the rest is 1 % of what they add."""
 _POLES = {"local_rational": 2, "local_polynomial": 0}
 
 
@@ -67,6 +69,8 @@ class LinearView:
         Frequency responses of these records together; None where no input moves.
     model
         By (source, response) the linearized response at the measured frequencies with its standard error, shape (n,) each.
+    images
+        By (source, response) what a held input adds to the measured response, shape (n,); not there for a prescribed motion.
     """
 
     constants: dict[str, float]
@@ -75,6 +79,7 @@ class LinearView:
     modes: tuple[Mode, ...]
     measured: ResponsesOfInputs | None
     model: Mapping[tuple[str, str], tuple[NDArray[np.complex128], Floats]]
+    images: Mapping[tuple[str, str], NDArray[np.complex128]]
 
     def misfit(self, source: str, response: str) -> float:
         """Return how far the model is from the measured response, in units of what noise explains; 1 where that is all.
@@ -84,7 +89,8 @@ class LinearView:
         assert self.measured is not None
         curve, (values, std) = self.measured.found[source, response], self.model[source, response]
         assert curve.variance is not None
-        relative = np.abs(curve.values - values) ** 2 / (curve.variance + std**2)
+        expected = values + self.images.get((source, response), 0.0)
+        relative = np.abs(curve.values - expected) ** 2 / (curve.variance + std**2)
         # A squared complex error has an exponential law.
         return float(np.sqrt(np.median(relative) / np.log(2.0)))
 
@@ -113,8 +119,7 @@ def measured_responses(
         [signal.name for signal in rig.outputs],
         poles=_POLES[method],
         resolution=resolution,
-        # A prescribed motion was measured: it is smooth between its samples.
-        smooth=[str(coordinate.prescribed_by) for coordinate in rig.mechanism.prescribed],
+        smooth=sorted(_smooth(rig)),
     )
 
 
@@ -193,7 +198,7 @@ def linear_view(
         return linearize(structure, {**values, **constants, **moved}, inputs, near=found.at_state)
 
     neighbors = list(_neighbors(known, at))
-    model = {}
+    model, images = {}, {}
     for (source, response), curve in (measured.found if measured is not None else {}).items():
         column, row = found.inputs.index(source), found.outputs.index(response)
         changes = [
@@ -205,6 +210,8 @@ def linear_view(
             np.sum(np.abs([np.zeros_like(curve.values), *(c[:, row, column] for c in changes)]) ** 2, axis=0)
         )
         model[source, response] = (found.frequency_response(curve.omega)[:, row, column], np.asarray(spread))
+        if source not in _smooth(structure.rig):
+            images[source, response] = _images(found, curve.omega, records)[:, row, column]
     return LinearView(
         constants=constants,
         records=tuple(record.name for record in records),
@@ -212,7 +219,36 @@ def linear_view(
         modes=tuple(_mode(pole, neighbors) for pole in found.poles if pole.imag >= 0.0),
         measured=measured,
         model=model,
+        images=images,
     )
+
+
+def _smooth(rig: Rig) -> set[str]:
+    """Return the inputs that go on between their samples without content above Nyquist: a prescribed motion was measured."""
+    return {str(coordinate.prescribed_by) for coordinate in rig.mechanism.prescribed}
+
+
+def _images(linear: Linearization, omega: Floats, records: Sequence[Record]) -> NDArray[np.complex128]:
+    """Return what a held input adds to measured responses from around the multiples of the sampling frequency.
+
+    The steps or lines of a hold have a spectrum there, and samples of a response that falls off slowly, such as a pressure's or a
+    speed's, show it at low frequencies (Astrom and Wittenmark, *Computer-Controlled Systems*, 1997, section 3.5). None where
+    the records differ in sample time or hold, or the input has no content there.
+
+    Returns
+    -------
+    Shape (n_frequencies, n_outputs, n_inputs).
+    """
+    none = np.zeros((omega.size, len(linear.outputs), len(linear.inputs)), dtype=np.complex128)
+    holds, times = {record.hold for record in records}, [record.dt for record in records]
+    power = {"zoh": 1, "foh": 2}.get(holds.pop() if len(holds) == 1 else "band_limited")
+    if power is None or np.ptp(times) > _ROUNDING * times[0]:
+        return none
+    found = none
+    for multiple in (m for size in range(1, _IMAGES + 1) for m in (-size, size)):
+        around = omega + multiple * 2.0 * np.pi / times[0]
+        found = found + linear.frequency_response(around) * ((omega / around) ** power)[:, None, None]
+    return found
 
 
 def _mean(samples: Sequence[Floats]) -> float:
