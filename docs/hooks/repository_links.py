@@ -21,6 +21,7 @@ MOVED = {
     "experiments/amplitudes/README.md": "experiments/amplitudes.md",
     "experiments/blind_cheat/README.md": "experiments/blind_cheat.md",
     "experiments/blind_laboratory/README.md": "experiments/blind_laboratory.md",
+    "experiments/blind_rigs/README.md": "experiments/blind_rigs.md",
     "experiments/blind_small/README.md": "experiments/blind_small.md",
     "experiments/fuzzing/README.md": "experiments/fuzzing.md",
     "experiments/linear_recovery/README.md": "experiments/linear_recovery.md",
