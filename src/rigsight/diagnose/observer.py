@@ -58,7 +58,7 @@ def followed_sensors(task: Task) -> tuple[str, ...]:
         Records and the simulation in question.
     """
     shown = {name for record in task.records for name in record.signals}
-    return tuple(name for name in _sensors_of_motion(task.rig) if name in shown)
+    return tuple(name for name in sensors_of_motion(task.rig) if name in shown)
 
 
 def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Structure]:
@@ -68,7 +68,8 @@ def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Struc
     return [structure_of_fit(structure, records) for structure in structures]
 
 
-def _sensors_of_motion(rig: Rig) -> tuple[str, ...]:
+def sensors_of_motion(rig: Rig) -> tuple[str, ...]:
+    """Return the sensors of a rig that show nothing but its motion: coordinates and their rates."""
     structure = compose(rig)
     motion = structure.tree.motion
     moving = {*motion.coordinates, *motion.velocities}

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.observer import Observer
+from rigsight.diagnose.observer import Observer, sensors_of_motion
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -106,10 +106,10 @@ def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.flo
 
 
 def leading_output(rig: Rig, records: Sequence[Record]) -> str:
-    """Return the first of the outputs that most records hold: its motion tells cycles and lively stretches."""
-    return max(
-        (signal.name for signal in rig.outputs), key=lambda name: sum(name in record for record in records)
-    )
+    """Return the output that tells cycles and lively stretches: the first that most records hold, of motion if one is."""
+    outputs = [signal.name for signal in rig.outputs]
+    of_motion = [name for name in sensors_of_motion(rig) if any(name in record for record in records)]
+    return max(of_motion or outputs, key=lambda name: sum(name in record for record in records))
 
 
 def shown_by(rig: Rig, records: Sequence[Record]) -> list[str]:
