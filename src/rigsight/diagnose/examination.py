@@ -132,7 +132,7 @@ def examine(
     windowing = Windowing()
     if drifts:
         windowing, amplified = windowing_of(task, noise, n_jobs)
-        floors = tuple(_amplified(floor, amplified.get(floor.output, 1.0)) for floor in floors)
+        floors = tuple(_raised(floor, amplified.get(floor.output, 1.0)) for floor in floors)
         noise = {floor.output: floor.std for floor in floors}
     ready = preparing(prepare, windowing.cut(task.records))
     models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
@@ -209,7 +209,7 @@ def examine(
     )
 
 
-def _amplified(floor: NoiseFloor, factor: float) -> NoiseFloor:
+def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
     low, high = floor.interval
     return replace(floor, std=factor * floor.std, interval=(factor * low, factor * high))
 

@@ -100,23 +100,24 @@ def grown(
     first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= _FINEST_STEPS]
-    beam = [first, *([_plainest(others, others[0], effects)] if others else [])]
-    # Where neither leads to a pair: an effect's form, fitted by itself, may stand off for what a second one does to it.
-    last_resort = [min(others, key=lambda model: (model.n_free, model.excess))] if others else []
     allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
     # An effect that was left out of the singles, as another says the same, may still be half of a pair.
     alone = {effect.name: np.inf for effect in effects} | {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []
-    for parent in beam:
-        if min((pair.excess for pair in pairs), default=np.inf) > _NOTHING_LEFT:
-            pairs += _grown_from(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
-    for parent in last_resort:
-        if parent not in beam and min((pair.excess for pair in pairs), default=np.inf) > allowed:
+    parents = [(first, _NOTHING_LEFT)]
+    if others:
+        parents.append((_plainest(others, others[0], effects), _NOTHING_LEFT))
+        # Fitted by itself, an effect may stand far off for what a second one does to it: one more where no pair competes.
+        parents.append((min(others, key=lambda model: (model.n_free, model.excess)), allowed))
+    tried: list[Scored] = []
+    for parent, enough in parents:
+        if parent not in tried and min((pair.excess for pair in pairs), default=np.inf) > enough:
+            tried.append(parent)
             pairs += _grown_from(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
         # What came second may be right and the first only its relative: another as good alone may do better in its place.
-        for second in (model for model in usable if model not in beam):
+        for second in (model for model in usable if model not in tried):
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
                 instead = [e for e in effects if alone[e.name] <= _IN_ITS_PLACE * alone[name]]
