@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.first_states import rig_state
 from rigsight.identify.rig_equations import equations_of
 from rigsight.records import Record
@@ -69,3 +70,50 @@ def test_without_a_sensor_of_the_current_it_goes_by_the_parameters(run: Record) 
     record = Record("run", run.dt, {"u": run["u"], "angle": run["angle"]}, {})
     assert not equations.shows_all_states(set(record.signals))
     assert rig_state(equations, record, VALUES)[1] == pytest.approx(4.0, rel=0.05)
+
+
+TWO_PATHS = """
+name = "two_paths"
+summary = "Two motions are imposed, the forces are measured."
+[inputs.a]
+unit = "m"
+[inputs.b]
+unit = "m"
+[parameters.k]
+unit = "N/m"
+[parameters.d]
+unit = "N s/m"
+[parameters.c]
+unit = "N/m"
+[coordinates.x]
+unit = "m"
+prescribed_by = "a"
+[coordinates.y]
+unit = "m"
+prescribed_by = "b"
+[joints.between]
+motion = "x - y"
+stiffness = "k"
+damping = "d"
+[joints.ground]
+motion = "y"
+stiffness = "c"
+[sensors.upper]
+reads = "force(between)"
+unit = "N"
+[sensors.lower]
+reads = "force(ground)"
+unit = "N"
+"""
+
+
+def test_a_rig_without_states_is_fitted() -> None:
+    rig, t = rig_of_text(TWO_PATHS, "two_paths.toml"), 0.01 * np.arange(600)
+    truth = {"k": 100.0, "d": 2.0, "c": 50.0}
+    moved = Record("run", 0.01, {"a": np.sin(5.0 * t), "b": 0.3 * np.sin(3.0 * t)}, {}, role="estimation")
+    run = simulate(compose(rig), truth, moved)
+    fit = GreyBoxFit(
+        compose(rig), [run], characteristic_scales(rig, [run], truth), {"upper": 1e-3, "lower": 1e-3}
+    )
+    found = fit.fit({"k": 80.0, "d": 1.0, "c": 60.0}, list(truth))
+    assert found.values == pytest.approx(truth, rel=1e-6)

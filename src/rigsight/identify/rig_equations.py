@@ -83,15 +83,19 @@ class RigEquations:
 
     def shows_all_states(self, measured: set[str]) -> bool:
         """Return True if these sensors alone give all coordinates and own states, whatever the parameters are."""
-        mechanism = self.rig.mechanism
-        shown = [c.symbol for c in mechanism.free] + [state.symbol for state in mechanism.states]
+        coordinates = [c.symbol for c in self.rig.mechanism.free]
+        own = [state.symbol for state in self.rig.mechanism.states]
+        # Rates follow from the slopes of readings, and those of own states hang on the parameters.
+        return self._show(measured, coordinates) and self._show(measured, [*coordinates, *own])
+
+    def _show(self, measured: set[str], wanted: Sequence[sp.Symbol]) -> bool:
         read = [
             sensor.reads
-            for sensor in mechanism.sensors
-            if sensor.name in measured and sensor.reads.free_symbols <= set(shown)
+            for sensor in self.rig.mechanism.sensors
+            if sensor.name in measured and sensor.reads.free_symbols <= set(wanted)
         ]
-        slopes = sp.Matrix(read).jacobian(shown) if read else sp.Matrix(0, 0, [])
-        return bool(slopes.is_symbolic() is False and slopes.rank() == len(shown))
+        slopes = sp.Matrix(read).jacobian(wanted) if read and wanted else sp.Matrix(0, 0, [])
+        return bool(slopes.is_symbolic() is False and slopes.rank() == len(wanted))
 
     @cached_property
     def of_own_states(self) -> frozenset[str]:

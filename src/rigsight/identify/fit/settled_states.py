@@ -29,7 +29,7 @@ _SHORTER = (0.3, 0.1, 0.03)
 _WORTH_A_STEP = 0.1
 """Share of the squared error that a step has to take for another one: the fit goes on from here."""
 _LONGER = 4
-"""Length of a stretch in units of the one before."""
+"""Length of a stretch in units of the one before. With four instead of two all stretches together take two thirds of the time."""
 _PULL = 1e-3
 """Weight of the guess against an error of size one: it decides what the stretch does not tell."""
 _LARGEST = 1e9
@@ -171,6 +171,8 @@ def _dies_away(slopes: Floats, n_samples: int) -> bool:
         Samples of the stretch.
     """
     n_states = slopes.shape[1]
+    if n_states == 0:
+        return True
     directions = np.linalg.qr(slopes)[0][:-n_states].reshape(-1, n_samples, n_states)
     late = directions[:, n_samples // 2 :].reshape(-1, n_states)
     return bool(np.linalg.norm(late, ord=2) ** 2 <= _STEADY)
