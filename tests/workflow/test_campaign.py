@@ -362,7 +362,7 @@ def test_a_rig_whose_own_input_is_called_reference_means_that(
 
 def test_time_is_no_signal(campaign: Callable[..., Path]) -> None:
     folder = campaign(HEAD + RECORDS + '[records.columns]\nu = "t"\n')
-    with pytest.raises(InputError, match=r"step\.csv: u and t are both column 't': a signal is no time"):
+    with pytest.raises(InputError, match=r"step\.csv: u and t are both read from column 't'"):
         read_campaign(folder)
 
 

@@ -275,7 +275,7 @@ def test_a_rig_file_elsewhere_is_copied_into_the_campaign(tmp_path: Path) -> Non
     file = own_train(tmp_path)
     copy = tmp_path / "records" / file.name
     copy.write_text("another")
-    with pytest.raises(InputError, match=r"is another file than"):
+    with pytest.raises(InputError, match=r"differs from .*, which would be copied there"):
         run_init(tmp_path / "records", model="train", rig_files=[file])
     assert not (tmp_path / "records" / "campaign.toml").exists()
     copy.unlink()

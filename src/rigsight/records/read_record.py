@@ -171,7 +171,8 @@ def read_stretches(
         raise InputError(
             f"{path.name} has none of the outputs {listed}. Its columns: {listed_columns(table)}. Map one at least under columns."
         )
-    _refuse_time_as_signal(path.name, table)
+    if dt is None:
+        _refuse_time_as_signal(path.name, table)
     units = {TIME: "s"} | {signal.name: signal.unit for signal in (*inputs, *outputs)}
     # One that nothing is computed in has the unit that it was said to have.
     units |= {name: wanted[name].unit or "" for name in beside}
@@ -275,8 +276,8 @@ def _refuse_time_as_signal(file: str, table: Columns) -> None:
     ]
     if same:
         raise InputError(
-            f"{file}: {same[0]} and {TIME} are both column '{table.labels[TIME]}': a signal is no time. Map each to a column "
-            "of its own under columns."
+            f"{file}: {same[0]} and {TIME} are both read from column '{table.labels[TIME]}'. Give each a column of its own under "
+            "columns."
         )
 
 

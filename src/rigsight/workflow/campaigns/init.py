@@ -214,7 +214,7 @@ def _copied(folder: Path, file: Path) -> dict[str, str]:
     text, copy = file.read_text(encoding="utf-8"), folder / file.name
     if copy.exists() and copy.read_text(encoding="utf-8", errors="replace") != text:
         raise InputError(
-            f"{copy} is another file than {file}, of which a campaign needs a copy; name that one, or remove it."
+            f"{copy} differs from {file}, which would be copied there. Name the file in the folder with --rigs, or remove it."
         )
     return {file.name: text}
 
