@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from rigsight.frequency.signal_pair import hold_response
-from rigsight.identify.linear_view import _images
+from rigsight.identify.linear_view import images_of_held_input
 from rigsight.records import Hold, Record
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose
@@ -49,8 +49,9 @@ def test_the_response_of_a_speed_is_that_of_the_sampled_rig(hold: Hold, method: 
     z = np.exp(1j * omega * DT)
     exact = (c[0, 0] * b[0, 0] / (z - a[0, 0]) + d[0, 0]) / hold_response(omega, DT, hold)
     plain = linear.frequency_response(omega)[:, 0, 0]
-    images = _images(linear, omega, [record])[:, 0, 0]
+    images = images_of_held_input(linear, omega, [record])[:, 0, 0]
     np.testing.assert_allclose(plain + images, exact, atol=0.03 * float(np.max(np.abs(exact - plain))))
     assert np.all(
-        _images(linear, omega, [record, Record("s", 2.0 * DT, record.signals, {}, hold=hold)]) == 0.0
+        images_of_held_input(linear, omega, [record, Record("s", 2.0 * DT, record.signals, {}, hold=hold)])
+        == 0.0
     )

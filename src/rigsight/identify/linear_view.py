@@ -211,7 +211,7 @@ def linear_view(
         )
         model[source, response] = (found.frequency_response(curve.omega)[:, row, column], np.asarray(spread))
         if source not in _smooth(structure.rig):
-            images[source, response] = _images(found, curve.omega, records)[:, row, column]
+            images[source, response] = images_of_held_input(found, curve.omega, records)[:, row, column]
     return LinearView(
         constants=constants,
         records=tuple(record.name for record in records),
@@ -228,12 +228,14 @@ def _smooth(rig: Rig) -> set[str]:
     return {str(coordinate.prescribed_by) for coordinate in rig.mechanism.prescribed}
 
 
-def _images(linear: Linearization, omega: Floats, records: Sequence[Record]) -> NDArray[np.complex128]:
+def images_of_held_input(
+    linear: Linearization, omega: Floats, records: Sequence[Record]
+) -> NDArray[np.complex128]:
     """Return what a held input adds to measured responses from around the multiples of the sampling frequency.
 
     The steps or lines of a hold have a spectrum there, and samples of a response that falls off slowly, such as a pressure's or a
-    speed's, show it at low frequencies (Astrom and Wittenmark, *Computer-Controlled Systems*, 1997, section 3.5). None where
-    the records differ in sample time or hold, or the input has no content there.
+    speed's, show it at low frequencies (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, Prentice Hall 1997).
+    Zero where the records differ in sample time or hold, or the input has no content there.
 
     Returns
     -------

@@ -31,7 +31,7 @@ def continued(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 
     References
     ----------
-    S. M. Kay, *Modern Spectral Estimation* (Prentice Hall 1988), section 7.5, for the modified covariance method.
+    S. M. Kay, *Modern Spectral Estimation* (Prentice Hall 1988), chapter 7, for the modified covariance method.
     """
     return np.concatenate([_following(samples[::-1], count)[::-1], samples, _following(samples, count)])
 

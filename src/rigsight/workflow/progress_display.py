@@ -25,13 +25,13 @@ def listening(quiet: bool) -> Iterator[Listener]:
     if quiet or sys.stderr is None:
         yield silent
     elif not sys.stderr.isatty():
-        yield _lines()
+        yield log_lines()
     else:
         with _bar() as listener:
             yield listener
 
 
-def _lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time.monotonic) -> Listener:
+def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time.monotonic) -> Listener:
     """Return what says a line at the start of a stage, and later at most one in so many seconds."""
     last = clock()
 
