@@ -66,7 +66,7 @@ def test_it_moves_as_in_the_engine(case):
         or case.model.hold == "zoh"
     ):
         pytest.skip("the compiler takes inputs as formulas only")
-    if structure.delay is not None or structure.measured_late is not None:
+    if structure.delay is not None or structure.first_shown_late is not None:
         pytest.skip("this compiler approximates delays")
     source = structure.rig.inputs[0].name
     drive = "sin(2*time + 1.5*time*time)"

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.effects import CATALOGUE, Effect, effect_named
+from rigsight.effects import CATALOGUE, Effect, effect_named, placed
 from rigsight.excitation import log_sweep
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.fit_problem import Problem
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.start.scales import characteristic_scales
 from rigsight.records import Record
-from rigsight.rigs import AXIS, RUNNING_GEAR, Rig
+from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR, Rig
 from rigsight.simulate import Substeps, carries_tangents, compose, simulate, simulate_outputs
 from rigsight.simulate.kinks import freeze
 from rigsight.units import characteristic_value
@@ -85,7 +85,7 @@ def test_derivatives_are_those_of_the_accurate_simulation(rig: Rig, effect: Effe
     size = np.linalg.norm(expected, axis=0)
     error = np.linalg.norm(found - expected, axis=0)
     structure = problem.data.structure
-    limit = KINKED if freeze(structure).modes else SMOOTH if structure.measured_late is None else LATE
+    limit = KINKED if freeze(structure).modes else SMOOTH if structure.first_shown_late is None else LATE
     assert np.all(error <= limit * size), dict(
         zip((*problem.coordinates.free, *structure.state_names), error / size, strict=True)
     )
@@ -116,3 +116,22 @@ def test_where_functions_cost_or_friction_is_dry_derivatives_are_carried_along()
     }  # fmt: skip
     for others in (["coulomb_friction", "iwan_hysteresis"], ["coulomb_friction", "sensor_delay"]):
         assert not carries_tangents(compose(AXIS, map(effect_named, others)))
+
+
+def test_a_late_sensor_is_fitted_late_whichever_it_is() -> None:
+    rig = RIGS["cart_pendulum"]
+    t = DT * np.arange(N_SAMPLES)
+    record = Record("sweep", DT, {"u": log_sweep(t, 0.3, 0.3, 3.0)}, {"u": "A"}, hold="band_limited")
+    values = {
+        **{"g": 9.81, "m_c": 0.5, "m_p": 0.5, "s": 0.6, "I_p": 0.5, "k_u": 2.0, "d_c": 0.4, "d_p": 0.1},
+        "T_s": 0.02,
+    }
+    sensors = [sensor.name for sensor in rig.outputs]
+    scales = characteristic_scales(rig, [simulate(compose(rig), values, record)], values)
+    for sensor in sensors:
+        structure = compose(rig, [placed(effect_named("sensor_delay"), sensor)])
+        assert not carries_tangents(structure)
+        fit = GreyBoxFit(structure, [simulate(structure, values, record)], scales, dict.fromkeys(sensors, 1e-3))
+        result = fit.fit({**values, "T_s": 0.01}, ["T_s"])
+        assert result.success
+        assert result.values["T_s"] == pytest.approx(0.02, rel=1e-4)

@@ -110,8 +110,8 @@ def switched_equations(structure: Structure, values: Mapping[str, float]) -> Swi
         velocity_sign=freezer.arguments.index(velocity) if velocity in freezer.arguments else None,
         delay=0.0 if structure.delay is None else float(structure.delay.xreplace(numbers)),
         measured_late=0.0
-        if structure.measured_late is None
-        else float(structure.measured_late.xreplace(numbers)),
+        if structure.first_shown_late is None
+        else float(structure.first_shown_late.xreplace(numbers)),
     )
 
 

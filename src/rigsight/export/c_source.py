@@ -176,7 +176,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
     """
     structure, upper = exported.structure, name.upper()
     equations = KernelEquations(structure)
-    delayed, late = structure.delay is not None, structure.measured_late is not None
+    delayed, late = structure.delay is not None, structure.first_shown_late is not None
     read_signs = "    read_signs(&own, &c, 0.0);\n" if exported.hold == "zoh" else ""
     names = _parameter_names(exported)
     inputs = ["t", *(quantity.name for quantity in exported.inputs)]
@@ -241,7 +241,7 @@ def c_source(exported: Exported, source: str, name: str) -> str:
             for i, (at, source) in enumerate(zip(_places(exported), exported.sources, strict=True))
             if source.rate is not None
         ),
-        "REMEMBER": _REMEMBER.format(upper=upper, late=C.expression(structure.measured_late, names))
+        "REMEMBER": _REMEMBER.format(upper=upper, late=C.expression(structure.first_shown_late, names))
         if late
         else "",
         "REMEMBER_CALL": "    remember(m);\n" if late else "",

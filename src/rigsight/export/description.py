@@ -53,8 +53,8 @@ def equation_lines(exported: Exported) -> list[str]:
         lines.append(line)
     for i, (output, expression) in enumerate(zip(exported.outputs, structure.outputs, strict=True)):
         line = f"output {output.name} [{output.unit}] = {text(expression, names)}"
-        if i == 0 and structure.measured_late is not None:
-            line += f", read {text(structure.measured_late, names)} late"
+        if i == 0 and structure.first_shown_late is not None:
+            line += f", read {text(structure.first_shown_late, names)} late"
         lines.append(line)
     return [*lines, *_held_lines(exported)]
 

@@ -33,7 +33,7 @@ def interpolates(exported: Exported) -> bool:
 
 def needs_constant_step(exported: Exported) -> bool:
     """Return True if the model remembers samples, which must lie equally far apart."""
-    return exported.structure.delay is not None or exported.structure.measured_late is not None
+    return exported.structure.delay is not None or exported.structure.first_shown_late is not None
 
 
 def model_description(

@@ -223,7 +223,7 @@ def matlab_function(exported: Exported, source: str, name: str) -> str:
     inputs = [quantity.name for quantity in exported.inputs]
     friction = _friction(exported)
     head = header_lines(exported, source, with_parameters=False)
-    late = structure.measured_late
+    late = structure.first_shown_late
     fragments = {
         "HEADER": "\n".join(f"% {line}".rstrip() for line in head),
         "TITLE": f"Simulation of {exported.title}",

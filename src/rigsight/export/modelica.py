@@ -61,8 +61,8 @@ def modelica(exported: Exported, source: str, name: str) -> str:
     for i, (own, quantity) in shown.items():
         declared.append(f"output Real {own}{_unit(quantity)} {_said(quantity)};")
         value = MODELICA.expression(structure.outputs[i], names)
-        if i == 0 and structure.measured_late is not None:
-            value = f"delay({value}, {MODELICA.expression(structure.measured_late, names)})"
+        if i == 0 and structure.first_shown_late is not None:
+            value = f"delay({value}, {MODELICA.expression(structure.first_shown_late, names)})"
         equations.append(f"{own} = {value};")
     head = header_lines(exported, source, with_parameters=False)
     lines = [
@@ -82,7 +82,7 @@ def _outputs(exported: Exported, used: set[str]) -> tuple[set[str], dict[int, tu
     own: set[str] = set()
     shown: dict[int, tuple[str, Quantity]] = {}
     for i, (output, expression) in enumerate(zip(exported.outputs, structure.outputs, strict=True)):
-        late = i == 0 and structure.measured_late is not None
+        late = i == 0 and structure.first_shown_late is not None
         state = exported.names().get(expression)
         if state == output.name and not late:
             own.add(output.name)

@@ -154,7 +154,7 @@ def python_function(exported: Exported, source: str) -> str:
         "SLIP_RATE": _returned_one(unpack, slip_rate(exported), {**names, **_slopes(exported)}),
         "LIMITS": sequence(limits),
         "DELAY": _number(exported, structure.delay, "0.0"),
-        "SENSOR_DELAY": _number(exported, structure.measured_late, "None"),
+        "SENSOR_DELAY": _number(exported, structure.first_shown_late, "None"),
         "READ_SIGNS": "        motion.read_signs(piece, start + split, 0.0)"
         if exported.hold == "zoh"
         else "",

@@ -202,7 +202,7 @@ class Structure:
         return arriving[-1] if arriving else None
 
     @property
-    def measured_late(self) -> sp.Expr | None:
+    def first_shown_late(self) -> sp.Expr | None:
         """Time by which the first output is measured late, or None."""
         return self.shown_late[0]
 

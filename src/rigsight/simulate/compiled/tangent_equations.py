@@ -35,7 +35,7 @@ def carries_tangents(equations: KernelEquations) -> bool:
     how one lets go changes when the next does.
     """
     structure = equations.structure
-    if equations.limits or structure.measured_late is not None or equations.has_several_frictions:
+    if equations.limits or structure.is_shifted or equations.has_several_frictions:
         return False
     expressions = (*equations.lane_rates, *equations.outputs, *equations.lane_steps.values())
     return bool(equations.frozen.frictions) or any(
