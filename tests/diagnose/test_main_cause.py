@@ -13,11 +13,11 @@ N = 4000
 
 @pytest.fixture
 def cause(scored):
-    def of(left: np.ndarray, tied: tuple[str, ...] = ()):
+    def of(left: np.ndarray, tied: tuple[str, ...] = (), others_left: np.ndarray | None = None):
         rng = np.random.default_rng(0)
         linear = scored((), residuals=10.0 * rng.standard_normal(N))
         best = scored(("coulomb_friction",), residuals=left)
-        rivals = [scored((name,), residuals=left) for name in tied]
+        rivals = [scored((name,), residuals=left if others_left is None else others_left) for name in tied]
         return main_cause(AXIS, linear, best, rivals, np.ones(1), np.random.default_rng(1))
 
     return of
@@ -42,9 +42,25 @@ def test_a_part_that_one_stretch_decides_is_not_sure(cause) -> None:
     assert not found.clear
 
 
-def test_only_what_acts_elsewhere_contradicts(cause) -> None:
-    left = 3.0 * np.random.default_rng(2).standard_normal(N)
-    assert cause(left, ("quadratic_damping",)).clear
-    found = cause(left, ("actuator_lag",))
-    assert not found.clear
+@pytest.fixture
+def halves() -> tuple[np.ndarray, np.ndarray]:
+    """Return what is left by two models that each explain most of the gap, but the one in the other half of the time."""
+    gap, noise = 10.0 * np.random.default_rng(0).standard_normal(N), np.random.default_rng(2).standard_normal(N)
+    first = np.arange(N) % 100 < 50
+    return np.where(first, noise, 0.62 * gap), np.where(first, 0.62 * gap, noise)
+
+
+def test_only_what_acts_elsewhere_and_takes_another_part_contradicts(cause, halves) -> None:
+    left, others_left = halves
+    assert cause(left, ("quadratic_damping",), others_left).clear
+    found = cause(left, ("actuator_lag",), others_left)
     assert [model.names for model in found.contradicted_by] == [("actuator_lag",)]
+    assert not found.equalled_by
+    assert not found.clear
+
+
+def test_what_takes_the_same_part_from_elsewhere_leaves_the_place_open(cause) -> None:
+    left = 3.0 * np.random.default_rng(2).standard_normal(N)
+    found = cause(left, ("actuator_lag",))
+    assert [model.names for model in found.equalled_by] == [("actuator_lag",)]
+    assert found.clear

@@ -1,4 +1,8 @@
-"""Does one model surely take the larger part of the gap, and does no other that is as good say that the cause is elsewhere?"""
+"""Does one model surely take the larger part of the gap, and does no other that is as good take another part of it?
+
+Models that act elsewhere contradict each other where they explain different parts of the gap. Where they explain the same part,
+such as a late drive and a late sensor, the cause is known but for its place.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,10 @@ from rigsight.diagnose.workbench import Scored
 from rigsight.rigs import Rig
 
 LARGER_PART = 0.5
-"""Share of the squared gap above the noise floor: what takes more of it than all else together is the main cause."""
+"""Share of the squared gap above the noise floor: what takes more of it than all else together is the main cause.
+
+It also says whether two models take the same part: the one explains the larger part of what the other does.
+"""
 _SURELY = 0.05
 """Quantile, over resampled stretches of the records, at which it must still be the larger part."""
 
@@ -29,16 +36,19 @@ class MainCause:
     at_least
         What it is in all but one of twenty resamplings of the records' stretches.
     contradicted_by
-        Models that are as good and act at other places.
+        Models that are as good, act at other places and take another part of the gap.
+    equalled_by
+        Models that are as good and act at other places, but take the same part.
     """
 
     share: float
     at_least: float
     contradicted_by: tuple[Scored, ...] = ()
+    equalled_by: tuple[Scored, ...] = ()
 
     @property
     def clear(self) -> bool:
-        """True where the model surely takes the larger part and nothing that is as good contradicts its place."""
+        """True where the model surely takes the larger part and nothing that is as good contradicts it."""
         return self.at_least > LARGER_PART and not self.contradicted_by
 
 
@@ -73,8 +83,19 @@ def main_cause(
     share = _share(*np.mean(squares, axis=0))
     lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, left, strict=True)], _SURELY))
     places = {rig.acts_at(effect) for effect in best.effects}
-    elsewhere = tuple(m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects))
-    return MainCause(share, lowest, elsewhere)
+    elsewhere = [m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects)]
+    same = [m for m in elsewhere if _common_part(linear, best, m, noise) > LARGER_PART]
+    other = [m for m in elsewhere if m not in same]
+    return MainCause(share, lowest, tuple(other), tuple(same))
+
+
+def _common_part(linear: Scored, one: Scored, other: Scored, noise: NDArray[np.float64]) -> float:
+    """Return the share of what one model explains of the gap that another explains as well, of squares."""
+    explained = differing = 0.0
+    for gap, left, others_left in zip(linear.residuals, one.residuals, other.residuals, strict=True):
+        explained += float(np.nansum(((gap - left) / noise) ** 2))
+        differing += float(np.nansum(((others_left - left) / noise) ** 2))
+    return 1.0 - differing / explained if explained > 0.0 else 0.0
 
 
 def _share(gap: float, left: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rigsight.diagnose.main_cause import MainCause
@@ -103,18 +103,23 @@ def judge(
         )
     taken = cause()
     if taken.clear:
+        place = (
+            f", but {_listed(taken.equalled_by)} would take the same part from elsewhere"
+            if taken.equalled_by
+            else " at that place"
+        )
         return Judgement(
             "effect",
             best,
-            f"{nearest}: the main cause, or its nearest relative at that place. It leaves {best.excess:.3g} times {floor}, which "
+            f"{nearest}: the main cause, or its nearest relative{place}. It leaves {best.excess:.3g} times {floor}, which "
             "still goes with something.",
         )
     if taken.contradicted_by:
-        others = "; ".join(", ".join(model.names) for model in taken.contradicted_by[:3])
         return Judgement(
             "unknown",
             best,
-            f"{nearest}, but others are as good and act elsewhere ({others}): they contradict each other.",
+            f"{nearest}, but {_listed(taken.contradicted_by)} closes as much, acts elsewhere and explains another part of it: "
+            "they contradict each other.",
         )
     return Judgement(
         "unknown",
@@ -122,3 +127,7 @@ def judge(
         f"The best candidate, {', '.join(best.names)}, takes {taken.share:.0%} of the squared gap (at least "
         f"{taken.at_least:.0%}, 95 %): a main cause must take the larger part.",
     )
+
+
+def _listed(models: Sequence[Scored]) -> str:
+    return "; ".join(", ".join(model.names) for model in models[:3])

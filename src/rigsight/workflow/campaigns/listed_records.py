@@ -45,7 +45,7 @@ def inside(path: Path, key: str, asked: str) -> Path:
     if not exists:
         files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
         raise InputError(
-            f"{key}: '{asked}' does not exist in {path.parent}.{nearest(asked, files)} Check the name."
+            f"{key}: '{asked}' does not exist in the folder of {path.name}.{nearest(asked, files)} Check the name."
         )
     return path.parent / name
 
