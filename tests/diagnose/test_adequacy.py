@@ -156,3 +156,35 @@ def test_a_true_second_effect_is_worth_trying() -> None:
     assert forms.partners(single, effects[1:]) == [effects[1]]
     pair = fitted(bench, effects, values)
     assert forms.with_own_evidence([single], [pair]) == [pair]
+
+
+def test_noise_that_only_motion_makes_is_no_noise_of_a_sensor() -> None:
+    bench, rng = axis_bench(), np.random.default_rng(7)
+
+    def louder(record: Record) -> Record:
+        noise = rng.standard_normal(record.n_samples)
+        return record.with_signals(x=record["x"] + 2e-2 * record["x"] * noise)
+
+    moved = replace(
+        bench,
+        estimation=tuple(map(louder, bench.estimation)),
+        scoring=tuple(map(louder, bench.scoring)),
+    )
+    model = fit_linear(moved, VALUES)
+    assert asked(moved, model).adequate
+    found = adequacy(moved, model, np.random.default_rng(1), of_steady_size=True)
+    assert not found.adequate
+    assert found.goes_with == "how far dynamics moves"
+
+
+@pytest.mark.parametrize("disturbance", [0.0, 0.5], ids=["white noise", "much disturbed"])
+def test_noise_and_disturbance_are_as_large_where_nothing_moves(disturbance: float) -> None:
+    adequate = []
+    for seed in range(8):
+        bench = axis_bench(seed=seed, disturbance=disturbance)
+        model = fit_linear(bench, VALUES)
+        adequate.append(
+            adequacy(bench, model, np.random.default_rng(1), of_steady_size=True).adequate
+            or not asked(bench, model).adequate
+        )
+    assert all(adequate)

@@ -45,7 +45,10 @@ def test_a_part_that_one_stretch_decides_is_not_sure(cause) -> None:
 @pytest.fixture
 def halves() -> tuple[np.ndarray, np.ndarray]:
     """Return what is left by two models that each explain most of the gap, but the one in the other half of the time."""
-    gap, noise = 10.0 * np.random.default_rng(0).standard_normal(N), np.random.default_rng(2).standard_normal(N)
+    gap, noise = (
+        10.0 * np.random.default_rng(0).standard_normal(N),
+        np.random.default_rng(2).standard_normal(N),
+    )
     first = np.arange(N) % 100 < 50
     return np.where(first, noise, 0.62 * gap), np.where(first, 0.62 * gap, noise)
 

@@ -131,7 +131,9 @@ def test_a_late_sensor_is_fitted_late_whichever_it_is() -> None:
     for sensor in sensors:
         structure = compose(rig, [placed(effect_named("sensor_delay"), sensor)])
         assert not carries_tangents(structure)
-        fit = GreyBoxFit(structure, [simulate(structure, values, record)], scales, dict.fromkeys(sensors, 1e-3))
+        fit = GreyBoxFit(
+            structure, [simulate(structure, values, record)], scales, dict.fromkeys(sensors, 1e-3)
+        )
         result = fit.fit({**values, "T_s": 0.01}, ["T_s"])
         assert result.success
         assert result.values["T_s"] == pytest.approx(0.02, rel=1e-4)

@@ -6,12 +6,14 @@ from record to record. Noise and disturbance agree with such an answer in one st
 in the next, so that the signs of what is left may be turned stretch by stretch: how often chance agrees as well is the p-value.
 What is compared is what is new at each sample (`innovations.py`), as a disturbance hangs together for as long as a rig swings,
 and pushes go with the motion that the equations have, as the measured one goes with the disturbance itself. No floor of the
-noise is needed, and noise may be colored and of changing size.
+noise is needed, and noise may be colored and of changing size. Whether that size goes with the motion is told beside it: an effect
+that no push resembles, such as a stiffness that pulsates, leaves more where there is more motion, as noise of a sensor does not.
 
 References
 ----------
 E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for turning signs (the wild bootstrap with Rademacher weights).
 P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the smallest of several p-values.
+T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for what the size of a remainder goes with; here by ranks.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import spearmanr
 
 from rigsight.diagnose.innovations import Innovations
 from rigsight.diagnose.places.answers import Answers, orthonormal
@@ -121,7 +124,11 @@ class Adequacy:
 
 
 def adequacy(
-    bench: Workbench, model: Scored, rng: np.random.Generator, significance: float = SIGNIFICANCE
+    bench: Workbench,
+    model: Scored,
+    rng: np.random.Generator,
+    significance: float = SIGNIFICANCE,
+    of_steady_size: bool = False,
 ) -> Adequacy:
     """Say whether what a model leaves of all records goes with anything.
 
@@ -138,6 +145,8 @@ def adequacy(
         Source of the turned signs.
     significance
         p-value below which it is not adequate.
+    of_steady_size
+        Whether noise and disturbance are to be as large where nothing moves.
     """
     records = bench.records
     answers = Answers(bench, records, bench.on_all_records(model), model.effects, model.fit.free)
@@ -158,11 +167,12 @@ def adequacy(
             0.0 if seen is None else max(0.0, seen.reached - seen.mean) / float(answers.left @ answers.left)
         )
         found.append((Agreement(what, place, told.p_value, share), told))
-    spread = _is_spread(answers)
-    if not found:
-        return Adequacy(1.0, (), spread, significance)
-    ordered = tuple(sorted((a for a, _ in found), key=lambda a: (a.p_value >= significance, -a.share)))
-    return Adequacy(_smallest([told for _, told in found]), ordered, spread, significance)
+    grown = _growth(answers, stretches) if of_steady_size else None
+    agreements = [agreement for agreement, _ in found] + ([grown] if grown is not None else [])
+    p_values = [_smallest([told for _, told in found])] if found else [1.0]
+    p_values += [grown.p_value] if grown is not None else []
+    ordered = tuple(sorted(agreements, key=lambda a: (a.p_value >= significance, -a.share)))
+    return Adequacy(min(p_values), ordered, _is_spread(answers), significance)
 
 
 @dataclass(frozen=True)
@@ -204,6 +214,34 @@ def _is_spread(answers: Answers) -> bool:
     stretches = _stretches(answers, _LONG_STRETCHES)
     powers = np.array([float(np.mean(answers.seen_left[part] ** 2)) for part in stretches])
     return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= _LEAST_SPREAD * len(stretches)
+
+
+def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
+    """Return how the size of what is left goes with how much moves: with what of several chance explains least."""
+    left = [float(np.mean(answers.seen_left[part] ** 2)) for part in stretches]
+    rig = answers.bench.rig
+    moving: list[tuple[str, str, Sequence[Floats]]] = []
+    for joint in motion_columns(rig):
+        moving.append((f"how far {joint} moves", joint, answers.simulated(joint)))
+        moving.append((f"how fast {joint} moves", joint, _slopes(answers, joint)))
+    for drive in signal_columns(rig):
+        moving.append((f"how much {drive} drives", drive, answers.simulated(drive)))
+    told = [
+        (float(spearmanr(left, powers, alternative="greater").pvalue), what, place)
+        for what, place, signals in moving
+        if np.ptp(powers := _powers(answers, signals, stretches)) > 0.0
+    ]
+    if not told:
+        return None
+    p_value, what, place = min(told)
+    return Agreement(what, place, min(1.0, len(told) * p_value), 1.0)
+
+
+def _powers(answers: Answers, signals: Sequence[Floats], stretches: Sequence[slice]) -> list[float]:
+    """Return the mean square of a signal, counted from its median, in each stretch of the stacked readings."""
+    n_outputs, middle = len(answers.bench.rig.outputs), float(np.median(np.concatenate(signals)))
+    stacked = np.concatenate([np.repeat((signal - middle) ** 2, n_outputs) for signal in signals])
+    return [float(np.mean(stacked[part])) for part in stretches]
 
 
 def _stretches(answers: Answers, most: int) -> list[slice]:

@@ -231,7 +231,9 @@ class Checks:
         """Return what a model's remainder goes with."""
         if model.names not in self._known:
             significance = SIGNIFICANCE if model.excess <= self._allowed else AGAINST_A_FLOOR
-            self._known[model.names] = adequacy(self._bench, model, self._rng, significance)
+            # Noise that only motion makes is no reason to say that nothing is missing.
+            steady = not model.effects and model.excess > AT_FLOOR
+            self._known[model.names] = adequacy(self._bench, model, self._rng, significance, steady)
         return self._known[model.names]
 
     def is_adequate(self, model: Scored) -> bool:

@@ -45,7 +45,7 @@ class Remainder:
                 f"(p = {self.p_value:.2g}): numbers may be off by more than their standard errors."
             )
         left = (
-            f"What is left, {100.0 * self.share:.2g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
+            f"What is left, {float(f'{100.0 * self.share:.2g}'):g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
             f"(p = {self.p_value:.2g})"
         )
         if self.share > LARGER_PART:

@@ -53,7 +53,9 @@ def _simulated_instant(
         known[mode] = 1.0 if _values([switch], known)[0] >= 0.0 else -1.0
     rates = _values(frozen.rates, known)
     outputs = _values(frozen.outputs[: len(structure.outputs)], known)
-    measured_late = 0.0 if structure.first_shown_late is None else _values([structure.first_shown_late], known)[0]
+    measured_late = (
+        0.0 if structure.first_shown_late is None else _values([structure.first_shown_late], known)[0]
+    )
     return Instant(
         dict(zip(structure.states, rates, strict=True)),
         dict(zip((s.name for s in structure.rig.outputs), outputs, strict=True)),

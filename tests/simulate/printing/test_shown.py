@@ -264,7 +264,11 @@ def test_the_compiled_kernel_moves_as_shown(rig: str, names: Sequence[str]) -> N
         assert status == 0
         for state, moved in zip(structure.states, (end - start) / _MOMENT, strict=True):
             assert moved == pytest.approx(reader.rate(state), rel=1e-4, abs=1e-4), state
-        late = 0.0 if structure.first_shown_late is None else reader.value(structure.first_shown_late, reader.now)
+        late = (
+            0.0
+            if structure.first_shown_late is None
+            else reader.value(structure.first_shown_late, reader.now)
+        )
         for i, signal in enumerate(structure.rig.outputs):
             shown = reader.output(signal.name, reader.now + (late if i == 0 else 0.0))
             assert out[0, i] == pytest.approx(shown, rel=1e-9, abs=1e-12), signal.name
