@@ -123,7 +123,14 @@ def test_a_late_sensor_is_fitted_late_whichever_it_is() -> None:
     t = DT * np.arange(N_SAMPLES)
     record = Record("sweep", DT, {"u": log_sweep(t, 0.3, 0.3, 3.0)}, {"u": "A"}, hold="band_limited")
     values = {
-        **{"g": 9.81, "m_c": 0.5, "m_p": 0.5, "s": 0.6, "I_p": 0.5, "k_u": 2.0, "d_c": 0.4, "d_p": 0.1},
+        "g": 9.81,
+        "m_c": 0.5,
+        "m_p": 0.5,
+        "s": 0.6,
+        "I_p": 0.5,
+        "k_u": 2.0,
+        "d_c": 0.4,
+        "d_p": 0.1,
         "T_s": 0.02,
     }
     sensors = [sensor.name for sensor in rig.outputs]

@@ -6,8 +6,8 @@ from record to record. Noise and disturbance agree with such an answer in one st
 in the next, so that the signs of what is left may be turned stretch by stretch: how often chance agrees as well is the p-value.
 What is compared is what is new at each sample (`innovations.py`), as a disturbance hangs together for as long as a rig swings,
 and pushes go with the motion that the equations have, as the measured one goes with the disturbance itself. No floor of the
-noise is needed, and noise may be colored and of changing size. Whether that size goes with the motion is told beside it: an effect
-that no push resembles, such as a stiffness that pulsates, leaves more where there is more motion, as noise of a sensor does not.
+noise is needed, and noise may be colored and of changing size. Whether that size goes with the motion can be asked beside it: an
+effect that no push resembles, such as a pulsating stiffness, leaves more where there is more motion; a sensor's noise does not.
 
 References
 ----------

@@ -44,8 +44,9 @@ class Remainder:
                 f"What is left is no more than the noise floor, but it still goes with {_in_words(self.goes_with)} "
                 f"(p = {self.p_value:.2g}): numbers may be off by more than their standard errors."
             )
+        percent = float(f"{100.0 * self.share:.2g}")
         left = (
-            f"What is left, {float(f'{100.0 * self.share:.2g}'):g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
+            f"What is left, {percent:g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
             f"(p = {self.p_value:.2g})"
         )
         if self.share > LARGER_PART:
