@@ -63,6 +63,14 @@ def scaled(
 ) -> dict[str, float]:
     """Return the parameters of an effect between its null (strength 0) and its full shape (1), or beyond."""
     values = dict(shape)
+    growing = [p for p in effect.parameters if p.null is not None and p.null < _NEVER and p.null != 1.0]
+    # What grows stops together: static friction held at the limit of its sliding part would be Coulomb friction.
+    most = [
+        _LIMITS[p.dimension] * _unit(effect, p.dimension, scales) / abs(shape[p.name])
+        for p in growing
+        if p.dimension in _LIMITS and shape[p.name]
+    ]
+    growth = min([strength, *most])
     for p in effect.parameters:
         if p.null is None:
             continue
@@ -71,8 +79,7 @@ def scaled(
         elif p.null == 1.0:
             values[p.name] = max(1.0 - strength * (1.0 - shape[p.name]), 0.02)
         else:
-            limit = _LIMITS.get(p.dimension, math.inf) * _unit(effect, p.dimension, scales)
-            values[p.name] = min(strength * shape[p.name], limit)
+            values[p.name] = growth * shape[p.name]
     return values
 
 
