@@ -14,7 +14,8 @@ from scipy.optimize import minimize_scalar
 from rigsight.simulate.linear_prediction import continued
 
 _cache: OrderedDict[bytes, tuple[NDArray[np.float64], NDArray[np.float64]]] = OrderedDict()
-_CACHED_RECORDS = 64
+_CACHED_SAMPLES = 2_000_000
+"""Samples of all records together that are kept, 32 MB: a campaign has few records, or hundreds of short windows of them."""
 _PENALTIES = (-16.0, 25.0)
 """Natural logarithm of the weights tried: from no smoothing at all to a straight line."""
 _TRIALS = 42
@@ -54,7 +55,7 @@ def smooth_motion(
     key = sha256(samples.tobytes()).digest()
     if key not in _cache:
         _cache[key] = _spline(samples)
-        while len(_cache) > _CACHED_RECORDS:
+        while len(_cache) > 1 and sum(kept.size for kept, _ in _cache.values()) > _CACHED_SAMPLES:
             _cache.popitem(last=False)
     values, slopes = _cache[key]
     return values, slopes / dt
