@@ -34,7 +34,8 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
 ) -> None:
     found = [scored(PAIR, excess=pair)]
     monkeypatch.setattr(examination, "grown", lambda *_: found)
-    models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)])
+    linear = scored((), excess=40.0)
+    models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)], linear=linear)
     checks = None if adequate is None else SimpleNamespace(is_adequate=lambda _: adequate)
     kept = examination._grown(models, [], None, checks, is_driven, None)
     assert kept == (found if competes else [])

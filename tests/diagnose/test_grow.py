@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
+from rigsight.diagnose.candidates import grow
 from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
 from rigsight.diagnose.candidates.grow import grown, pruned
 from rigsight.diagnose.second_cause import OtherForms
@@ -75,9 +77,33 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
     fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
     bench = Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
     spring, lag = effect_named("cubic_stiffness"), effect_named("actuator_lag")
-    singles = fit_candidates(bench, fit_linear(bench, VALUES), [spring])
-    pairs = grown(bench, singles, [spring, lag], AT_FLOOR, OtherForms(bench, lower_bound=False))
+    linear = fit_linear(bench, VALUES)
+    singles = fit_candidates(bench, linear, [spring])
+    pairs = grown(
+        bench, singles, [spring, lag], AT_FLOOR, linear.excess, OtherForms(bench, lower_bound=False)
+    )
     assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
+
+
+def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
+    monkeypatch: pytest.MonkeyPatch, scored
+) -> None:
+    nothing, spring = effect_named("actuator_lag"), effect_named("power_law_stiffness")
+    singles = [
+        scored((nothing.name,), excess=10.0, residuals=np.ones(8), n_free=4),
+        scored((spring.name,), excess=8.0, residuals=np.ones(8), n_free=6),
+    ]
+    beside: list[str] = []
+
+    def tried(_: Workbench, parent: Scored, *rest: object) -> list[Scored]:
+        beside.extend(parent.names)
+        return []
+
+    monkeypatch.setattr(grow, "_grown_from", tried)
+    monkeypatch.setattr(grow, "refine", lambda _, pairs: pairs)
+    forms = SimpleNamespace(partners=lambda parent, effects: effects)
+    grow.grown(None, singles, [nothing, spring], AT_FLOOR, 9.0, forms)
+    assert beside == ["power_law_stiffness"]
 
 
 def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:

@@ -39,7 +39,7 @@ STATED = {
     "rank._HINT": (0.9, "nine tenths to the model that is lowest"),
     "verdict.AT_FLOOR": (1.1, "excess up to 1.1;"),
     "verdict.AT_LOWER_BOUND": (3.0, "up to 3 where the floor is a lower bound"),
-    "verdict._WORTHWHILE": (1.1, "lower by a factor of 1.1"),
+    "verdict.WORTHWHILE": (1.1, "lower by a factor of 1.1"),
     "verdict._LEFT_OF_GAP": (0.025, "1 + 2.5 % of the gap's excess"),
     "verdict.LEAST_LEFT": (1.15, "at least 1.15"),
     "verdict.MOST_LEFT": (1.6, "at most 1.6"),

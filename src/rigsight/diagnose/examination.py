@@ -27,7 +27,15 @@ from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
 from rigsight.diagnose.second_cause import OtherForms, beyond_disturbance
 from rigsight.diagnose.task import Task
-from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND, MOST_LEFT, Judgement, judge, most_left
+from rigsight.diagnose.verdict import (
+    AT_FLOOR,
+    AT_LOWER_BOUND,
+    MOST_LEFT,
+    WORTHWHILE,
+    Judgement,
+    judge,
+    most_left,
+)
 from rigsight.diagnose.windows import Windowing, leading_output
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -312,7 +320,8 @@ def _grown(
         is_excused = best.excess <= AT_LOWER_BOUND
         if is_excused and (not is_driven or of_unknown_noise.is_adequate(best)):
             return []
-    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, forms, prepare)
+    worthwhile = models.linear.excess / WORTHWHILE
+    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, worthwhile, forms, prepare)
     return [pair for pair in pairs if not is_excused or pair.excess <= AT_FLOOR]
 
 

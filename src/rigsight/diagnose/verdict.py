@@ -13,7 +13,7 @@ AT_FLOOR = 1.1
 """RMS in units of the noise floor that counts as the floor itself: floors are known to a few percent."""
 AT_LOWER_BOUND = 3.0
 """The same where the floor is only a lower bound: an assumption, white noise is taken to be at least a third of all."""
-_WORTHWHILE = 1.1
+WORTHWHILE = 1.1
 """Factor by which a model must lower the held-out error to be believed to explain anything; an assumption."""
 LEAST_LEFT, MOST_LEFT, _LEFT_OF_GAP = 1.15, 1.6, 0.025
 """What a named cause may leave of a measured noise floor: a share of the gap, within these RMS in units of the floor.
@@ -67,8 +67,8 @@ def judge(
         may stand well above it, so that a modest rest which no model lowers is taken for noise.
     """
     at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    helps = best.excess * _WORTHWHILE < linear.excess
-    retuned = linear.excess * _WORTHWHILE < before_excess
+    helps = best.excess * WORTHWHILE < linear.excess
+    retuned = linear.excess * WORTHWHILE < before_excess
     needs_effect = helps and linear.excess > AT_FLOOR
     # Numbers that were fitted to a record like the held-out ones suit them by chance where no numbers suit all records.
     if not needs_effect and (before_excess <= AT_FLOOR or (before_excess <= at_floor and not retuned)):

@@ -66,6 +66,7 @@ def grown(
     singles: Sequence[Scored],
     effects: Sequence[Effect],
     at_floor: float,
+    worthwhile: float,
     forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
@@ -81,6 +82,8 @@ def grown(
         Candidates for the second place.
     at_floor
         Held-out error in units of the noise floor at which nothing is left to explain.
+    worthwhile
+        Held-out error up to which an effect is believed to explain anything.
     forms
         Says which effects are worth trying beside another.
     prepare
@@ -93,7 +96,9 @@ def grown(
     usable = sorted((m for m in singles if m.residuals and np.isfinite(m.excess)), key=lambda m: m.excess)
     if not usable or usable[0].excess <= at_floor:
         return []
-    close = [model for model in usable if model.excess <= _BEAM * usable[0].excess]
+    # Beside an effect that explains nothing a second one does what it does alone.
+    explaining = [model for model in usable if model.excess <= worthwhile] or usable
+    close = [model for model in explaining if model.excess <= _BEAM * usable[0].excess]
     # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
     # many, the one that the catalogue has first is the plainer.
     best = min(close, key=lambda model: (model.n_free, model.excess))
