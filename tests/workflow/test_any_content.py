@@ -25,6 +25,7 @@ from rigsight.workflow.campaigns.campaign_file import (
     checked_file,
     read_campaign_table,
 )
+from rigsight.workflow.campaigns.where import Where
 from rigsight.workflow.files.json_file import json_object
 from rigsight.workflow.files.model_file import model_of, named_model, read_model
 from rigsight.workflow.own.effect_declaration import declaration_faults
@@ -98,7 +99,7 @@ def refused_in_words(take: Callable[[], object]) -> None:
 
 @pytest.mark.parametrize(("tree", "table"), [(CAMPAIGN, CampaignTable), (KEY, KeyTable)])
 def test_the_tree_that_is_changed_is_sound(tree: dict[str, Any], table: type[FileTable]) -> None:
-    assert isinstance(checked_file(Path("file"), tree, table), table)
+    assert isinstance(checked_file(Where("file"), tree, table), table)
 
 
 @drawn
@@ -109,7 +110,7 @@ def test_any_change_of_a_table(
 ) -> None:
     given_tree = changed(tree, data.draw(st.sampled_from(places(tree))), value, name)
     if isinstance(given_tree, dict):
-        refused_in_words(lambda: checked_file(Path("file"), given_tree, table))
+        refused_in_words(lambda: checked_file(Where("file"), given_tree, table))
 
 
 @drawn

@@ -273,7 +273,9 @@ def test_errors_of_a_record_name_campaign_file_and_line(campaign: Callable[..., 
     def change(lines: Lines) -> None:
         lines[7] = lines[7].replace(lines[7].split(",")[1], "off")
 
-    with pytest.raises(InputError, match=r"campaign.toml: record 1: sweep.csv, line 8, column 'u': 'off'"):
+    with pytest.raises(
+        InputError, match=r"campaign.toml, line 13, column 1: record 1: sweep.csv, line 8, column 'u': 'off'"
+    ):
         read_campaign(campaign(change=change))
 
 
@@ -370,3 +372,21 @@ def test_a_fitted_record_that_is_to_validate_too_is_told(campaign: Callable[...,
     folder = campaign(HEAD + RECORDS.replace('"step.csv"', '"sweep.csv"'))
     (note,) = read_campaign(folder).notes
     assert "is for validation and holds the very samples of 'sweep', which is fitted" in note
+
+
+def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callable[..., Path]) -> None:
+    text = (HEAD + RECORDS).replace("b = 0.3", "bb = 0.3")
+    line = 1 + text.splitlines().index("bb = 0.3")
+    folder = campaign(text)
+    told = (
+        rf"campaign.toml, line {line}, column 6: rig.constants.bb: unknown to running_gear. Did you mean 'b'"
+    )
+    with pytest.raises(InputError, match=told):
+        read_campaign(folder)
+
+
+def test_what_is_missing_is_told_with_the_line_of_its_table(campaign: Callable[..., Path]) -> None:
+    text = (HEAD + RECORDS).replace("b = 0.3\n", "")
+    line = 1 + text.splitlines().index("[rig.constants]")
+    with pytest.raises(InputError, match=rf"line {line}, column 1: rig.constants.b: is missing"):
+        read_campaign(campaign(text))

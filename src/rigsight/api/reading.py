@@ -11,6 +11,7 @@ from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
 from rigsight.workflow.campaigns.given_simulation import checked_numbers
 from rigsight.workflow.campaigns.in_memory import rig_of
+from rigsight.workflow.campaigns.where import Where
 
 
 def read_record(
@@ -103,6 +104,8 @@ def read_record(
         hold=hold,
         dt=dt,
         resample=resample,
-        constants=checked_numbers(Path(path).name, "constants", found, found.constants, constants or {}),
+        constants=checked_numbers(
+            Where(Path(path).name), ("constants",), found, found.constants, constants or {}
+        ),
         beside=signals_beside([signal.name for signal in (*found.inputs, *found.outputs)]),
     )

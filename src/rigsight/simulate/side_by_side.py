@@ -229,7 +229,9 @@ def choose_substeps(
         return Substeps(1)
     taken = np.zeros(held.n_pieces, dtype=np.intc)
     exact = simulate_outputs(structure, held, p, initial_state, n_samples, min(accuracy / 10.0, 1e-5), taken)
-    size = np.std(exact, axis=0) + 1e-300
+    # A motion that has left the range of its squares is finite still.
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.std(exact, axis=0) + 1e-300
     state = np.asarray(initial_state, dtype=np.float64)[:, None]
     least, needs = 1.0, relative_needs(taken)
     for substeps in (number for number in _SUBSTEPS if number <= most):

@@ -20,6 +20,7 @@ from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaigns.given_simulation import checked_numbers
+from rigsight.workflow.campaigns.where import Where
 from rigsight.workflow.files.model_file import MODEL_FILE, read_model
 from rigsight.workflow.files.results import check_target, write_together
 
@@ -78,7 +79,7 @@ def run_simulate(
                 f"Column mapping '{name}': a simulation of {rig.name} does not read it.{nearest(name, known)} "
                 f"It reads: {', '.join(known)}."
             )
-    own = checked_numbers(MODEL_FILE, "constants", rig, rig.constants, constants or {})
+    own = checked_numbers(Where(MODEL_FILE), ("constants",), rig, rig.constants, constants or {})
     if out is not None:
         check_target(Path(out))
     estimated = initial_state == "estimated"

@@ -45,6 +45,7 @@ from rigsight.workflow.campaigns.campaign_file import (
     read_campaign_table,
 )
 from rigsight.workflow.campaigns.listed_records import file_inside
+from rigsight.workflow.campaigns.where import Where
 from rigsight.workflow.files.json_file import json_object
 from rigsight.workflow.files.results import json_text, write_together
 
@@ -177,7 +178,8 @@ class ExternalBench(BenchFolder):
 
     def _rig(self, trial: str) -> Rig:
         path = self.campaign(trial) / _CAMPAIGN
-        return listed_rig(path, read_campaign_table(path).rig)
+        table, where = read_campaign_table(path)
+        return listed_rig(path, table.rig, where)
 
     def settle_here(self) -> None:
         """Write down whose campaigns these are, or check that the folder holds no drawn bench.
@@ -202,7 +204,8 @@ class ExternalBench(BenchFolder):
 
 
 def _key_table(path: Path) -> KeyTable:
-    return checked_file(path, json_object(path, "key", f"The least that a key holds is {_LEAST}."), KeyTable)
+    data = json_object(path, "key", f"The least that a key holds is {_LEAST}.")
+    return checked_file(Where(path.name, data), data, KeyTable)
 
 
 def _check_effects(path: Path, table: KeyTable, rig: Rig) -> None:

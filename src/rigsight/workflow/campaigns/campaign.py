@@ -23,6 +23,7 @@ from rigsight.workflow.campaigns.campaign_file import (
 )
 from rigsight.workflow.campaigns.given_simulation import GivenSimulation, checked_simulation, rig_named
 from rigsight.workflow.campaigns.listed_records import file_inside, inside, read_listed_record
+from rigsight.workflow.campaigns.where import Where
 from rigsight.workflow.own.effect_names import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
 
@@ -125,27 +126,27 @@ def read_campaign(
     rigsight.errors.InputError: measurements/march does not exist; name a campaign.toml or the folder that holds one.
     """
     path = locate(Path(campaign))
-    table = read_campaign_table(path)
-    rig = listed_rig(path, table.rig, own_rigs)
+    table, where = read_campaign_table(path)
+    rig = listed_rig(path, table.rig, where, own_rigs)
     known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
     by_record = set.intersection(*(set(record.constants) for record in table.records))
     given = checked_simulation(
-        path.name,
+        where,
         rig,
-        [effect_on(rig, name, known, f"{path.name}: rig.effects") for name in table.rig.effects],
+        [effect_on(rig, name, known, where.at("rig", "effects")) for name in table.rig.effects],
         table.rig.constants,
         table.rig.parameters,
         by_record,
     )
     if all(record.role != "estimation" for record in table.records):
         raise InputError(
-            f'{path.name}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
+            f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
         )
-    files = [file_inside(path, number, record) for number, record in enumerate(table.records, 1)]
+    files = [file_inside(path, number, record, where) for number, record in enumerate(table.records, 1)]
     read = [
         (record, stretch)
         for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
-        for stretch in read_listed_record(path, rig, number, record, file)
+        for stretch in read_listed_record(path, rig, number, record, file, where)
     ]
     if table.offsets == "per_record":
         outputs = [signal.name for signal in rig.outputs]
@@ -192,7 +193,7 @@ def _holds_same_samples(record: Record, other: Record) -> bool:
     )
 
 
-def listed_rig(path: Path, table: RigTable, own_rigs: Iterable[Rig] = ()) -> Rig:
+def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig] = ()) -> Rig:
     """Return the rig that a campaign names, or whose file it names.
 
     Parameters
@@ -201,6 +202,8 @@ def listed_rig(path: Path, table: RigTable, own_rigs: Iterable[Rig] = ()) -> Rig
         The campaign's file.
     table
         Its ``[rig]``.
+    where
+        Where its keys stand.
     own_rigs
         Rigs that it may name beside the built-in ones.
 
@@ -210,12 +213,12 @@ def listed_rig(path: Path, table: RigTable, own_rigs: Iterable[Rig] = ()) -> Rig
         If not exactly one of ``model`` and ``file`` is given, there is no such rig, or its file cannot be used.
     """
     if table.model is not None and table.file is not None:
-        raise InputError(f"{path.name}: rig.file: stands beside rig.model; give one of the two.")
+        raise InputError(f"{where.at('rig', 'file')}: stands beside rig.model; give one of the two.")
     if table.file is not None:
-        return read_rig_file(inside(path, "rig.file", table.file))
+        return read_rig_file(inside(path, where.at("rig", "file"), table.file))
     if table.model is None:
-        raise InputError(f"{path.name}: rig.model: is missing. Write {WHICH_RIG}")
-    return rig_named(path.name, table.model, known_rigs(own_rigs))
+        raise InputError(f"{where.at('rig', 'model')}: is missing. Write {WHICH_RIG}")
+    return rig_named(where, table.model, known_rigs(own_rigs))
 
 
 def of_first_record(given: GivenSimulation, records: Sequence[Record]) -> tuple[dict[str, float], str]:

@@ -11,14 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from rigsight.errors import InputError, nearest, shown
 from rigsight.records import Hold, Kind, Role
 from rigsight.records.formats.ordinary_file import file_size
+from rigsight.workflow.campaigns.where import LISTS, Where
 
 MOST_RECORDS = 1000
 Offsets = Literal["shared", "per_record"]
 """Whether the offset of a sensor is the same in all records."""
 WHICH_RIG = 'model = "NAME" for a rig that rigsight rigs lists, or file = "my_rig.toml" for one of your own.'
 LARGEST_FILE = 10_000_000
-_LISTS = ("records", "withheld")
-"""Keys that hold lists of records."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Seconds = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
@@ -105,18 +104,19 @@ def locate(campaign: Path) -> Path:
     raise InputError(f"Folder {campaign} holds no campaign.toml. {mend}")
 
 
-def read_campaign_table(path: Path) -> CampaignTable:
-    """Return the checked contents of a campaign file.
+def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
+    """Return the checked contents of a campaign file, and where its keys stand.
 
     Raises
     ------
     InputError
-        Naming the file with line and column for a syntax error, or with the key for anything else.
+        Naming the file with line and column, and the key.
     """
     try:
         if file_size(path, "the campaign.toml") > LARGEST_FILE:
             raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no campaign.toml.")
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path.name} is not valid TOML: {error}. {_mend(str(error))}") from None
     except UnicodeDecodeError as error:
@@ -130,10 +130,11 @@ def read_campaign_table(path: Path) -> CampaignTable:
     except ValueError:
         # The only thing that is valid TOML and yet fails is a whole number of thousands of digits.
         raise InputError(f"{path.name} holds a whole number with more digits than are read.") from None
-    return checked_file(path, data, CampaignTable)
+    where = Where.of_toml(path.name, text, data)
+    return checked_file(where, data, CampaignTable), where
 
 
-def checked_file(path: Path, data: dict[str, Any], table: type[Checked]) -> Checked:
+def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Checked:
     """Return what a file holds as a table.
 
     Raises
@@ -144,47 +145,36 @@ def checked_file(path: Path, data: dict[str, Any], table: type[Checked]) -> Chec
     try:
         return table.model_validate(data)
     except ValidationError as error:
-        told = _messages(path, data, table, [dict(problem) for problem in error.errors(include_url=False)])
+        told = _messages(where, data, table, [dict(problem) for problem in error.errors(include_url=False)])
         more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
         raise InputError("\n".join(told[:5]) + more) from None
 
 
-def key_text(location: tuple[str | int, ...], data: dict[str, Any]) -> str:
-    """Return a location as a user reads it: ``rig.constants.v``, ``record 2 (step.csv): role``."""
-    if len(location) >= 2 and location[0] in _LISTS and isinstance(location[1], int):
-        table = data[location[0]][location[1]]
-        file = table.get("file") if isinstance(table, dict) else None
-        record = f"record {location[1] + 1}" + (f" ({file})" if isinstance(file, str) and file else "")
-        rest = ".".join(map(str, location[2:]))
-        return f"{record}: {rest}" if rest else record
-    return ".".join(map(str, location))
-
-
 def _messages(
-    path: Path, data: dict[str, Any], table: type[FileTable], problems: list[dict[str, Any]]
+    where: Where, data: dict[str, Any], table: type[FileTable], problems: list[dict[str, Any]]
 ) -> list[str]:
     """Return one line per mistake; an alternative that fails as a whole only repeats what another says in detail."""
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
     told = [
-        _tell(path, data, table, problem)
+        _tell(where, data, table, problem)
         for problem, key in zip(problems, keys, strict=True)
         if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
     ]
     return list(dict.fromkeys(told))
 
 
-def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
+def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
     if not location:
         # Only a key with half a sign in it belongs to no place.
-        return f"{path.name}: a key is no text: {shown(problem['input'])}. Use plain letters."
-    key = key_text(location, data)
+        return f"{where.name}: a key is no text: {shown(problem['input'])}. Use plain letters."
+    key = where.at(*location)
     kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
     if kind == "extra_forbidden":
         allowed = _allowed_keys(location, table)
-        return f"{path.name}: {key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
+        return f"{key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
     if kind == "missing":
-        return f"{path.name}: {key}: is missing.{_how_to_write(location)}"
+        return f"{key}: is missing.{_how_to_write(location)}"
     if kind == "literal_error":
         allowed = context["expected"].replace(" or ", ", ")
         hint = (
@@ -192,28 +182,30 @@ def _tell(path: Path, data: dict[str, Any], table: type[FileTable], problem: dic
             if isinstance(got, str)
             else ""
         )
-        return f"{path.name}: {key}: is {shown(got)}.{hint} Allowed: {allowed}."
+        return f"{key}: is {shown(got)}.{hint} Allowed: {allowed}."
     if kind == "finite_number":
-        return f"{path.name}: {key}: must be a finite number, got {shown(got)}."
+        return f"{key}: must be a finite number, got {shown(got)}."
     if kind == "float_type":
-        return (
-            f"{path.name}: {key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
-        )
+        return f"{key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
     if location == ("records",) and kind in ("too_short", "too_long"):
         count = len(got)
-        return f"{path.name}: records: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
+        return f"{key}: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
     if location[-1] == "decimal":
-        return f'{path.name}: {key}: must be "." or ",", got {shown(got)}.'
+        return f'{key}: must be "." or ",", got {shown(got)}.'
     if location[-1] == "header":
-        return f"{path.name}: {key}: must be true, false, or the number of the line that holds the names, got {shown(got)}."
+        return (
+            f"{key}: must be true, false, or the number of the line that holds the names, got {shown(got)}."
+        )
     if location[-1] == "separator":
-        return f"{path.name}: {key}: must be one character, got {shown(got)}; a blank stands for any white space."
+        return f"{key}: must be one character, got {shown(got)}; a blank stands for any white space."
     if "columns" in location[:-1]:
         return (
-            f"{path.name}: {key}: got {shown(got)}. Write the column's name, its number counted from 1, "
+            f"{key}: got {shown(got)}. Write the column's name, its number counted from 1, "
             'or { name = "...", scale = 1.0, offset = 0.0 }, or { name = "...", unit = "mm" }.'
         )
-    return f"{path.name}: {key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {shown(got)}.{_how_to_write(location)}"
+    return (
+        f"{key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {shown(got)}.{_how_to_write(location)}"
+    )
 
 
 def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:
@@ -236,7 +228,7 @@ def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]
 def _allowed_keys(location: tuple[str | int, ...], table: type[FileTable]) -> list[str]:
     if location[0] == "rig" and len(location) > 1:
         table = RigTable
-    elif location[0] in _LISTS and len(location) > 1:
+    elif location[0] in LISTS and len(location) > 1:
         table = ColumnTable if "columns" in location else RecordTable
     return list(table.model_fields)
 

@@ -10,6 +10,7 @@ from rigsight.errors import InputError, nearest
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
+from rigsight.workflow.campaigns.where import Location, Where
 
 
 @dataclass(frozen=True)
@@ -22,13 +23,13 @@ class GivenSimulation:
     parameters: dict[str, float]
 
 
-def rig_named(where: str, name: str, known: Mapping[str, Rig]) -> Rig:
+def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:
     """Return the rig that ``rig.model`` names.
 
     Parameters
     ----------
     where
-        How messages begin.
+        Where keys stand.
     name
         Its name.
     known
@@ -41,14 +42,14 @@ def rig_named(where: str, name: str, known: Mapping[str, Rig]) -> Rig:
     """
     if name not in known:
         raise InputError(
-            f"{where}: rig.model: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; a rig of your own is "
+            f"{where.at('rig', 'model')}: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; a rig of your own is "
             'named by its file: file = "my_rig.toml".'
         )
     return known[name]
 
 
 def checked_simulation(
-    where: str,
+    where: Where,
     rig: Rig,
     modelled: Sequence[Effect],
     constants: Mapping[str, float],
@@ -60,7 +61,7 @@ def checked_simulation(
     Parameters
     ----------
     where
-        How messages begin: the file, or the title of a campaign in memory.
+        Where keys stand: in a file, or in a campaign in memory.
     rig
         The rig.
     modelled
@@ -79,19 +80,19 @@ def checked_simulation(
     try:
         structure = compose(rig, modelled)
     except InputError as error:
-        raise InputError(f"{where}: rig.effects: {error}") from None
+        raise InputError(f"{where.at('rig', 'effects')}: {error}") from None
     return GivenSimulation(rig, tuple(modelled), known, _parameters(where, structure, parameters))
 
 
 def checked_numbers(
-    where: str, key: str, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
+    where: Where, key: Location, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
 ) -> dict[str, float]:
     """Return given numbers, each one that is allowed and within its range.
 
     Parameters
     ----------
     where, key
-        How messages begin, and the table in which the numbers stand.
+        Where keys stand, and the table in which the numbers are.
     rig
         Whose numbers they are.
     allowed
@@ -107,55 +108,56 @@ def checked_numbers(
     known = {parameter.name: parameter for parameter in allowed}
     checked = {}
     for name, value in given.items():
+        here = where.at(*key, name)
         if name not in known:
             listed = ", ".join(known) or "none"
-            raise InputError(
-                f"{where}: {key}.{name}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}."
-            )
+            raise InputError(f"{here}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}.")
         try:
             checked[name] = known[name].check(value)
         except InputError as error:
-            raise InputError(f"{where}: {key}.{name}: {error}") from None
+            raise InputError(f"{here}: {error}") from None
     return checked
 
 
 def _constants(
-    where: str, rig: Rig, given: Mapping[str, float], of_records: Collection[str]
+    where: Where, rig: Rig, given: Mapping[str, float], of_records: Collection[str]
 ) -> dict[str, float]:
-    checked = checked_numbers(where, "rig.constants", rig, rig.constants, given)
+    checked = checked_numbers(where, ("rig", "constants"), rig, rig.constants, given)
     for constant in rig.constants:
         if constant.name in checked or constant.name in of_records:
             continue
         if constant.default is None:
             raise InputError(
-                f"{where}: rig.constants.{constant.name}: is missing; {rig.name} needs it "
+                f"{where.at('rig', 'constants', constant.name)}: is missing; {rig.name} needs it "
                 f"({constant.description} [{constant.unit}])."
             )
         checked[constant.name] = constant.default
     if rig.has_one_motion:
         gain = rig.motion.drive_gain
         if checked.get(str(gain)) == 0.0:
-            raise InputError(f"{where}: rig.constants.{gain}: is 0, so that the input would drive nothing.")
+            raise InputError(
+                f"{where.at('rig', 'constants', str(gain))}: is 0, so that the input would drive nothing."
+            )
     return {constant.name: checked[constant.name] for constant in rig.constants if constant.name in checked}
 
 
-def _parameters(where: str, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
+def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
     rig = structure.rig
     constants = {constant.name for constant in rig.constants}
     own = [parameter for parameter in structure.parameters if parameter.name not in constants]
-    checked = checked_numbers(where, "rig.parameters", rig, (*own, *rig.alternative_parameters), given)
+    checked = checked_numbers(where, ("rig", "parameters"), rig, (*own, *rig.alternative_parameters), given)
     for parameter in own:
         if parameter not in rig.parameters and parameter.name not in checked:
             if parameter.default is None:
                 raise InputError(
-                    f"{where}: rig.parameters.{parameter.name}: is missing; the simulation is said to have an effect that "
+                    f"{where.at('rig', 'parameters', parameter.name)}: is missing; the simulation is said to have an effect that "
                     f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
                 )
             checked[parameter.name] = parameter.default
     for alternative, determined in ((a.parameter.name, a.gives) for a in rig.alternatives):
         if alternative in checked and determined in checked:
             raise InputError(
-                f"{where}: rig.parameters.{alternative}: stands beside {determined}, which it determines; "
+                f"{where.at('rig', 'parameters', alternative)}: stands beside {determined}, which it determines; "
                 "give one of the two."
             )
     return checked

@@ -17,6 +17,7 @@ from rigsight.simulate.model import Model
 from rigsight.workflow.campaigns.campaign import NO_VALIDATION, Campaign, of_first_record
 from rigsight.workflow.campaigns.campaign_file import Offsets
 from rigsight.workflow.campaigns.given_simulation import checked_numbers, checked_simulation
+from rigsight.workflow.campaigns.where import Where
 from rigsight.workflow.own.effect_names import effects_on
 
 
@@ -69,7 +70,7 @@ def make_campaign(
     called = title or found.name
     by_record = set.intersection(*(set(record.constants) for record in records)) if records else set()
     given = checked_simulation(
-        called,
+        Where(called),
         found,
         effects_on(found, effects_of(effects), called),
         constants or {},
@@ -207,6 +208,8 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
                 "be learned from it. Check the signal, or leave the record out; a record of a rig that moves freely has the kind "
                 '"operation" and no amplitude.'
             )
-    checked_numbers(f"{called}: record '{record.name}'", "constants", rig, rig.constants, record.constants)
+    checked_numbers(
+        Where(f"{called}: record '{record.name}'"), ("constants",), rig, rig.constants, record.constants
+    )
     units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
     return replace(record, units={**units, **record.units})

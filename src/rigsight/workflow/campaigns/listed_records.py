@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from rigsight.errors import InputError, nearest, shown
@@ -11,17 +12,18 @@ from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
 from rigsight.workflow.campaigns.campaign_file import RecordTable
 from rigsight.workflow.campaigns.given_simulation import checked_numbers
+from rigsight.workflow.campaigns.where import Location, Where
 
 
-def inside(path: Path, key: str, asked: str) -> Path:
+def inside(path: Path, where: str, asked: str) -> Path:
     """Return a file that another one names; a campaign that was sent to someone must not read what is none of its business.
 
     Parameters
     ----------
     path
         The file that names it.
-    key
-        Where it stands there, for messages.
+    where
+        How messages begin.
     asked
         The name.
 
@@ -30,27 +32,26 @@ def inside(path: Path, key: str, asked: str) -> Path:
     InputError
         If there is none, or it lies outside the folder of `path`.
     """
-    key = f"{path.name}: {key}"
     folder = path.parent.resolve()
     name = Path(asked)
     try:
         is_inside, exists = (folder / name).resolve().is_relative_to(folder), (folder / name).is_file()
     except (OSError, ValueError, RuntimeError):
         # Longer than names may be, with a null or half a sign in it, or a link to itself.
-        raise InputError(f"{key}: is no file name that can be looked up: {shown(asked)}.") from None
+        raise InputError(f"{where}: is no file name that can be looked up: {shown(asked)}.") from None
     if name.is_absolute() or ".." in name.parts or not is_inside:
         is_link = not name.is_absolute() and ".." not in name.parts
         how = "is a link that leaves" if is_link else "leaves"
-        raise InputError(f"{key}: '{asked}' {how} the campaign's folder; put the file beside {path.name}.")
+        raise InputError(f"{where}: '{asked}' {how} the campaign's folder; put the file beside {path.name}.")
     if not exists:
         files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
         raise InputError(
-            f"{key}: '{asked}' does not exist in the folder of {path.name}.{nearest(asked, files)} Check the name."
+            f"{where}: '{asked}' does not exist in the folder of {path.name}.{nearest(asked, files)} Check the name."
         )
     return path.parent / name
 
 
-def file_inside(path: Path, number: int, record: RecordTable) -> Path:
+def file_inside(path: Path, number: int, record: RecordTable, where: Where | None = None) -> Path:
     """Return the file of a record.
 
     Parameters
@@ -61,17 +62,21 @@ def file_inside(path: Path, number: int, record: RecordTable) -> Path:
         Place of the record in that file, from 1.
     record
         What is listed.
+    where
+        Where the keys of that file stand, if it is known.
 
     Raises
     ------
     InputError
         As `inside`.
     """
-    return inside(path, f"record {number}: file", record.file)
+    # The message names the file by itself.
+    where = replace(where or Where(path.name), data={})
+    return inside(path, where.at("records", number - 1, "file"), record.file)
 
 
 def read_listed_record(
-    path: Path, rig: Rig, number: int, record: RecordTable, file: Path
+    path: Path, rig: Rig, number: int, record: RecordTable, file: Path, where: Where | None = None
 ) -> tuple[Record, ...]:
     """Read a record as a file that lists it describes it, in stretches where its clock pauses.
 
@@ -85,7 +90,7 @@ def read_listed_record(
         Place of the record in that file, from 1.
     record
         What is listed.
-    file
+    file, where
         See `file_inside`.
 
     Raises
@@ -93,10 +98,11 @@ def read_listed_record(
     InputError
         Naming the file that lists it, the record, and line and column of what cannot be used.
     """
-    key = f"{path.name}: record {number} ({record.file})"
-    columns = _columns(key, rig, record)
-    constants = checked_numbers(key, "constants", rig, rig.constants, record.constants)
-    _check_inputs(key, rig, record)
+    where = where or Where(path.name, {"records": [None] * (number - 1) + [{"file": record.file}]})
+    own = ("records", number - 1)
+    columns = _columns(where, own, rig, record)
+    constants = checked_numbers(where, (*own, "constants"), rig, rig.constants, record.constants)
+    _check_inputs(where, own, rig, record)
     try:
         return read_stretches(
             file,
@@ -122,20 +128,22 @@ def read_listed_record(
             beside=signals_beside(_own(rig)),
         )
     except InputError as error:
-        raise InputError(f"{path.name}: record {number}: {error}") from None
+        # What is wrong stands in the record's file, which the message names already.
+        raise InputError(f"{replace(where, data={}).at(*own)}: {error}") from None
 
 
 def _own(rig: Rig) -> list[str]:
     return [signal.name for signal in (*rig.inputs, *rig.outputs)]
 
 
-def _columns(key: str, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping]:
+def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping]:
     known = [TIME, *_own(rig), *signals_beside(_own(rig))]
     columns = {}
     for signal, column in record.columns.items():
+        here = where.at(*own, "columns", signal)
         if signal not in known:
             raise InputError(
-                f"{key}: columns.{signal}: no signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
+                f"{here}: no signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
             )
         try:
             if isinstance(column, str | int):
@@ -143,24 +151,21 @@ def _columns(key: str, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping
             else:
                 columns[signal] = ColumnMapping(column.name, column.scale, column.offset, column.unit)
         except InputError as error:
-            raise InputError(f"{key}: columns.{signal}: {error}") from None
+            raise InputError(f"{here}: {error}") from None
     return columns
 
 
-def _check_inputs(key: str, rig: Rig, record: RecordTable) -> None:
+def _check_inputs(where: Where, own: Location, rig: Rig, record: RecordTable) -> None:
     """Refuse constant values of what is no input, is recorded, or prescribes a motion."""
     names = [signal.name for signal in rig.inputs]
     for name in record.inputs:
+        here = where.at(*own, "inputs", name)
         if name not in names:
             listed = ", ".join(names) or "none"
-            raise InputError(
-                f"{key}: inputs.{name}: no input of {rig.name}.{nearest(name, names)} Inputs: {listed}."
-            )
+            raise InputError(f"{here}: no input of {rig.name}.{nearest(name, names)} Inputs: {listed}.")
         if name in record.columns:
-            raise InputError(
-                f"{key}: inputs.{name}: stands beside columns.{name}, which reads it; give one of the two."
-            )
+            raise InputError(f"{here}: stands beside columns.{name}, which reads it; give one of the two.")
         if name not in rig.absent_inputs:
             raise InputError(
-                f"{key}: inputs.{name}: prescribes a motion of {rig.name}, which must be recorded. Map its column."
+                f"{here}: prescribes a motion of {rig.name}, which must be recorded. Map its column."
             )
