@@ -14,7 +14,7 @@ from rigsight.parameters import Parameter
 from rigsight.records.record import Record
 from rigsight.rigs import MOST_COUPLED, RIGS, Rig, joint_of
 from rigsight.simulate.signal_path import equation_tree
-from rigsight.simulate.structure import Structure, bandwidth_name, unique_names
+from rigsight.simulate.structure import Structure, ahead_name, bandwidth_name, unique_names
 
 
 def compose(
@@ -110,7 +110,9 @@ def _compose(
     assert isinstance(effects, tuple)
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
-    parameters = (*_parameters(rig, effects, unique, dict(fixed)), *map(_bandwidth, observed))
+    late = {rig.acts_at(effect) for effect in effects if effect.measured_late is not None}
+    of_observer = [*map(_bandwidth, observed), *(_ahead(sensor) for sensor in observed if sensor in late)]
+    parameters = (*_parameters(rig, effects, unique, dict(fixed)), *of_observer)
     symbols = {p.name: sp.Symbol(f"parameter {p.name}", real=True) for p in parameters}
     return Structure(
         rig=rig,
@@ -157,6 +159,12 @@ def _parameters(
 def _bandwidth(sensor: str) -> Parameter:
     return Parameter(
         bandwidth_name(sensor), f"bandwidth of the observer of {sensor}", unit="rad/s", default=0.0
+    )
+
+
+def _ahead(sensor: str) -> Parameter:
+    return Parameter(
+        ahead_name(sensor), f"time by which the motion of {sensor} is read ahead", unit="s", default=0.0
     )
 
 

@@ -58,6 +58,37 @@ class HeldInput:
         """Return the input of the first samples."""
         return replace(self, coefficients=self.coefficients[: (n_samples - 1) * self.per_sample + 1])
 
+    def read_ahead(self, column: int, by: float) -> HeldInput:
+        """Return the same with one input read some time ahead [s]: between nodes by cubic Hermite interpolation.
+
+        Beyond either end it goes on with the slope and the curvature that it has there.
+
+        Parameters
+        ----------
+        column
+            Index of the input.
+        by
+            How far; negative for what was before.
+        """
+        n, rows = self.n_pieces, self.coefficients.reshape(self.n_pieces + 1, -1, 4)
+        if n == 0 or by == 0.0:
+            return self
+        place = np.arange(n + 1) + by / self.interval
+        piece = np.clip(np.floor(place).astype(np.int64), 0, n - 1)
+        tau = self.interval * (place - piece)
+        inside = np.clip(tau, 0.0, self.interval)
+        c0, c1, c2, c3 = rows[1 + piece, column].T
+        value = c0 + inside * (c1 + inside * (c2 + inside * c3))
+        slope = c1 + inside * (2.0 * c2 + 3.0 * inside * c3)
+        bend = 2.0 * c2 + 6.0 * inside * c3
+        beyond = tau - inside
+        shifted = hold_motion(
+            value + beyond * (slope + 0.5 * beyond * bend), slope + beyond * bend, self.interval
+        )
+        found = rows.copy()
+        found[:, column] = shifted.coefficients
+        return replace(self, coefficients=found.reshape(self.coefficients.shape))
+
     def at_samples(self, n_samples: int) -> NDArray[np.float64]:
         """Return each input with its first and second derivative by time at the samples, shape (3 n_inputs, n_samples).
 

@@ -15,14 +15,14 @@ from rigsight.rigs import Coordinate
 
 
 def measured_before(shown: Sequence[sp.Expr], delay: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Return value and rate of a measured motion before a delay, by its Taylor series.
+    """Return value and rate of a measured motion before a delay, by its Taylor series: for delays that are nearly none.
 
     Parameters
     ----------
     shown
         What was measured, and its first and second derivative by time.
     delay
-        Time by which the sensor is late [s].
+        Time by which the sensor is late [s], less that by which its motion is read ahead (`read_ahead.py`).
     """
     value, rate, curvature = shown
     return value + delay * rate + delay**2 / 2 * curvature, rate + delay * curvature

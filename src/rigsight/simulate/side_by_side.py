@@ -12,6 +12,7 @@ from rigsight.simulate.compiled.kernel import FittedRecord
 from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.kinks import freeze
+from rigsight.simulate.read_ahead import read_ahead
 from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.simulation import (
     DEFAULT_ACCURACY,
@@ -57,6 +58,7 @@ def simulate_sets(
     -------
     Shape (n_samples, n_outputs, n_sets); a set that diverges holds NaN or infinity.
     """
+    held, p = read_ahead(structure, held, p)
     if structure.histories:
         return _one_by_one(structure, held, p, initial_states, n_samples)
     steps = Substeps.per_piece(

@@ -25,7 +25,7 @@ from rigsight.simulate.equation_tree import (
     shifted,
 )
 from rigsight.simulate.observer_acceleration import measured_before, observer_acceleration
-from rigsight.simulate.structure import bandwidth_name, input_symbols
+from rigsight.simulate.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.units import at_place, size_of
 
 
@@ -58,7 +58,8 @@ def equation_tree(
         Sensors of an observer, towards whose measured readings the motion is pulled.
     """
     bandwidths = {sensor: symbols[bandwidth_name(sensor)] for sensor in observed}
-    return _Path(Binder(rig, symbols, unique, fixed), rig, effects, offsets, bandwidths).tree()
+    ahead = {s: symbols[ahead_name(s)] for s in observed if ahead_name(s) in symbols}
+    return _Path(Binder(rig, symbols, unique, fixed), rig, effects, offsets, bandwidths, ahead).tree()
 
 
 def bound_to(
@@ -89,11 +90,13 @@ class _Path:
         effects: tuple[Effect, ...],
         offsets: tuple[str, ...] = (),
         bandwidths: Mapping[str, sp.Symbol] | None = None,
+        ahead: Mapping[str, sp.Symbol] | None = None,
     ) -> None:
         self._binder = binder
         self._rig = rig
         self._effects = effects
         self._bandwidths = bandwidths or {}
+        self._ahead = ahead or {}
         self._shown: dict[str, tuple[sp.Expr, sp.Expr]] = {}
         """Reading of each sensor of the observer, and the time by which it is late."""
         self._offsets = {name: sp.Symbol(f"offset of {name}", real=True) for name in offsets}
@@ -208,7 +211,7 @@ class _Path:
                 mechanism.free,
                 self._bound(sensors[name].reads),
                 (reading, rate),
-                measured_before(input_symbols(place), delay),
+                measured_before(input_symbols(place), delay - self._ahead.get(name, sp.Integer(0))),
                 bandwidth,
             )
         return found

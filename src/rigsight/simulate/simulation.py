@@ -14,6 +14,7 @@ from rigsight.simulate.compiled.kernel_cache import kernel_of
 from rigsight.simulate.composition import without_vanished_effects
 from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
 from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.simulate.read_ahead import read_ahead
 from rigsight.simulate.rest import rest_state
 from rigsight.simulate.sensor_delay import as_measured
 from rigsight.simulate.structure import Structure, bandwidth_name
@@ -198,6 +199,7 @@ def simulate_outputs(
     SimulationError
         If the motion leaves the range of numbers or the model is too stiff.
     """
+    held, p = read_ahead(structure, held, p)
     status, out, _ = kernel_of(structure).simulate_one(
         held, p, state_vector(structure, initial_state), LOCAL_PER_GLOBAL * accuracy, n_samples, taken
     )

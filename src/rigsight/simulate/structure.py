@@ -201,6 +201,24 @@ class Structure:
         ]
         return arriving[-1] if arriving else None
 
+    @cached_property
+    def observed_delays(self) -> dict[str, sp.Expr]:
+        """Time by which sensors of an observer are late, of parameters; those that are on time are left out."""
+        symbols = dict(zip(self.names, self.parameter_symbols, strict=True))
+        found: dict[str, sp.Expr] = {}
+        for effect in self.effects:
+            sensor = self.rig.acts_at(effect)
+            if effect.measured_late is None or sensor not in self.observed:
+                continue
+            values = {}
+            for own in effect.parameters:
+                name = self.parameter_name(effect, own.name)
+                values[sp.Symbol(own.name, real=True)] = (
+                    symbols[name] if name in symbols else sp.Float(dict(self.fixed)[name])
+                )
+            found[sensor] = found.get(sensor, sp.Integer(0)) + effect.measured_late.xreplace(values)
+        return found
+
     @property
     def first_shown_late(self) -> sp.Expr | None:
         """Time by which the first output is measured late, or None."""
@@ -277,6 +295,11 @@ class Structure:
 def bandwidth_name(sensor: str) -> str:
     """Return the name of the bandwidth with which an observer follows a sensor."""
     return f"bandwidth of {sensor}"
+
+
+def ahead_name(sensor: str) -> str:
+    """Return the name of the time by which the measured motion of a late sensor is read ahead for an observer."""
+    return f"reading ahead of {sensor}"
 
 
 def _slope(reading: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
