@@ -265,3 +265,18 @@ def test_a_terminal_shows_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None
         for name in ("one", "two", "three"):
             stage.finished(name)
     assert re.search(r"3/4.*\d:\d\d:\d\d.* left .*\d:\d\d:\d\d.*three", shown.getvalue())
+
+
+def test_many_folders_with_results_are_told_by_the_one_that_holds_them(
+    axis_campaign: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diagnosed(*_: object, **__: object) -> None:
+        for number in range(5):
+            write_together(tmp_path / "bench" / str(number), {"diagnosis.json": "{}"})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rigsight.workflow.diagnose.diagnose_campaign", diagnosed)
+    _, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
+    assert (
+        stderr == f"rigsight: interrupted; the results in 5 folders in {tmp_path / 'bench'} are complete.\n"
+    )

@@ -11,7 +11,8 @@ import errno
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import NoReturn
 
 import typer
@@ -23,6 +24,8 @@ from rigsight.workflow.files.results import forget_written, written
 DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
 _OF_THE_SESSION = (errno.EMFILE, errno.ENFILE, errno.EFBIG)
+_MOST_NAMED = 3
+"""Folders with results that an interruption names one by one; a bench has hundreds."""
 GOES_ON = "nothing was written; the same command goes on from there"
 """What an interrupted diagnosis leaves: no file, but the fits that it has done."""
 
@@ -56,7 +59,7 @@ def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
         leave(str(error), BAD_INPUT, isinstance(error, MachineError))
     except KeyboardInterrupt as error:
         if written():
-            left = f"the results in {', '.join(sorted({str(folder) for folder in written()}))} are complete"
+            left = f"the results in {_named(written())} are complete"
         leave(f"interrupted; {left}.", exit_code(error))
     except BrokenPipeError:
         raise
@@ -144,6 +147,16 @@ def output_told() -> Iterator[None]:
             f"the output cannot be written: {error.strerror}. Files that the command writes are complete.",
             BAD_INPUT,
         )
+
+
+def _named(folders: Iterable[Path]) -> str:
+    """Return folders in words; many by the folder that holds them all."""
+    names = sorted({str(folder) for folder in folders})
+    return (
+        ", ".join(names)
+        if len(names) <= _MOST_NAMED
+        else f"{len(names)} folders in {os.path.commonpath(names)}"
+    )
 
 
 def _leave_unread() -> NoReturn:
