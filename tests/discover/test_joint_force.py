@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from rigsight.discover import missing_forces
 from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.records.record import Record
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, read_rig_file
 from rigsight.simulate import compose, simulate
 
 DT, SECONDS = 5e-3, 4.0
@@ -78,3 +79,32 @@ def test_a_joint_that_cannot_explain_all_sensors_contradicts_them(drive_train: R
 def test_without_records_nothing_is_traced(drive_train: Rig) -> None:
     with pytest.raises(InputError, match="there is none"):
         missing_forces(drive_train, [], TRAIN, {"motor_angle": 1.0, "load_angle": 1.0})
+
+
+PENDULUM = """
+name = "pendulum"
+summary = "A pendulum swings out; nothing drives it."
+parameters.I = { unit = "kg m^2", lower = 1e-6, log = true }
+parameters.s = { unit = "kg m", lower = 0.0 }
+parameters.d = { unit = "N m s/rad", lower = 0.0 }
+coordinates.a = { unit = "rad", about = "from hanging" }
+energy = { kinetic = "I*d(a)^2/2", potential = "-9.81*s*cos(a)" }
+joints.pivot = { motion = "a", damping = "d" }
+sensors.angle = { reads = "a", unit = "rad" }
+"""
+
+
+def test_a_missing_force_is_found_in_free_motion(tmp_path: Path) -> None:
+    path = tmp_path / "pendulum.toml"
+    path.write_text(PENDULUM, encoding="utf-8")
+    rig, values = read_rig_file(path), {"I": 0.02, "s": 0.08, "d": 2e-3}
+    structure = compose(rig, [placed(effect_named("quadratic_damping"), "pivot")])
+    rng = np.random.default_rng(0)
+    records = []
+    for begin in (1.0, 0.6):
+        still = Record(f"from {begin}", DT, {"angle": np.zeros(T.size)}, {"angle": "rad"})
+        run = simulate(structure, {**values, "c_2": 2e-3}, still, np.array([begin, 0.0]))
+        records.append(run.with_signals(angle=run["angle"] + rng.normal(scale=1e-4, size=T.size)))
+    (force,) = missing_forces(rig, records, values, {"angle": 1e-4})
+    assert force.error_over_noise < 1.3
+    assert force.share > 0.9

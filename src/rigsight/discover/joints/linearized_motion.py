@@ -159,11 +159,15 @@ class MotionEquations:
         times = np.asarray(record.dt * np.arange(record.n_samples), dtype=np.float64)
         return np.ascontiguousarray(reference.T), u, times
 
+    def _inputs(self, held: HeldInput, pieces: NDArray[np.int_], tau: Floats) -> Floats:
+        """Return inputs with their derivatives within pieces, shape (3 n_inputs, n); a rig without any reads none."""
+        return _input_at(held, pieces, tau)[: 3 * len(self.structure.rig.inputs)]
+
     def _stepped(self, x: Floats, held: HeldInput, record: Record, p: Floats) -> tuple[Floats, Floats]:
         """Return the state a sample later, shape (n_states, n), and its derivatives, shape (n, n_states, n_states + n_fitted)."""
         count = x.shape[1]
         first = held.per_sample * np.arange(count)
-        steps = self._steps(x, _input_at(held, first, np.zeros(count)), p, held.interval)
+        steps = self._steps(x, self._inputs(held, first, np.zeros(count)), p, held.interval)
         h = held.interval / steps
         n, m = self._n_states, self._n_states + len(self.fitted)
         change = np.zeros((count, n, m))
@@ -195,7 +199,7 @@ class MotionEquations:
     ) -> tuple[Floats, Floats]:
         """Return the rates of states and of their derivatives within pieces of the input."""
         n = self._n_states
-        u = _input_at(held, pieces, np.full(pieces.size, tau))
+        u = self._inputs(held, pieces, np.full(pieces.size, tau))
         rates, slopes = self._rates(x, u, start + tau, p)
         growth = slopes[:, :, :n] @ change
         growth[:, :, n:] += slopes[:, :, n:]
