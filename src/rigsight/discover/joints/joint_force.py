@@ -124,10 +124,7 @@ class JointForce:
         if not self.law.terms:
             return f"No law of the motion of {self.joint} describes a force that is missing there."
         told = " and ".join(term.text for term in self.law.terms)
-        return (
-            f"A force that is missing at {self.joint} is {told}, x and v from there: "
-            f"that explains {self.law.share:.0%} of it."
-        )
+        return f"Of a force that is missing at {self.joint}, {told} explains {self.law.share:.0%}; x and v are those of the joint."
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data without the traces."""
