@@ -20,15 +20,16 @@ def verdict(scored):
         adequate: bool = False,
         at_least: float = 0.0,
         contradicted: bool = False,
+        equalled: bool = False,
     ) -> Judgement:
-        model = scored(("cubic_stiffness",), excess=best)
-        rivals = (scored(("actuator_lag",), excess=best),) if contradicted else ()
+        model, rival = (scored((name,), excess=best) for name in ("cubic_stiffness", "actuator_lag"))
+        contradicting, equal = ((rival,) if is_so else () for is_so in (contradicted, equalled))
         return judge(
             before,
             scored((), excess=linear),
             model,
             lambda _: adequate,
-            lambda: MainCause(at_least, at_least, rivals),
+            lambda: MainCause(at_least, at_least, contradicting, equal),
             lower_bound,
         )
 
@@ -92,6 +93,12 @@ def test_models_that_are_as_good_and_act_elsewhere_contradict_it(verdict) -> Non
     found = verdict(100.0, 100.0, 30.0, at_least=0.9, contradicted=True)
     assert found.verdict == "unknown"
     assert "actuator_lag" in found.reason
+
+
+def test_models_that_explain_the_same_part_from_elsewhere_are_told(verdict) -> None:
+    found = verdict(100.0, 100.0, 30.0, at_least=0.9, equalled=True)
+    assert found.verdict == "effect"
+    assert "explain the same part of it (actuator_lag)" in found.reason
 
 
 @pytest.mark.parametrize(

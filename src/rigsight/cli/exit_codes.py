@@ -152,11 +152,10 @@ def output_told() -> Iterator[None]:
 def _named(folders: Iterable[Path]) -> str:
     """Return folders in words; many by the folder that holds them all."""
     names = sorted({str(folder) for folder in folders})
-    return (
-        ", ".join(names)
-        if len(names) <= _MOST_NAMED
-        else f"{len(names)} folders in {os.path.commonpath(names)}"
-    )
+    if len(names) <= _MOST_NAMED:
+        return ", ".join(names)
+    # Some may be named from here and some from the root.
+    return f"{len(names)} folders in {os.path.commonpath([Path(name).absolute() for name in names])}"
 
 
 def _leave_unread() -> NoReturn:

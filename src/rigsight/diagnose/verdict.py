@@ -103,11 +103,9 @@ def judge(
         )
     taken = cause()
     if taken.clear:
-        place = (
-            f", but {_listed(taken.equalled_by)} would take the same part from elsewhere"
-            if taken.equalled_by
-            else " at that place"
-        )
+        place = " at that place"
+        if taken.equalled_by:
+            place = f". Effects at other places explain the same part of it ({_listed(taken.equalled_by)})"
         return Judgement(
             "effect",
             best,
@@ -118,8 +116,8 @@ def judge(
         return Judgement(
             "unknown",
             best,
-            f"{nearest}, but {_listed(taken.contradicted_by)} closes as much, acts elsewhere and explains another part of it: "
-            "they contradict each other.",
+            f"{nearest}, but effects at other places close as much and explain another part of it "
+            f"({_listed(taken.contradicted_by)}): they contradict each other.",
         )
     return Judgement(
         "unknown",

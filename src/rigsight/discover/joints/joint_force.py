@@ -124,7 +124,7 @@ class JointForce:
         if not self.law.terms:
             return f"No law of the motion of {self.joint} describes a force that is missing there."
         told = " and ".join(term.text for term in self.law.terms)
-        return f"Of a force that is missing at {self.joint}, {told} explains {self.law.share:.0%}; x and v are those of the joint."
+        return f"Of a force that is missing at {self.joint}, {told} explains {self.law.share:.0%} (x and v of the joint)."
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data without the traces."""
