@@ -54,6 +54,12 @@ def test_an_unknown_cause_says_with_what_the_rest_goes(variant: Callable[[str], 
     assert "the larger part of the gap is not explained" in sentence
 
 
+def test_beside_an_unknown_cause_nothing_smaller_is_missing() -> None:
+    left = Remainder(0.1, ("elbow",), "change of angle_2", 0.002, beside_a_cause=False)
+    assert left.text.endswith("goes with change of angle_2 (p = 0.002).")
+    assert "something smaller is missing too" in replace(left, beside_a_cause=True).text
+
+
 def test_a_number_that_differs_by_record_is_told_as_such() -> None:
     left = Remainder(0.02, (), "record: T_c", 0.001)
     assert "still goes with the record: T_c differs from one to another" in left.text

@@ -204,7 +204,7 @@ def _assembled(
         floors = tuple(_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors)
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
-        left = remainder_of(linear, judgement.model, found.adequacy, lower_bound)
+        left = remainder_of(linear, judgement.model, found.adequacy, lower_bound, is_effect)
     if judgement.verdict != "unknown":
         floors = _with_disturbance(bench, judgement.model, floors, found.windowing.bandwidth)
     return Diagnosis(

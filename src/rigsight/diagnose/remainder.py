@@ -24,12 +24,15 @@ class Remainder:
         Signal, time or record; empty where it goes with nothing.
     p_value
         Probability that noise and disturbance alone would agree as well with anything that was looked at.
+    beside_a_cause
+        True where the verdict names one: then what is left is something beside it.
     """
 
     share: float
     where: tuple[str, ...]
     goes_with: str
     p_value: float
+    beside_a_cause: bool = True
 
     @property
     def text(self) -> str:
@@ -51,6 +54,8 @@ class Remainder:
         )
         if self.share > LARGER_PART:
             return f"{left}: the larger part of the gap is not explained."
+        if not self.beside_a_cause:
+            return f"{left}."
         return (
             f"{left}: something smaller is missing too, or the equation has not quite the form of the rig's."
         )
@@ -72,7 +77,9 @@ def _in_words(goes_with: str) -> str:
     return goes_with if kind else f"the record: {what} differs from one to another"
 
 
-def remainder_of(linear: Scored, model: Scored, found: Adequacy, lower_bound: bool) -> Remainder:
+def remainder_of(
+    linear: Scored, model: Scored, found: Adequacy, lower_bound: bool, beside_a_cause: bool
+) -> Remainder:
     """Return what a model leaves.
 
     Parameters
@@ -85,11 +92,13 @@ def remainder_of(linear: Scored, model: Scored, found: Adequacy, lower_bound: bo
         Whether what it leaves goes with anything.
     lower_bound
         True if the noise floor is only a lower bound: then only what surely goes with something counts as remainder.
+    beside_a_cause
+        True where the verdict names one.
     """
     if found.adequate:
-        return Remainder(0.0, (), "", found.p_value)
+        return Remainder(0.0, (), "", found.p_value, beside_a_cause)
     share = found.agreements[0].share if found.agreements else 1.0
     above = share * model.excess**2 if lower_bound else max(model.excess**2 - 1.0, 0.0)
     whole = linear.excess**2 if lower_bound else max(linear.excess**2 - 1.0, 1e-300)
     where = (found.place,) if found.place else ()
-    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value)
+    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value, beside_a_cause)
