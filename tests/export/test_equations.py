@@ -16,7 +16,7 @@ from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
-from rigsight.simulate.compiled.kernel_equations import template
+from rigsight.simulate.compiled.c_functions import template
 from rigsight.simulate.compiled.kernel_source import ACCURATE
 from rigsight.simulate.model import Model
 

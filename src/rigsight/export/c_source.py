@@ -10,7 +10,8 @@ import sympy as sp
 from rigsight.export.description import filled, header_lines, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.equilibrium import Balance
-from rigsight.simulate.compiled.kernel_equations import FUNCTIONS, KernelEquations
+from rigsight.simulate.compiled.c_functions import FUNCTIONS
+from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.kernel_source import accurate_integrator
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.c import C

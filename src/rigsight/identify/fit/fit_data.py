@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.records.record import Record
-from rigsight.simulate import Structure, state_limits
+from rigsight.simulate import Structure, record_input, record_values, state_limits
 from rigsight.simulate.input_hold import HeldInput
 
 Result = TypeVar("Result")
@@ -98,6 +98,30 @@ class FitData:
             limits = state_limits(self.structure, p)
             sizes[self.limited] = np.maximum(limits[self.limited], _LEAST_RANGE * sizes[self.limited])
         return sizes
+
+
+def record_data(
+    structure: Structure, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
+) -> RecordData:
+    """Return a record as a fit sees it.
+
+    Parameters
+    ----------
+    structure
+        As it is simulated in the fit.
+    record
+        May lack outputs.
+    names
+        Outputs of the rig, in order.
+    output_noise
+        Standard deviation by which the residuals of each output are divided.
+    """
+    missing = np.full(record.n_samples, np.nan)
+    measured = np.column_stack([record.signals.get(n, missing) for n in names])
+    weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
+    own = record_values(structure, {}, record)
+    places = tuple((structure.names.index(name), value) for name, value in own.items())
+    return RecordData(record, record_input(structure, record), measured, weights, places)
 
 
 def weighted(record: RecordData, out: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

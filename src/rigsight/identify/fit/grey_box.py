@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rigsight.errors import SimulationError
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.covariance import colored_covariance, propagated_covariance
-from rigsight.identify.fit.fit_data import FitData, RecordData
+from rigsight.identify.fit.fit_data import FitData, record_data
 from rigsight.identify.fit.fit_memory import FitMemory, fit_key, record_digest
 from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
 from rigsight.identify.fit.fit_result import FitResult
@@ -33,8 +33,6 @@ from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
     Substeps,
-    record_input,
-    record_values,
     simulate_outputs,
     structure_of_fit,
 )
@@ -108,7 +106,7 @@ class GreyBoxFit:
         names = [signal.name for signal in structure.rig.outputs]
         self.data = FitData(
             structure=simulated,
-            records=tuple(_prepared(simulated, record, names, output_noise) for record in records),
+            records=tuple(record_data(simulated, record, names, output_noise) for record in records),
             limited=np.array([equation.limit is not None for equation in simulated.equations], dtype=bool),
             unlimited_sizes=np.array(sizes).reshape(-1, 1),
             accuracy=accuracy,
@@ -399,14 +397,3 @@ class GreyBoxFit:
         return d.measured - simulate_outputs(
             self.data.structure, d.held, d.parameters(p), state, d.record.n_samples, self.data.accuracy
         )
-
-
-def _prepared(
-    structure: Structure, record: Record, names: Sequence[str], output_noise: Mapping[str, float]
-) -> RecordData:
-    missing = np.full(record.n_samples, np.nan)
-    measured = np.column_stack([record.signals.get(n, missing) for n in names])
-    weights = np.array([1.0 / output_noise[n] if n in record else 0.0 for n in names])
-    own = record_values(structure, {}, record)
-    places = tuple((structure.names.index(name), value) for name, value in own.items())
-    return RecordData(record, record_input(structure, record), measured, weights, places)

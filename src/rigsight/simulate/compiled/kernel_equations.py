@@ -4,39 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib.resources import files
 
 import sympy as sp
 
+from rigsight.simulate.compiled.c_functions import FUNCTIONS, elements, filled, function_body, real, template
 from rigsight.simulate.expressions import gathered, hoist_constants
 from rigsight.simulate.kinks import FrozenStructure, freeze
-from rigsight.simulate.printing.c import C_LANES, C, limited
-from rigsight.simulate.straight_line import StraightLine, needed_steps
+from rigsight.simulate.printing.c import limited
 from rigsight.simulate.structure import TIME, Structure, input_symbols
-
-_NO_STEPS: Mapping[sp.Symbol, sp.Expr] = {}
-
-# Each is written where it is called: some compilers warn of those that are not.
-FUNCTIONS = {
-    "sign_of": "static inline double sign_of(double value) { return value > 0.0 ? 1.0 : (value < 0.0 ? -1.0 : 0.0); }",
-    "positive": "static inline double positive(double value) { return value > 0.0 ? value : 0.0; }",
-    "within": (
-        "static inline double within(double value, double limit) "
-        "{ return value > limit ? limit : (value < -limit ? -limit : value); }"
-    ),
-}
-
-
-def template(name: str) -> str:
-    """Return the text of one of the fixed parts of a kernel."""
-    return files("rigsight.simulate").joinpath("templates", name).read_text("utf-8")
-
-
-def filled(text: str, fragments: Mapping[str, str]) -> str:
-    """Return a template with every ``<<KEY>>`` replaced."""
-    for key, fragment in fragments.items():
-        text = text.replace(f"<<{key}>>", fragment)
-    return text
 
 
 class KernelEquations:
@@ -355,48 +330,3 @@ class KernelEquations:
             for i, equation in enumerate(self.structure.remembering_equations)
             if equation.limit is not None and equation.rate in motions
         }
-
-
-def real(name: str) -> sp.Symbol:
-    """Return a symbol that is C already."""
-    return sp.Symbol(name, real=True)
-
-
-def symbols(array: str, count: int) -> list[sp.Symbol]:
-    """Return the elements of an array of C as symbols."""
-    return [real(element) for element in elements(array, count)]
-
-
-def elements(array: str, count: int) -> list[str]:
-    """Return the elements of an array of C."""
-    return [f"{array}[{i}]" for i in range(count)]
-
-
-def function_body(
-    arguments: Sequence[str],
-    targets: Sequence[str],
-    expressions: Sequence[sp.Expr],
-    names: Mapping[sp.Symbol, str],
-    *further: str,
-    lanes: bool = False,
-    steps: Mapping[sp.Symbol, sp.Expr] = _NO_STEPS,
-) -> str:
-    """Return the body of a function; arguments that its equations happen not to read are marked for the compiler."""
-    needed = needed_steps(expressions, steps)
-    read = set().union(*(e.free_symbols for e in (*expressions, *needed.values())))
-    for symbol in sorted(read - set(needed) - set(names), key=str):
-        raise KeyError(f"The symbol {symbol} has no number: no name of a rig or an effect may reach C.")
-    lines = (C_LANES if lanes else C).statements(targets, expressions, names, needed) if targets else []
-    return _marked(arguments, lines, further)
-
-
-def lane_body(targets: Sequence[str], line: StraightLine, names: Mapping[sp.Symbol, str]) -> str:
-    """Return the body of a function of lanes that computes expressions in parts."""
-    return _marked((), C_LANES.written(targets, line, names), ())
-
-
-def _marked(arguments: Sequence[str], lines: Sequence[str], further: Sequence[str]) -> str:
-    text = "\n".join([*lines, *further])
-    unread = [a for a in arguments if f"{a}[" not in text and f"{a}->" not in text]
-    marks = [" ".join(f"(void){argument};" for argument in unread)] if unread else []
-    return "\n".join(f"    {line}" for line in [*marks, *lines, *further])

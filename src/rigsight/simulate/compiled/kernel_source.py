@@ -18,7 +18,8 @@ parameters and constants are numbered.
 
 from __future__ import annotations
 
-from rigsight.simulate.compiled.kernel_equations import KernelEquations, filled, template
+from rigsight.simulate.compiled.c_functions import filled, template
+from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.tangent_equations import carries_tangents, tangent_fragments
 from rigsight.simulate.structure import Structure
 

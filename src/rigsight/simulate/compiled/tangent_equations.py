@@ -7,15 +7,9 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from rigsight.effects.symbols import positive_part
+from rigsight.simulate.compiled.c_functions import elements, function_body, lane_body, real, symbols
 from rigsight.simulate.compiled.eliminated_forms import EliminatedForms, eliminated_forms
-from rigsight.simulate.compiled.kernel_equations import (
-    KernelEquations,
-    elements,
-    function_body,
-    lane_body,
-    real,
-    symbols,
-)
+from rigsight.simulate.compiled.kernel_equations import KernelEquations
 from rigsight.simulate.compiled.linear_forms import LinearForms, linear_forms, slope
 from rigsight.simulate.kinks import absolute
 from rigsight.simulate.printing.c import C, limited
