@@ -19,10 +19,10 @@ from rigsight.rigs.mechanism import acceleration as acceleration
 from rigsight.rigs.mechanism import force_symbol as force_symbol
 from rigsight.rigs.mechanism import has_short_inverse as has_short_inverse
 from rigsight.rigs.mechanism import reading_symbol as reading_symbol
+from rigsight.rigs.one_motion import Follower as Follower
+from rigsight.rigs.one_motion import Motion as Motion
 from rigsight.rigs.reading.rig_file import read_rig_file as read_rig_file
 from rigsight.rigs.reading.rig_file import rig_of_tables as rig_of_tables
-from rigsight.rigs.rig import Follower as Follower
-from rigsight.rigs.rig import Motion as Motion
 from rigsight.rigs.rig import Rig as Rig
 from rigsight.rigs.rig import joint_of as joint_of
 from rigsight.rigs.signal import Signal as Signal
