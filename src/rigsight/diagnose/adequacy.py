@@ -12,6 +12,8 @@ effect that no push resembles, such as a pulsating stiffness, leaves more where 
 References
 ----------
 E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for turning signs (the wild bootstrap with Rademacher weights).
+R. De Santis, J. J. Goeman, J. Hemerik, S. Davenport and L. Finos, J. Am. Stat. Assoc. (2025), doi 10.1080/01621459.2025.2491775,
+for turned signs beside fitted numbers.
 P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the smallest of several p-values.
 T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for what the size of a remainder goes with; here by ranks.
 """
@@ -27,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from rigsight.diagnose.innovations import Innovations
-from rigsight.diagnose.places.answers import Answers, orthonormal
+from rigsight.diagnose.places.answers import Answers, Followed, orthonormal
 from rigsight.diagnose.places.probes import motion_columns, signal_columns
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect, Place
@@ -43,6 +45,10 @@ SIGNIFICANCE = 0.01
 AGAINST_A_FLOOR = 0.1
 """The same for a model that leaves more than a measured floor allows: that floor speaks against it already."""
 _TURNS = 9999
+_PORTIONS = 10
+"""Turns are counted a tenth at a time, so that they need no more than some ten megabytes."""
+_SINGULAR = 1e-9
+"""Keeps a turn that parameters could follow whole from a division by zero."""
 _STRETCHES = 64
 """Stretches of all records together whose signs are turned: so many that a number which differs in one record shows, and so few
 that what a disturbance does to a sliding or sticking mass hardly reaches from one into the next (`experiments/adequacy`)."""
@@ -153,12 +159,13 @@ def adequacy(
     if not answers.can_be_compared:
         return Adequacy(0.0, (Agreement(_TOO_FAST, "", 0.0, 1.0),), significance=significance)
     innovations = Innovations(answers)
-    seen_left, new = answers.seen_left, innovations.of(answers.seen_left)
+    seen_left, new = answers.seen_left, innovations.without_free(innovations.of(answers.seen_left))
     stretches = _stretches(answers, _STRETCHES)
     signs = rng.choice([-1.0, 1.0], size=(_TURNS, len(stretches)))
     found: list[tuple[Agreement, _Turned]] = []
     for what, place, columns in _things(answers):
-        told = _turned(innovations.without_free(innovations.of(columns)), new, stretches, signs)
+        fresh = innovations.without_free(innovations.of(columns))
+        told = _turned(fresh, new, stretches, signs, innovations.followed)
         if told is None:
             continue
         # How large it is counts in the readings themselves; what is new in them says only whether it is there.
@@ -191,14 +198,29 @@ class _Turned:
         return float((1.0 + np.sum(self.by_chance >= self.reached)) / (1.0 + self.by_chance.size))
 
 
-def _turned(columns: Floats, left: Floats, stretches: Sequence[slice], signs: Floats) -> _Turned | None:
-    """Return how much goes with columns that no parameter follows; None if there are none."""
+def _turned(
+    columns: Floats, left: Floats, stretches: Sequence[slice], signs: Floats, followed: Followed | None = None
+) -> _Turned | None:
+    """Return how much goes with columns that no parameter follows; None if there are none.
+
+    What parameters and initial states took of what is left is missing from it once signs are turned, so that chance would seem
+    smaller than it is: with `followed` each turn counts in units of what it then expects.
+    """
     basis = orthonormal(columns)
     if basis.shape[1] == 0:
         return None
     # Their sum is that of what no parameter follows; each alone is whole, as chance would have it.
     along = np.array([left[part] @ basis[part] for part in stretches])
-    return _Turned(float(np.sum(np.sum(along, axis=0) ** 2)), np.sum((signs @ along) ** 2, axis=1))
+    turned = signs @ along
+    sizes = np.sum(turned**2, axis=1)
+    if followed is not None:
+        shared = followed.along(basis, stretches)
+        for some in np.array_split(np.arange(len(signs)), _PORTIONS):
+            taken = np.tensordot(signs[some], shared, axes=1)
+            expected = (1.0 + _SINGULAR) * np.eye(basis.shape[1]) - taken @ taken.transpose(0, 2, 1)
+            whole = np.linalg.solve(expected, turned[some, :, None])[:, :, 0]
+            sizes[some] = np.einsum("ij,ij->i", turned[some], whole)
+    return _Turned(float(np.sum(np.sum(along, axis=0) ** 2)), sizes)
 
 
 def _smallest(found: Sequence[_Turned]) -> float:

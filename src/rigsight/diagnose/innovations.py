@@ -62,6 +62,11 @@ class Innovations:
     ----------
     answers
         Of the equations.
+
+    Attributes
+    ----------
+    followed
+        What parameters and initial states could follow of what is new.
     """
 
     def __init__(self, answers: Answers) -> None:
@@ -70,7 +75,7 @@ class Innovations:
         left = [answers.seen_left[span].reshape(-1, n_outputs) for span in answers.spans]
         self._filters = [whitening_filter([own[:, i] for own in left]) for i in range(n_outputs)]
         by_state = [self._of_record(own) for own in answers.by_state]
-        self._followed = Followed.of(answers.spans, by_state, self.of(answers.by_parameter))
+        self.followed = Followed.of(answers.spans, by_state, self.of(answers.by_parameter))
 
     def of(self, columns: Floats) -> Floats:
         """Return what is new at each sample of weighted and stacked readings, shape (n,) or (n, m).
@@ -81,7 +86,7 @@ class Innovations:
 
     def without_free(self, columns: Floats) -> Floats:
         """Return what is left of such columns when parameters and initial states follow."""
-        return self._followed.without(columns)
+        return self.followed.without(columns)
 
     def _of_record(self, columns: Floats) -> Floats:
         found = np.array(columns)

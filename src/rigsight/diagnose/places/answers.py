@@ -75,6 +75,31 @@ class Followed:
             left[span] -= basis @ (basis.T @ left[span])
         return np.asarray(left - self.of_parameters @ (self.of_parameters.T @ left))
 
+    def along(self, basis: Floats, stretches: Sequence[slice]) -> Floats:
+        """Return what a basis and these share in stretches, none of which reaches from one record into the next.
+
+        Parameters
+        ----------
+        basis
+            Shape (n, n_columns).
+        stretches
+            Of the n readings.
+
+        Returns
+        -------
+        Products of the columns of both, shape (n_stretches, n_columns, n_followed).
+        """
+        widths = [own.shape[1] for own in self.of_states]
+        columns = [slice(int(b) - w, int(b)) for w, b in zip(widths, np.cumsum(widths), strict=True)]
+        products = np.zeros((len(stretches), basis.shape[1], sum(widths) + self.of_parameters.shape[1]))
+        for product, part in zip(products, stretches, strict=True):
+            product[:, sum(widths) :] = basis[part].T @ self.of_parameters[part]
+            for span, own, column in zip(self.spans, self.of_states, columns, strict=True):
+                if span.start <= part.start < span.stop:
+                    inside = slice(part.start - span.start, part.stop - span.start)
+                    product[:, column] = basis[part].T @ own[inside]
+        return products
+
 
 class Answers:
     """Fitted equations along records, with a push at every place.
@@ -158,8 +183,12 @@ class Answers:
         return found
 
     def seen(self, place: str) -> list[Floats]:
-        """Return what an effect at a place sees along each record: a joint's motion, a drive's signal, a sensor's reading."""
-        if place in motion_columns(self.bench.rig):
+        """Return what an effect at a place sees along each record: a joint's motion, a drive's signal, a sensor's reading.
+
+        A joint's motion is the measured one where the sensors tell it. An observer follows that by itself, and its velocity is
+        that of the equations: between the steps of an encoder a measured one is not known.
+        """
+        if place in motion_columns(self.bench.rig) and not self.structure.observed:
             return [motion[place] for motion in self.motions]
         return self.simulated(place)
 
