@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,15 +20,16 @@ from rigsight.simulate import compose, simulate
 
 DT, N, NOISE = 0.01, 2000, 1e-5
 VALUES = {"gain": 1.0, "m": 1.0, "d": 0.2, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
-CUBIC, TONE, FRICTION = (
-    effect_named(name) for name in ("cubic_stiffness", "periodic_disturbance", "coulomb_friction")
+CUBIC, TONE, FRICTION, LAG = (
+    effect_named(name)
+    for name in ("cubic_stiffness", "periodic_disturbance", "coulomb_friction", "actuator_lag")
 )
 
 
 def bench_of(own: Mapping[str, float], force: float, seed: int = 2) -> Workbench:
     """Four runs of many tones; a white force from outside swings the mass, and nobody records it."""
     rng, t = np.random.default_rng(seed), DT * np.arange(N)
-    effects = [effect for effect in (CUBIC, FRICTION) if effect.parameters[0].name in own]
+    effects = [effect for effect in (CUBIC, FRICTION, LAG) if effect.parameters[0].name in own]
     structure, records = compose(AXIS, effects), []
     for number in range(4):
         u = sum(0.3 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.4, 4.0, 0.3))
@@ -57,15 +59,15 @@ def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing(seed
     linear, single, tone, _ = modelled(bench)
     assert single.excess > 3.0
     assert tone.excess < 0.98 * single.excess
-    assert beyond_disturbance(bench, linear, [single], [tone]) == []
+    assert beyond_disturbance(Evidence(bench, linear, single), [single], [tone]) == []
 
 
 @pytest.mark.parametrize("force", [0.0, 0.01])
 def test_a_second_effect_that_is_there_stands_with_and_without_a_disturbance(force: float) -> None:
     bench = bench_of({"k_3": 2e3, "T_c": 0.02}, force)
     linear, single, tone, friction = modelled(bench)
-    assert beyond_disturbance(bench, linear, [single], [tone, friction])[-1] is friction
     evidence = Evidence(bench, linear, single)
+    assert beyond_disturbance(evidence, [single], [tone, friction])[-1] is friction
     assert evidence.criterion(friction) < min(evidence.criterion(single), evidence.criterion(tone)) - 100.0
 
 
@@ -76,3 +78,30 @@ def test_the_powers_of_force_and_noise_are_told_apart() -> None:
     # Lines are scaled so that white noise has its variance; a tenth of a record is faded.
     assert np.sqrt(noise) == pytest.approx(NOISE, rel=0.1)
     assert np.sqrt(force) == pytest.approx(0.01, rel=0.15)
+
+
+def test_what_trades_a_slow_error_for_a_fast_one_gains_nothing() -> None:
+    bench = bench_of({"k_3": 2e3, "T_c": 0.02}, 0.01)
+    linear, single, _, friction = modelled(bench)
+    evidence, rng = Evidence(bench, linear, single), np.random.default_rng(0)
+
+    def shaken(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+        return tuple(0.5 * left + rng.normal(scale=3.0 * NOISE, size=left.shape) for left in parts)
+
+    traded = replace(
+        friction,
+        fit=replace(friction.fit, residuals=shaken(single.fit.residuals)),
+        held_out=replace(friction.held_out, residuals=shaken(single.held_out.residuals)),
+    )
+    assert evidence.gain(friction, single) > 0.0 > evidence.gain(traded, single)
+    assert beyond_disturbance(evidence, [single], [traded]) == []
+
+
+def test_states_that_move_the_readings_alike_cost_as_much() -> None:
+    """Between a linear mass and its only sensor a lag of the drive is one of the sensor."""
+    bench = bench_of({"T_a": 0.03}, 0.01)
+    linear = fit_linear(bench, VALUES)
+    late = [fit_candidate(bench, (effect,), linear.fit) for effect in (LAG, effect_named("sensor_lag"))]
+    evidence = Evidence(bench, linear, linear)
+    drive, sensor = (evidence.criterion(model) for model in late)
+    assert drive == pytest.approx(sensor, abs=1.0)

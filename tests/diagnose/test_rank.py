@@ -169,3 +169,17 @@ def test_a_mean_force_of_friction_stands_before_a_constant_force_that_nobody_kne
     assert ranking.order[0] is of_its_own
     assert ranking.tied == (beside_a_force,)
     assert ranking.probabilities[0] == pytest.approx(0.75, abs=0.01)
+
+
+def test_evidence_decides_between_models_whose_errors_tell_little(scored, white) -> None:
+    """Far above the floor errors within a tenth of it count as equal, and the fewest numbers win."""
+    plain = scored(("coulomb_friction",), 9.0 * white, n_free=4)
+    true = scored(("load_dependent_friction",), 8.9 * white, n_free=5)
+    far = scored(("end_stop",), 20.0 * white, n_free=5)
+    told = {plain.names: 900.0, true.names: 0.0}
+    models, rng = [plain, true, far], np.random.default_rng(0)
+    assert rank(models, np.ones(1), rng).order[0] is plain
+    ranking = rank(models, np.ones(1), rng, criterion=lambda model: told[model.names])
+    assert ranking.order[0] is true
+    assert ranking.tied == ()
+    assert rank(models, np.ones(1), rng, criterion=lambda _: 0.0).tied == (true,)

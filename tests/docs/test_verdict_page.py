@@ -21,7 +21,7 @@ STATED = {
     "candidates.first_look._NEAR": (25.0, "within five times the RMS of the best"),
     "candidates.characterize._PROMISING": (9.0, "within three times the RMS of the best"),
     "candidates.characterize._RELEASE_GAIN": (1.02, "lowers the held-out error by 2 %"),
-    "candidates.characterize._CONTENDER": (1.5, "within 1.5 times the best"),
+    "candidates.characterize.CONTENDER": (1.5, "within 1.5 times the best"),
     "predictability.PREDICTABLE": (3.0, "more than three times what they do to the linear rig"),
     "candidates.chance._BY_CHANCE": (0.5, "at least half of what the model leaves"),
     "windows._CYCLES": (4, "windows of four cycles"),

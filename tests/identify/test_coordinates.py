@@ -192,3 +192,25 @@ def test_special_values_go_by_the_names_of_the_structure() -> None:
     assert dict(structure.fixed) == {"bouc_wen_hysteresis.n": 1.0}
     assert "power_law_stiffness.n" in structure.names
     assert structure.special_cases == {"n"}
+
+
+def test_of_ordered_parameters_the_larger_one_moves_as_its_excess() -> None:
+    """Static friction is never below sliding friction, wherever a search goes."""
+    structure = compose(AXIS, [effect_named("stribeck_friction")])
+    values = {**VALUES, "T_c": 0.3, "T_s": 0.5, "w_s": 0.02}
+    free = ("m", "d", "T_c", "T_s", "w_s")
+    coordinates = Coordinates.of(structure, free, values, SCALES)
+    theta = coordinates.from_values(values)
+    np.testing.assert_allclose(
+        coordinates.to_parameters(theta), parameter_vector(structure, values), rtol=1e-12
+    )
+    assert theta[3] == pytest.approx(0.2 / SCALES["drive"], rel=1e-9)
+    slopes = coordinates.derivatives(theta)
+    for i in range(len(free)):
+        step = 1e-6 * np.eye(len(free))[i]
+        found = (coordinates.to_parameters(theta + step) - coordinates.to_parameters(theta - step)) / 2e-6
+        np.testing.assert_allclose(slopes[:, i], found, rtol=1e-6, atol=1e-6)
+    lowest = coordinates.to_parameters(np.where(np.arange(len(free)) == 3, coordinates.lower, theta))
+    assert lowest[structure.names.index("T_s")] == lowest[structure.names.index("T_c")]
+    turned = Coordinates.of(structure, free, values, SCALES).from_values({**values, "T_s": 0.1})
+    assert coordinates.to_parameters(turned)[structure.names.index("T_s")] == pytest.approx(0.3, rel=1e-6)

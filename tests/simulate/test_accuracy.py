@@ -177,6 +177,17 @@ def test_steps_that_run_away_do_not_tell_how_many_are_needed(axis) -> None:
     assert np.std(out - exact) <= 1e-3 * np.std(exact)
 
 
+def test_a_state_that_rests_does_not_hide_that_steps_are_too_long() -> None:
+    """A free decay: the lag of the drive, a fifth of a sample, answers to nothing but its own state."""
+    structure = compose(AXIS, [effect_named("actuator_lag")])
+    values = {"gain": 1.0, "m": 2.5, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0, "T_a": 1e-3}
+    held, p, _ = prepared(structure, values, Record("decay", DT, {"u": np.zeros(600)}, {}, hold="zoh"))
+    decaying, moved = np.array([0.1, 0.0, 0.0]), np.array([0.1, 0.0, 1e-6])
+    substeps = choose_substeps(structure, held, p, decaying, 600, 1e-3)
+    out = simulate_sets(structure, held, p[:, None], moved[:, None], 600, substeps)
+    assert np.max(np.abs(out)) < 1.0
+
+
 @pytest.mark.parametrize("effect", ["bouc_wen_hysteresis", "coulomb_friction", "iwan_hysteresis"])
 def test_sets_do_not_depend_on_their_neighbors(effect, hysteresis_sets, sweep, make_record):
     record = make_record(sweep[:1500])

@@ -8,6 +8,7 @@ References
 ----------
 P. Whittle, Ark. Mat. 2 (1953) 423, for the likelihood of a spectrum. R. B. Blackman and J. W. Tukey, *The Measurement of Power
 Spectra* (Dover 1958), section B.15, for prewhitening. G. Schwarz, Ann. Statist. 6 (1978) 461, for the price of a number.
+M. J. Bayarri et al., Stat. Theory Relat. Fields 3 (2019) 2, for the price of a number that only some of the samples tell of.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize
 from scipy.signal.windows import tukey
+from scipy.special import entr
 
+from rigsight.diagnose.places.answers import Answers, orthonormal
 from rigsight.diagnose.places.probes import PUSH_SIZE, push, with_probes
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.errors import SimulationError
@@ -79,9 +82,34 @@ class Evidence:
             smooth += _FAINT * np.mean(np.abs(lines) ** 2) * np.eye(lines.shape[1])
             told += 2.0 * float(np.sum(np.linalg.slogdet(smooth)[1]))
             n_samples += left[:, measured].size
-        found = self._bench.on_all_records(model)
-        n_numbers = len(found.free) + sum(state.size for state in found.initial_states)
-        return told + n_numbers * float(np.log(max(n_samples, 1)))
+        n_free = len(self._bench.on_all_records(model).free)
+        return told + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
+
+    def gain(self, model: Scored, simpler: Scored) -> float:
+        """Return by how much a model raises the log-likelihood where noise has the spectrum that a simpler one leaves.
+
+        What is missing of the simpler model swells that spectrum. A model that has it leaves no more than that anywhere; one that
+        trades a slow error for a fast one loses.
+        """
+        gained = 0.0
+        for (left, dt), (least, _) in zip(self._remainders(simpler), self._remainders(model), strict=True):
+            measured = np.all(np.isfinite(left), axis=0)
+            expected = np.sqrt(self._spectra(left.shape[0], dt)[:, measured])
+            before, after = (np.abs(_lines(own[:, measured]) / expected) ** 2 for own in (left, least))
+            smooth = uniform_filter1d(before, _SMOOTHED, axis=0) + _FAINT * np.mean(before)
+            gained += float(np.sum((before - after) / smooth))
+        return gained
+
+    def _price_of_states(self, model: Scored) -> float:
+        """Return the price of a model's initial states: of each the logarithm of the number of samples that tell of it.
+
+        That is the entropy of their leverages, the same for all states that move the readings alike.
+        """
+        records, found = self._bench.records, self._bench.on_all_records(model)
+        answers = Answers(self._bench, records, found, model.effects, ())
+        n_states = len(answers.structure.states)
+        leverages = [np.sum(orthonormal(own[:, :n_states]) ** 2, axis=1) for own in answers.by_state]
+        return float(sum(np.sum(entr(own)) for own in leverages))
 
     def _remainders(self, model: Scored) -> list[tuple[Floats, float]]:
         """Return what a model leaves of each record that is long enough, shape (n, n_outputs), with its sample time."""

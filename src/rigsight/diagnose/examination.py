@@ -18,6 +18,7 @@ from rigsight.diagnose.data.data_quality import data_quality, with_best_model, w
 from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.data.offset_question import asked_offsets, with_offsets_free
 from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.evidence import Evidence
 from rigsight.diagnose.horizon import brings_back, preparing, windowing_of
 from rigsight.diagnose.main_cause import main_cause
 from rigsight.diagnose.places.search import Search, search_places
@@ -172,17 +173,17 @@ def examine(
         models = cut
     bench, before, linear = models.bench, models.before, models.linear
     pairs, imitations = told_apart(pairs, models.singles, allowed)
-    if not in_windows:
-        pairs = forms.with_own_evidence(models.singles, pairs)
-        pairs = beyond_disturbance(bench, linear, models.singles, pairs)
-
+    evidence = Evidence(bench, linear, _best_of(models.singles) or linear)
     if in_windows:
         checks = Checks(bench, rng, np.inf if lower_bound else MOST_LEFT)
+    else:
+        pairs = forms.with_own_evidence(models.singles, pairs)
+        pairs = beyond_disturbance(evidence, models.singles, pairs)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    ranking = rank([*models.singles, *pairs], vector, rng, linear.excess)
+    ranking = rank([*models.singles, *pairs], vector, rng, linear.excess, evidence.criterion)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
-            ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess)
+            ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess, evidence)
         if ranking.order[0].excess > allowed:
             ranking = plausible_first(ranking, linear, _places(task.rig, ranking))
         best, tied = ranking.order[0], ranking.tied
@@ -215,6 +216,11 @@ def examine(
         tuple(doubt.text for doubt in doubts(judgement.model, linear)) if judgement.model.effects else (),
         checks.of(linear).place if judgement.verdict == "unknown" else "",
     )
+
+
+def _best_of(models: Sequence[Scored]) -> Scored | None:
+    usable = [model for model in models if model.residuals and np.isfinite(model.excess)]
+    return min(usable, key=lambda model: model.excess, default=None)
 
 
 def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
@@ -373,6 +379,7 @@ def _with_offset_rivals(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
     gap: float,
+    evidence: Evidence,
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force.
 
@@ -393,4 +400,4 @@ def _with_offset_rivals(
         if is_even and bench.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng, gap)
+    return rank([*ranking.order, *rivals], noise, rng, gap, evidence.criterion)

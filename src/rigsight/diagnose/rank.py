@@ -1,13 +1,14 @@
-"""How sure the ranking is: paired block bootstrap of the held-out errors, parsimony, ambiguity."""
+"""How sure the ranking is: paired block bootstrap of the held-out errors, parsimony, tempered evidence, ambiguity."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.candidates.characterize import CONTENDER
 from rigsight.diagnose.candidates.one_law import is_linear
 from rigsight.diagnose.location.block_means import RESAMPLES, block_means
 from rigsight.diagnose.verdict import AT_FLOOR
@@ -36,6 +37,17 @@ _MODEL_ERROR = 0.1
 """Share of what the best model leaves above the noise floor that may be worth nothing for the comparison."""
 
 
+_NEGLIGIBLE = 1e-3
+"""Probability, in units of the best model's, that a model of much larger error keeps."""
+_TEMPER = 0.03
+"""Exponent of the evidence. A likelihood takes every sample at its word, and no form, no hold of an input and no filter is exact.
+
+Of 0, 0.01, 0.03, 0.06, 0.1, 0.2 and 0.5 the one with the best log score on 44 trials of the laboratory bench, seeds 5 and 6.
+There a relative of the cause was ahead by 65 and 160 nats behind filters that no model knows, and the cause by 35 to 400
+elsewhere.
+"""
+
+
 @dataclass(frozen=True)
 class Ranking:
     """Scored models in order with their probabilities.
@@ -56,9 +68,16 @@ class Ranking:
 
 
 def rank(
-    models: Sequence[Scored], noise: NDArray[np.float64], rng: np.random.Generator, gap: float = 1.0
+    models: Sequence[Scored],
+    noise: NDArray[np.float64],
+    rng: np.random.Generator,
+    gap: float = 1.0,
+    criterion: Callable[[Scored], float] | None = None,
 ) -> Ranking:
-    """Rank models by held-out error; the simplest of those that tie with the best is chosen.
+    """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
+
+    Held-out errors say what an engineer sees, and little where a force from outside or a filter leaves much of every model; there
+    the spectrum of what is left says more.
 
     Parameters
     ----------
@@ -70,6 +89,8 @@ def rank(
         Source of the resampling.
     gap
         What the rig's own equations leave, re-identified, in units of the noise floor.
+    criterion
+        Minus twice the log of a model's evidence, see `evidence`; None ranks by held-out errors alone.
 
     References
     ----------
@@ -108,14 +129,17 @@ def rank(
     lowest = np.min(np.where(plain, resampled, np.inf), axis=1, keepdims=True)
     ahead = plain & (resampled <= lowest * (1.0 + fine))
     wins = np.mean((1.0 - _HINT) * _shared(tie, prior) + _HINT * _shared(ahead, prior), axis=0)
-    likelihood = wins + 1e-3 * np.exp(-20.0 * (errors / best - 1.0))
+    weights = _evidence_of(usable, errors / best, criterion)
+    likelihood = (wins + _NEGLIGIBLE * np.exp(-20.0 * (errors / best - 1.0))) * weights
     probabilities = likelihood / np.sum(likelihood)
     chosen = int(np.argmax(probabilities))
     ratio = resampled / resampled[:, chosen : chosen + 1]
     tied = [
         i
         for i in range(len(usable))
-        if i != chosen and float(np.quantile(ratio[:, i], 0.05)) <= 1.0 + tolerance
+        if i != chosen
+        and float(np.quantile(ratio[:, i], 0.05)) <= 1.0 + tolerance
+        and weights[i] > _NEGLIGIBLE * weights[chosen]
     ]
     rest = sorted((i for i in range(len(usable)) if i != chosen), key=lambda i: errors[i])
     order = [chosen, *rest]
@@ -124,6 +148,23 @@ def rank(
         probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
         tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
     )
+
+
+def _evidence_of(
+    models: Sequence[Scored], errors: NDArray[np.float64], criterion: Callable[[Scored], float] | None
+) -> NDArray[np.float64]:
+    """Return the tempered evidence of each model in units of the largest.
+
+    Models that are far off were not fitted to their end: they have that of the least of the others.
+    """
+    if criterion is None:
+        return np.ones(len(models))
+    near = errors <= CONTENDER
+    told = np.array(
+        [criterion(model) if close else -np.inf for model, close in zip(models, near, strict=True)]
+    )
+    told[~near] = np.max(told)
+    return np.asarray(np.exp(-0.5 * _TEMPER * (told - np.min(told))))
 
 
 def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -82,24 +82,27 @@ class OtherForms:
 
 
 def beyond_disturbance(
-    bench: Workbench, linear: Scored, singles: Sequence[Scored], pairs: Sequence[Scored]
+    evidence: Evidence, singles: Sequence[Scored], pairs: Sequence[Scored]
 ) -> list[Scored]:
-    """Return the pairs that explain more than any single effect does beside a disturbance.
+    """Return the pairs that explain more than any single effect does beside a disturbance, and make nothing worse.
 
-    A disturbance swings a rig at its resonances, and a second effect with a motion of its own follows that in each record.
+    A disturbance swings a rig at its resonances, and a second effect with a motion of its own follows that in each record. Where
+    the form of the first is not quite right, a second that shakes the rig may soak up a slow error and leaves a fast one instead.
 
     Parameters
     ----------
-    bench
-        Records, scales and noise.
-    linear
-        The re-identified equations.
+    evidence
+        Of models of these records.
     singles, pairs
         Fitted and scored.
     """
-    alone = [model for model in singles if model.residuals]
+    alone = {model.names[0]: model for model in singles if model.residuals}
     if not pairs or not alone:
         return list(pairs)
-    evidence = Evidence(bench, linear, min(alone, key=lambda model: model.excess))
-    least = min(evidence.criterion(model) for model in alone)
-    return [pair for pair in pairs if not pair.residuals or evidence.criterion(pair) < least]
+    least = min(evidence.criterion(model) for model in alone.values())
+
+    def stands(pair: Scored) -> bool:
+        parts = [alone[name] for name in pair.names if name in alone]
+        return evidence.criterion(pair) < least and all(evidence.gain(pair, part) > 0.0 for part in parts)
+
+    return [pair for pair in pairs if not pair.residuals or stands(pair)]

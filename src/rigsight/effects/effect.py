@@ -164,6 +164,8 @@ class Effect:
         the records show.
     searched_as
         Parameters that a fit moves as sum and difference.
+    ordered
+        Pairs of parameters of the same dimension of which the first is never smaller; a fit moves by how much it is larger.
     starts
         Start values worth trying; default are the combinations of the parameters' own starts. A parent named there is a
         special or limiting case of this effect, and wins a tie.
@@ -194,6 +196,7 @@ class Effect:
     pulsation: str | None = None
     wave_number: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()
+    ordered: tuple[tuple[str, str], ...] = ()
     starts: tuple[Start, ...] = ()
     special_cases: dict[str, float] = field(default_factory=dict)
     needs_inertia: bool = False

@@ -10,6 +10,8 @@ T_s        level at standstill [force]
 w_s        Stribeck velocity
 =========  =========================================
 
+T_s is at least T_c: dry friction that rises with speed has a law of another form, such as a sign that is rounded.
+
 Applies to lubricated contacts that pass slowly through standstill. Not told from Coulomb friction unless the records hold
 slow passes through w_s.
 
@@ -64,6 +66,7 @@ STRIBECK_FRICTION = Effect(
     ),
     energy=Energy.DISSIPATIVE,
     signature=Signature(gain_trend=GainTrend.RISES),
+    ordered=(("T_s", "T_c"),),
     torque=(T_c + (T_s - T_c) * sp.exp(-((v / w_s) ** 2))) * sp.sign(v),
     starts=(
         Start({"T_c": 0.05 * drive_size, "T_s": 0.1 * drive_size, "w_s": 0.1 * v_size}),

@@ -23,6 +23,8 @@ from rigsight.simulate.simulation import (
 from rigsight.simulate.structure import Structure
 from rigsight.simulate.substeps import Substeps, relative_needs
 
+_NUDGE = 1e-12
+"""What moves a state that rests: far below any accuracy, and unstable steps make it large all the same."""
 _CAUTION = 0.6
 """Share of the predicted number of substeps that is tried first."""
 _SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
@@ -235,14 +237,18 @@ def choose_substeps(
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.std(exact, axis=0) + 1e-300
     state = np.asarray(initial_state, dtype=np.float64)[:, None]
+    # A state that rests stays at rest with steps that are far too long for it, until anything moves it.
+    both = np.hstack([state, state + _NUDGE * (1.0 + np.abs(state))])
+    twice = np.repeat(p[:, None], 2, axis=1)
     least, needs = 1.0, relative_needs(taken)
     for substeps in (number for number in _SUBSTEPS if number <= most):
         if substeps < least:
             continue
         steps = Substeps(substeps, needs)
-        fast = simulate_sets(structure, held, p[:, None], state, n_samples, steps)[:, :, 0]
+        fast = simulate_sets(structure, held, twice, both, n_samples, steps)
         with np.errstate(over="ignore", invalid="ignore"):
-            error = float(np.max(np.sqrt(np.mean((fast - exact) ** 2, axis=0)) / size))
+            errors = np.sqrt(np.mean((fast - exact[:, :, None]) ** 2, axis=0)) / size[:, None]
+        error = float(np.max(errors))
         if error <= accuracy:
             return steps
         # An error as large as the motion is that of unstable steps, and tells nothing of how far they are from stable ones.

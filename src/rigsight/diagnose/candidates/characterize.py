@@ -43,7 +43,7 @@ _FEWEST_REFINE_EVALUATIONS = 15
 _HOPELESS_TOLERANCE = 1e-2
 _PROMISING = 9.0
 """A candidate that costs less than this factor of the best on whole records (three times its RMS) is followed to the end."""
-_CONTENDER = 1.5
+CONTENDER = 1.5
 """A model whose held-out error is within this factor of the best is fitted to full precision."""
 _WORTH_RELEASING = 1.05
 """Excess over the floor above which a fixed exponent is released."""
@@ -226,7 +226,7 @@ def refine(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
     best = min((m.excess for m in models), default=float("inf"))
 
     def one(model: Scored) -> Scored:
-        if not (np.isfinite(model.excess) and model.excess <= _CONTENDER * best):
+        if not (np.isfinite(model.excess) and model.excess <= CONTENDER * best):
             return model
         steps = max(substeps.mean for substeps in model.fit.substeps)
         return _refined(bench, model, max(_FEWEST_REFINE_EVALUATIONS, round(_REFINE_EVALUATIONS / steps)))

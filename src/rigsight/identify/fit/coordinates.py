@@ -1,7 +1,8 @@
 """Search coordinates: parameters in characteristic units, logarithms of positive ones, and what records tell apart.
 
-Those are sum and difference of a pair, and of a spring with memory the stiffness without memory and the one with it: where the
-latter is large, the product of the spring's stiffness and its elastic share is known far better than either.
+Those are sum and difference of a pair, by how much one parameter is larger than another that it never falls below, and of a
+spring with memory the stiffness without memory and the one with it: where the latter is large, the product of the spring's
+stiffness and its elastic share is known far better than either.
 """
 
 from __future__ import annotations
@@ -68,6 +69,7 @@ class Coordinates:
     scale: NDArray[np.float64]
     logarithmic: NDArray[np.bool_]
     pairs: tuple[_Pair, ...]
+    excesses: tuple[tuple[int, int], ...]
     split: _Split | None
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
@@ -98,6 +100,13 @@ class Coordinates:
                 lower[second], upper[second] = pair.difference_range
                 exponent = None if pair.exponent is None else structure.parameter_name(effect, pair.exponent)
                 pairs.append(_Pair(first, second, exponent))
+        excesses = []
+        for effect in structure.effects:
+            for larger, smaller in effect.ordered:
+                names = [structure.parameter_name(effect, own) for own in (larger, smaller)]
+                if names[0] in free:
+                    lower[free.index(names[0])] = 0.0
+                    excesses.append((free.index(names[0]), structure.names.index(names[1])))
         split = _split(structure, free)
         if split is not None:
             stiffness = chosen[split.stiffness]
@@ -112,6 +121,7 @@ class Coordinates:
             scale=scale,
             logarithmic=logarithmic,
             pairs=tuple(pairs),
+            excesses=tuple(excesses),
             split=split,
             lower=lower,
             upper=upper,
@@ -129,6 +139,8 @@ class Coordinates:
             difference = pair.forward(theta[pair.second], power) * size
             p[self.index[pair.first]] = (total + difference) / 2.0
             p[self.index[pair.second]] = (total - difference) / 2.0
+        for larger, smaller in self.excesses:
+            p[self.index[larger]] += p[smaller]
         if self.split is not None:
             stiffness, share = self.split.stiffness, self.split.share
             whole = np.exp(theta[stiffness]) + theta[share]
@@ -150,6 +162,8 @@ class Coordinates:
             first, second = plain[pair.first], plain[pair.second]
             theta[pair.first] = pair.forward((first + second) / size, 1.0 / power)
             theta[pair.second] = pair.forward((first - second) / size, 1.0 / power)
+        for larger, smaller in self.excesses:
+            theta[larger] = (plain[larger] - p[smaller]) / self.scale[larger]
         if self.split is not None:
             whole, elastic = own[self.split.stiffness], plain[self.split.share]
             theta[self.split.stiffness] = np.log(max((1.0 - elastic) * whole, _LEAST_STIFFNESS))
@@ -187,6 +201,8 @@ class Coordinates:
             total, difference = rows
             slopes[self.index[pair.first]] = (total + difference) / 2.0
             slopes[self.index[pair.second]] = (total - difference) / 2.0
+        for larger, smaller in self.excesses:
+            slopes[self.index[larger]] += slopes[smaller]
         if self.split is not None:
             stiffness, share = self.split.stiffness, self.split.share
             with_memory, without = np.exp(theta[stiffness]), theta[share]

@@ -102,9 +102,15 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
     for name in effect.special_cases:
         if name not in names:
             yield f"special_cases names {name}, which is no parameter.{nearest(name, names)}"
-    for pair in effect.searched_as:
-        for name in {pair.first, pair.second} - set(names):
+    for searched in effect.searched_as:
+        for name in {searched.first, searched.second} - set(names):
             yield f"searched_as names {name}, which is no parameter.{nearest(name, names)}"
+    dimensions = {p.name: p.dimension for p in effect.parameters}
+    for pair in effect.ordered:
+        for name in set(pair) - set(names):
+            yield f"ordered names {name}, which is no parameter.{nearest(name, names)}"
+        if set(pair) <= set(names) and dimensions[pair[0]] != dimensions[pair[1]]:
+            yield f"ordered compares {pair[0]} with {pair[1]}, whose dimension is another."
     for field in ("elastic_share", "pulsation", "wave_number"):
         name = getattr(effect, field)
         if name is not None and name not in names:

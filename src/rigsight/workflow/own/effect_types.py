@@ -106,6 +106,13 @@ _OTHERS: dict[str, Check] = {
         ),
         "a dictionary of parameter names and numbers",
     ),
+    "ordered": (
+        lambda value: (
+            isinstance(value, tuple)
+            and all(isinstance(pair, tuple) and len(pair) == 2 and all(map(_is_text, pair)) for pair in value)
+        ),
+        'a tuple of pairs of parameter names, such as (("T_s", "T_c"),)',
+    ),
     "elastic_share": _or_none(_TEXT),
     "pulsation": _or_none(_TEXT),
     "wave_number": _or_none(_TEXT),
