@@ -77,6 +77,14 @@ def test_sound_declarations_have_no_fault():
         (changed_parameter(dimension="force angle^-1"), "unknown quantity angle"),
         ({**changed_parameter(name="v"), "torque": v * x}, "has the name of a signal"),
         ({"special_cases": {"n": 1.0}}, "special_cases names n"),
+        ({"ordered": (("c", "d"),)}, "ordered names d, which is no parameter"),
+        (
+            {
+                "parameters": (*SOUND.parameters, replace(SOUND.parameters[0], name="w", dimension="time")),
+                "ordered": (("c", "w"),),
+            },
+            "ordered compares c with w, whose dimension is another",
+        ),
     ],
 )
 def test_each_fault_is_told(changes, told):
