@@ -36,6 +36,7 @@ STATED = {
     "rank._INEXACT": (1e-3, "a thousandth of the gap"),
     "rank._PRIOR_PER_EFFECT": (1.0 / 3.0, "counts a third"),
     "rank._FINE": (1e-3, "lowest by a thousandth"),
+    "rank._TEMPER": (0.1, "raised to the power 0.1"),
     "rank._HINT": (0.9, "nine tenths to the model that is lowest"),
     "verdict.AT_FLOOR": (1.1, "excess up to 1.1;"),
     "verdict.AT_LOWER_BOUND": (3.0, "up to 3 where the floor is a lower bound"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.adequacy import AGAINST_A_FLOOR, SIGNIFICANCE, Adequacy, adequacy
 from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
-from rigsight.diagnose.candidates.characterize import fit_candidate, fit_candidates, fit_linear
+from rigsight.diagnose.candidates.characterize import contenders, fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
 from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.candidates.one_law import told_apart
@@ -180,10 +180,15 @@ def examine(
         pairs = forms.with_own_evidence(models.singles, pairs)
         pairs = beyond_disturbance(evidence, models.singles, pairs)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
-    ranking = rank([*models.singles, *pairs], vector, rng, linear.excess, evidence.criterion)
+    candidates = [*models.singles, *pairs]
+    likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
+    # A likelihood takes what is left for noise: it counts where the likeliest model leaves no more than that.
+    counts = likeliest is not None and checks.is_adequate(likeliest)
+    criterion = evidence.criterion if counts else None
+    ranking = rank(candidates, vector, rng, linear.excess, criterion)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
-            ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess, evidence)
+            ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess, criterion)
         if ranking.order[0].excess > allowed:
             ranking = plausible_first(ranking, linear, _places(task.rig, ranking))
         best, tied = ranking.order[0], ranking.tied
@@ -379,7 +384,7 @@ def _with_offset_rivals(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
     gap: float,
-    evidence: Evidence,
+    criterion: Callable[[Scored], float] | None,
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force.
 
@@ -400,4 +405,4 @@ def _with_offset_rivals(
         if is_even and bench.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng, gap, evidence.criterion)
+    return rank([*ranking.order, *rivals], noise, rng, gap, criterion)

@@ -238,6 +238,13 @@ def refine(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
     return refined
 
 
+def contenders(models: Sequence[Scored]) -> list[Scored]:
+    """Return the models that are close enough to the best one to have been fitted to full precision."""
+    usable = [model for model in models if model.residuals and np.isfinite(model.excess)]
+    best = min((model.excess for model in usable), default=float("inf"))
+    return [model for model in usable if model.excess <= CONTENDER * best]
+
+
 def _refined(bench: Workbench, model: Scored, max_evaluations: int) -> Scored:
     fit = bench.problem(model.fit.structure, bench.estimation)
     result = fit.fit(
