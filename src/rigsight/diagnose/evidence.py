@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from scipy.signal.windows import tukey
 from scipy.special import entr
 
-from rigsight.diagnose.places.answers import Answers, orthonormal
+from rigsight.diagnose.places.answers import orthonormal
 from rigsight.diagnose.places.probes import PUSH_SIZE, push, with_probes
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.errors import SimulationError
@@ -66,10 +66,17 @@ class Evidence:
         self._bench = bench
         self._responses = self._of_forces(linear)
         self._known: dict[tuple[int, float], Floats] = {}
+        # Models are kept beside what was found, so that no other has their identity.
+        self._criteria: dict[int, tuple[Scored, float]] = {}
         self.powers = self._fitted_powers(self._remainders(reference))
 
     def criterion(self, model: Scored) -> float:
         """Return minus twice the log-likelihood with the price of all numbers and initial states: the lower, the better."""
+        if id(model) not in self._criteria:
+            self._criteria[id(model)] = (model, self._criterion(model))
+        return self._criteria[id(model)][1]
+
+    def _criterion(self, model: Scored) -> float:
         told, n_samples = 0.0, 0
         for left, dt in self._remainders(model):
             measured = np.all(np.isfinite(left), axis=0)
@@ -105,10 +112,9 @@ class Evidence:
 
         That is the entropy of their leverages, the same for all states that move the readings alike.
         """
-        records, found = self._bench.records, self._bench.on_all_records(model)
-        answers = Answers(self._bench, records, found, model.effects, ())
-        n_states = len(answers.structure.states)
-        leverages = [np.sum(orthonormal(own[:, :n_states]) ** 2, axis=1) for own in answers.by_state]
+        found = self._bench.on_all_records(model)
+        answers = self._bench.problem(found.structure, self._bench.records).answers_to_states(found)
+        leverages = [np.sum(orthonormal(own) ** 2, axis=1) for own in answers]
         return float(sum(np.sum(entr(own)) for own in leverages))
 
     def _remainders(self, model: Scored) -> list[tuple[Floats, float]]:
