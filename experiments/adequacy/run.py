@@ -123,6 +123,7 @@ def draw_picture(rows: list[Row]) -> None:
     axes.set(xlabel="p-value", ylabel="share below", xlim=(0, 1), ylim=(0, 1))
     axes.legend(frameon=False)
     figure.savefig(HERE / "p_values.png", dpi=120)
+    plt.close(figure)
 
 
 def main() -> None:

@@ -73,3 +73,11 @@ def test_a_force_that_was_estimated_is_known_as_well_as_the_other_numbers(effect
     bench = bench_of(effect, truth, given)
     found = {m.names[0] for m in fit_candidates(bench, fit_linear(bench, VALUES), [EVEN, LOPSIDED])}
     assert (LOPSIDED.name in found) == (effect is LOPSIDED)
+
+
+def test_a_force_that_is_known_is_held_where_it_is_known() -> None:
+    """The constant force is far from where the given simulation has it: friction alone cannot be it, whichever way it acts."""
+    bench = bench_of(EVEN, {**VALUES, "T_c": 0.1, "force_off": -0.6}, {"force_off": 0.0})
+    found = {m.names[0]: m for m in fit_candidates(bench, fit_linear(bench, VALUES), [EVEN, LOPSIDED])}
+    assert found[LOPSIDED.name].fit.values["force_off"] == 0.0
+    assert found[LOPSIDED.name].excess > 10.0 * found[EVEN.name].excess

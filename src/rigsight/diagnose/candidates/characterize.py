@@ -120,7 +120,9 @@ def _from_hardly_any(bench: Workbench, look: Look, base: FitResult) -> Scored:
         for p in effect.parameters
         if p.null is not None
     }
-    begin = replace(base, values={**start, **base.values, **faint})
+    # A constant force that is held where somebody knows it stays there.
+    known = bench.constant_forces_beside(look.effects)
+    begin = replace(base, values={**start, **base.values, **faint, **known})
     return _fitted(bench, look.effects, structure, look.free, (begin,), promising=False)
 
 
