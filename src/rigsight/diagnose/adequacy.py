@@ -21,7 +21,7 @@ T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for what the size of
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,17 +29,13 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from rigsight.diagnose.innovations import Innovations
+from rigsight.diagnose.places.alternatives import alternatives, slopes
 from rigsight.diagnose.places.answers import Answers, Followed, orthonormal
 from rigsight.diagnose.places.probes import motion_columns, signal_columns
 from rigsight.diagnose.workbench import Scored, Workbench
-from rigsight.effects import Effect, Place
-from rigsight.effects import symbols as canonical
-from rigsight.units import characteristic_value
 
 Floats = NDArray[np.float64]
 
-BY_RECORD = "record: "
-"""Before what differs from record to record."""
 SIGNIFICANCE = 0.01
 """p-value below which a model is not adequate: one adequate model of a hundred is refused."""
 AGAINST_A_FLOOR = 0.1
@@ -57,11 +53,6 @@ _LONG_STRETCHES = 32
 _LEAST_SPREAD = 0.25
 """Share of the stretches over which a remainder must be spread, as their number that would hold its power evenly. Noise is spread
 over nearly all; what stands in a few of them agrees with anything there by one turn in two, so that no p-value can tell."""
-_KNOTS = (0.02, 0.15, 0.35, 0.5, 0.65, 0.85, 0.98)
-"""Quantiles of a signal at which the corners of a piecewise linear function of it stand."""
-_PUSH = 1e-3
-"""Size of a push in units of the typical force, signal or reading at its place: the answer is proportional."""
-_TIMES = 4
 _TOO_FAST = "motion that is too fast for the sample time"
 """What a model is blamed for whose steps between samples cannot be as short as its motion needs: nothing can be compared."""
 
@@ -163,7 +154,7 @@ def adequacy(
     stretches = _stretches(answers, _STRETCHES)
     signs = rng.choice([-1.0, 1.0], size=(_TURNS, len(stretches)))
     found: list[tuple[Agreement, _Turned]] = []
-    for what, place, columns in _things(answers):
+    for what, place, columns in alternatives(answers):
         fresh = innovations.without_free(innovations.of(columns))
         told = _turned(fresh, new, stretches, signs, innovations.followed)
         if told is None:
@@ -180,6 +171,42 @@ def adequacy(
     p_values += [grown.p_value] if grown is not None else []
     ordered = tuple(sorted(agreements, key=lambda a: (a.p_value >= significance, -a.share)))
     return Adequacy(min(p_values), ordered, _is_spread(answers), significance)
+
+
+class Checks:
+    """Whether what each model leaves is noise and disturbance, asked once of each.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    rng
+        Source of the turned signs.
+    at_floor
+        What counts as the floor itself, in units of it: equations without an effect that leave more are asked for growth.
+    allowed
+        What a model may leave before the floor speaks against it, in the same units.
+    """
+
+    def __init__(self, bench: Workbench, rng: np.random.Generator, at_floor: float, allowed: float) -> None:
+        self._bench = bench
+        self._at_floor = at_floor
+        self._allowed = allowed
+        self._rng = rng
+        self._known: dict[tuple[str, ...], Adequacy] = {}
+
+    def of(self, model: Scored) -> Adequacy:
+        """Return what a model's remainder goes with."""
+        if model.names not in self._known:
+            significance = SIGNIFICANCE if model.excess <= self._allowed else AGAINST_A_FLOOR
+            # Noise that only motion makes is no reason to say that nothing is missing.
+            steady = not model.effects and model.excess > self._at_floor
+            self._known[model.names] = adequacy(self._bench, model, self._rng, significance, steady)
+        return self._known[model.names]
+
+    def is_adequate(self, model: Scored) -> bool:
+        """Return True where nothing contradicts that it is noise and disturbance."""
+        return self.of(model).adequate
 
 
 @dataclass(frozen=True)
@@ -245,7 +272,7 @@ def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
     moving: list[tuple[str, str, Sequence[Floats]]] = []
     for joint in motion_columns(rig):
         moving.append((f"how far {joint} moves", joint, answers.simulated(joint)))
-        moving.append((f"how fast {joint} moves", joint, _slopes(answers, joint)))
+        moving.append((f"how fast {joint} moves", joint, slopes(answers, joint)))
     for drive in signal_columns(rig):
         moving.append((f"how much {drive} drives", drive, answers.simulated(drive)))
     told = [
@@ -275,142 +302,3 @@ def _stretches(answers: Answers, most: int) -> list[slice]:
         edges = np.linspace(part.start, part.stop, count + 1).astype(int)
         found += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
     return found
-
-
-def law_columns(answers: Answers, effect: Effect) -> Floats:
-    """Return what any other law of the signals that an effect reads would change, at its place; shape (n, n_columns).
-
-    Parameters
-    ----------
-    answers
-        Of the equations with the effect.
-    effect
-        Any.
-    """
-    place = answers.bench.rig.acts_at(effect)
-    if effect.place in (Place.SENSOR, Place.ACTUATOR):
-        # What is limited or dead at once is no other form of what comes late, nor the other way round.
-        is_late = bool(effect.states) or effect.delay is not None or effect.measured_late is not None
-        if effect.place is Place.SENSOR:
-            return (_changes_of if is_late else _readings_of)(answers, place)
-        return (_signal_changes_of if is_late else _signals_of)(answers, place)
-    laws = [law for law in (effect.torque, effect.spring, effect.deflection) if law is not None]
-    read = {symbol for law in laws for symbol in law.free_symbols}
-    found = []
-    if canonical.v in read or effect.states:
-        found.append(_velocities_of(answers, place))
-    if canonical.v not in read or effect.states:
-        found.append(_positions_of(answers, place))
-    return np.column_stack(found)
-
-
-def _things(answers: Answers) -> Iterator[tuple[str, str, Floats]]:
-    """Yield what a remainder may go with, in words, with the place and the answers of all readings, shape (n, n_columns)."""
-    rig = answers.bench.rig
-    for joint in motion_columns(rig):
-        yield f"velocity of {joint}", joint, _velocities_of(answers, joint)
-        yield f"position of {joint}", joint, _positions_of(answers, joint)
-        yield f"time, at {joint}", joint, _pushes(answers, joint, _course(answers), _force(answers, joint))
-    for drive in signal_columns(rig):
-        yield f"signal of {drive}", drive, _signals_of(answers, drive)
-        yield f"change of {drive}", drive, _signal_changes_of(answers, drive)
-        yield f"time, at {drive}", drive, _fading_of(answers, drive)
-    for sensor in (s.name for s in rig.outputs):
-        yield f"reading of {sensor}", sensor, _readings_of(answers, sensor)
-        yield f"change of {sensor}", sensor, _changes_of(answers, sensor)
-    if len(answers.records) > 1:
-        for name in answers.free:
-            yield f"{BY_RECORD}{name}", "", _by_record(answers, answers.to_parameter(name))
-        for sensor in (s.name for s in rig.outputs):
-            ones = [np.ones(r.n_samples) for r in answers.records]
-            yield (
-                f"{BY_RECORD}offset of {sensor}",
-                sensor,
-                _by_record(answers, _reading(answers, sensor, ones)),
-            )
-
-
-def _force(answers: Answers, joint: str) -> float:
-    return _PUSH * characteristic_value(f"force@{joint}", answers.scales)
-
-
-def _signal(answers: Answers, drive: str) -> float:
-    return _PUSH * characteristic_value(f"input@{drive}", answers.scales)
-
-
-def _slopes(answers: Answers, place: str) -> list[Floats]:
-    return [np.gradient(s, r.dt) for s, r in zip(answers.simulated(place), answers.records, strict=True)]
-
-
-def _velocities_of(answers: Answers, joint: str) -> Floats:
-    return _pushes(answers, joint, _corners(_slopes(answers, joint)), _force(answers, joint))
-
-
-def _positions_of(answers: Answers, joint: str) -> Floats:
-    return _pushes(answers, joint, _corners(answers.simulated(joint)), _force(answers, joint))
-
-
-def _signals_of(answers: Answers, drive: str) -> Floats:
-    return _pushes(answers, drive, _corners(answers.simulated(drive)), _signal(answers, drive))
-
-
-def _signal_changes_of(answers: Answers, drive: str) -> Floats:
-    return _pushes(answers, drive, _corners(_slopes(answers, drive)), _signal(answers, drive))
-
-
-def _fading_of(answers: Answers, drive: str) -> Floats:
-    """Return what a drive whose strength changes slowly over each record would change."""
-    size = characteristic_value(f"input@{drive}", answers.scales)
-    faded = [
-        [c * s / size for c, s in zip(course, answers.simulated(drive), strict=True)]
-        for course in _course(answers)
-    ]
-    return _pushes(answers, drive, faded, _signal(answers, drive))
-
-
-def _readings_of(answers: Answers, sensor: str) -> Floats:
-    return _shown(answers, sensor, _corners(answers.simulated(sensor)))
-
-
-def _changes_of(answers: Answers, sensor: str) -> Floats:
-    return _shown(answers, sensor, _corners(_slopes(answers, sensor)))
-
-
-def _corners(signals: Sequence[Floats]) -> list[list[Floats]]:
-    """Return the ramps of a piecewise linear function of a signal, for each record."""
-    everything = np.concatenate(signals)
-    knots = np.unique(np.quantile(everything, _KNOTS))
-    scale = float(np.std(everything)) or 1.0
-    return [[np.maximum(s - knot, 0.0) / scale for s in signals] for knot in knots]
-
-
-def _course(answers: Answers) -> list[list[Floats]]:
-    """Return slow changes over each record."""
-    times = [np.linspace(0.0, np.pi, record.n_samples) for record in answers.records]
-    return [[np.cos(n * t) for t in times] for n in range(1, _TIMES + 1)]
-
-
-def _pushes(answers: Answers, place: str, signals: Sequence[list[Floats]], size: float) -> Floats:
-    return np.column_stack([answers.to_push(place, signal, size) for signal in signals])
-
-
-def _shown(answers: Answers, sensor: str, signals: Sequence[list[Floats]]) -> Floats:
-    return np.column_stack([answers.stacked(_reading(answers, sensor, signal)) for signal in signals])
-
-
-def _reading(answers: Answers, sensor: str, signals: Sequence[Floats]) -> list[Floats]:
-    names = [s.name for s in answers.bench.rig.outputs]
-    found = []
-    for signal in signals:
-        part = np.zeros((signal.size, len(names)))
-        part[:, names.index(sensor)] = signal
-        found.append(part)
-    return found
-
-
-def _by_record(answers: Answers, parts: Sequence[Floats]) -> Floats:
-    whole = answers.stacked(parts)
-    columns = np.zeros((whole.size, len(parts)))
-    for index, part in enumerate(answers.spans):
-        columns[part, index] = whole[part]
-    return columns

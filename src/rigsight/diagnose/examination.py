@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.adequacy import AGAINST_A_FLOOR, SIGNIFICANCE, Adequacy, adequacy
+from rigsight.diagnose.adequacy import Adequacy, Checks
 from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
 from rigsight.diagnose.candidates.characterize import contenders, fit_candidate, fit_candidates, fit_linear
 from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
@@ -159,7 +159,7 @@ def examine(
         cut = _cut(task, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
-    checks = Checks(models.bench, rng, np.inf if lower_bound else MOST_LEFT)
+    checks = Checks(models.bench, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
     if not in_windows:
         pairs = _grown(models, effects, forms, checks if lower_bound else None, task.rig.is_driven, ready)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
@@ -173,9 +173,10 @@ def examine(
         models = cut
     bench, before, linear = models.bench, models.before, models.linear
     pairs, imitations = told_apart(pairs, models.singles, allowed)
-    evidence = Evidence(bench, linear, _best_of(models.singles) or linear)
+    best_single = min(contenders(models.singles), key=lambda model: model.excess, default=linear)
+    evidence = Evidence(bench, linear, best_single)
     if in_windows:
-        checks = Checks(bench, rng, np.inf if lower_bound else MOST_LEFT)
+        checks = Checks(bench, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
     else:
         pairs = forms.with_own_evidence(models.singles, pairs)
         pairs = beyond_disturbance(evidence, models.singles, pairs)
@@ -223,11 +224,6 @@ def examine(
     )
 
 
-def _best_of(models: Sequence[Scored]) -> Scored | None:
-    usable = [model for model in models if model.residuals and np.isfinite(model.excess)]
-    return min(usable, key=lambda model: model.excess, default=None)
-
-
 def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
     low, high = floor.interval
     return replace(floor, std=factor * floor.std, interval=(factor * low, factor * high))
@@ -235,29 +231,6 @@ def _raised(floor: NoiseFloor, factor: float) -> NoiseFloor:
 
 def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:
     return {effect.name: rig.acts_at(effect) for model in ranking.order for effect in model.effects}
-
-
-class Checks:
-    """Whether what each model leaves is noise and disturbance, asked once of each."""
-
-    def __init__(self, bench: Workbench, rng: np.random.Generator, allowed: float) -> None:
-        self._bench = bench
-        self._allowed = allowed
-        self._rng = rng
-        self._known: dict[tuple[str, ...], Adequacy] = {}
-
-    def of(self, model: Scored) -> Adequacy:
-        """Return what a model's remainder goes with."""
-        if model.names not in self._known:
-            significance = SIGNIFICANCE if model.excess <= self._allowed else AGAINST_A_FLOOR
-            # Noise that only motion makes is no reason to say that nothing is missing.
-            steady = not model.effects and model.excess > AT_FLOOR
-            self._known[model.names] = adequacy(self._bench, model, self._rng, significance, steady)
-        return self._known[model.names]
-
-    def is_adequate(self, model: Scored) -> bool:
-        """Return True where nothing contradicts that it is noise and disturbance."""
-        return self.of(model).adequate
 
 
 @dataclass(frozen=True)

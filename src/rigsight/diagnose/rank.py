@@ -35,10 +35,11 @@ _PRIOR_PER_EFFECT = 1.0 / 3.0
 """Odds of one more effect between models with as many numbers and the same error."""
 _MODEL_ERROR = 0.1
 """Share of what the best model leaves above the noise floor that may be worth nothing for the comparison."""
-
-
 _NEGLIGIBLE = 1e-3
-"""Probability, in units of the best model's, that a model of much larger error keeps."""
+"""Probability, in units of the best model's, that a model keeps however large its error; one whose evidence is no more is told
+apart. A convention."""
+_FALL = 20.0
+"""Rate at which that probability falls with the relative difference of the error: to a third at 5 %. A convention."""
 _TEMPER = 0.1
 """Exponent of the evidence: one sample of ten counts, as no form, no hold of an input and no filter is exact.
 
@@ -74,7 +75,7 @@ def rank(
 ) -> Ranking:
     """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
 
-    Held-out errors say what an engineer sees, and little where a force from outside or a filter leaves much of every model; there
+    Held-out errors say what an engineer sees, and little where noise or a force from outside leaves much of every model. There
     the spectrum of what is left says more.
 
     Parameters
@@ -129,7 +130,7 @@ def rank(
     ahead = plain & (resampled <= lowest * (1.0 + fine))
     wins = np.mean((1.0 - _HINT) * _shared(tie, prior) + _HINT * _shared(ahead, prior), axis=0)
     weights = _evidence_of(usable, errors / best, criterion)
-    likelihood = (wins + _NEGLIGIBLE * np.exp(-20.0 * (errors / best - 1.0))) * weights
+    likelihood = (wins + _NEGLIGIBLE * np.exp(-_FALL * (errors / best - 1.0))) * weights
     probabilities = likelihood / np.sum(likelihood)
     chosen = int(np.argmax(probabilities))
     ratio = resampled / resampled[:, chosen : chosen + 1]

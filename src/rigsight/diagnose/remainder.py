@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.diagnose.adequacy import BY_RECORD, Adequacy
+from rigsight.diagnose.adequacy import Adequacy
 from rigsight.diagnose.main_cause import LARGER_PART
+from rigsight.diagnose.places.alternatives import BY_RECORD
 from rigsight.diagnose.workbench import Scored
 
 

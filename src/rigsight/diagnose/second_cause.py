@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigsight.diagnose.adequacy import law_columns
 from rigsight.diagnose.candidates.one_law import are_one_law, is_one_law
 from rigsight.diagnose.evidence import Evidence
+from rigsight.diagnose.places.alternatives import law_columns
 from rigsight.diagnose.places.answers import Answers, orthonormal
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
