@@ -26,6 +26,7 @@ from rigsight.diagnose.places.answers import orthonormal
 from rigsight.diagnose.places.probes import PUSH_SIZE, push, with_probes
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.errors import SimulationError
+from rigsight.identify import answers_to_states
 from rigsight.simulate import compose
 from rigsight.simulate.linearization import Linearization, linearize
 
@@ -97,6 +98,15 @@ class Evidence:
 
         What is missing of the simpler model swells that spectrum. A model that has it leaves no more than that anywhere; one that
         trades a slow error for a fast one loses.
+
+        Parameters
+        ----------
+        model, simpler
+            Fitted to the same records.
+
+        Returns
+        -------
+        In nats; no number is paid for.
         """
         gained = 0.0
         for (left, dt), (least, _) in zip(self._remainders(simpler), self._remainders(model), strict=True):
@@ -113,7 +123,7 @@ class Evidence:
         That is the entropy of their leverages, the same for all states that move the readings alike.
         """
         found = self._bench.on_all_records(model)
-        answers = self._bench.problem(found.structure, self._bench.records).answers_to_states(found)
+        answers = answers_to_states(self._bench.problem(found.structure, self._bench.records), found)
         leverages = [np.sum(orthonormal(own) ** 2, axis=1) for own in answers]
         return float(sum(np.sum(entr(own)) for own in leverages))
 

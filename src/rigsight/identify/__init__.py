@@ -17,6 +17,7 @@ from rigsight.identify.hysteresis import calibrate_to_records as calibrate_to_re
 from rigsight.identify.hysteresis import calibrate_to_responses as calibrate_to_responses
 from rigsight.identify.hysteresis import derived_quantities as derived_quantities
 from rigsight.identify.hysteresis import loop_area as loop_area
+from rigsight.identify.information import answers_to_states as answers_to_states
 from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
@@ -65,6 +66,7 @@ __all__ = [
     "SweptResponse",
     "TransferFit",
     "TransferForm",
+    "answers_to_states",
     "calibrate_to_records",
     "calibrate_to_responses",
     "characteristic_scales",

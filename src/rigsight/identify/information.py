@@ -84,12 +84,29 @@ def information(fit: GreyBoxFit, result: FitResult) -> Information:
     )
 
 
+def answers_to_states(fit: GreyBoxFit, result: FitResult) -> list[Floats]:
+    """Return how the weighted readings of each record answer to its initial states and free offsets, where a fit ended.
+
+    Parameters
+    ----------
+    fit
+        Structure, records and noise.
+    result
+        Its result.
+
+    Returns
+    -------
+    Shape (n_readings, n_states + n_offsets) each, per unit of a coordinate of the search.
+    """
+    return [answers for _, answers in _sensitivities(*_place(fit, result, result.values, ()))]
+
+
 class _Model:
     """Outputs of a fitted model as functions of its parameters, without what initial states could follow."""
 
     def __init__(self, fit: GreyBoxFit, result: FitResult, names: Sequence[str]) -> None:
         self._fit, self._result = fit, result
-        problem, theta = self._problem(result.values, names)
+        problem, theta = _place(fit, result, result.values, names)
         n, slopes = len(names), problem.coordinates.jacobian(theta[: len(names)])
         self._residuals, self._followed, self.rows = [], [], []
         for residual, derivative in _sensitivities(problem, theta):
@@ -101,19 +118,9 @@ class _Model:
             self._followed.append(basis)
             self.rows.append(own - basis @ (basis.T @ own))
 
-    def _problem(self, values: Mapping[str, float], free: Sequence[str]) -> tuple[Problem, Floats]:
-        data, result = self._fit.data, self._result
-        coordinates = Coordinates.of(self._fit.structure, free, values, self._fit.scales)
-        own = coordinates.from_values(values)
-        sizes = data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
-        theta = np.concatenate([own, *(state / sizes for state in result.initial_states)])
-        problem = Problem(data, coordinates, sizes.size, np.full(theta.size, np.inf))
-        problem.substeps = list(result.substeps)
-        return problem, theta
-
     def change(self, values: Mapping[str, float]) -> float:
         """Return the length of the change of all weighted outputs when parameters take other values."""
-        problem, theta = self._problem(values, ())
+        problem, theta = _place(self._fit, self._result, values, ())
         total = 0.0
         for (moved, _), residual, basis in zip(
             problem.sensitivities(theta), self._residuals, self._followed, strict=True
@@ -121,6 +128,19 @@ class _Model:
             change = moved - residual
             total += float(np.sum((change - basis @ (basis.T @ change)) ** 2))
         return float(np.sqrt(total))
+
+
+def _place(
+    fit: GreyBoxFit, result: FitResult, values: Mapping[str, float], free: Sequence[str]
+) -> tuple[Problem, Floats]:
+    """Return the problem and the coordinates of parameter values, with the initial states and steps of a result."""
+    coordinates = Coordinates.of(fit.structure, free, values, fit.scales)
+    own = coordinates.from_values(values)
+    sizes = fit.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
+    theta = np.concatenate([own, *(state / sizes for state in result.initial_states)])
+    problem = Problem(fit.data, coordinates, sizes.size, np.full(theta.size, np.inf))
+    problem.substeps = list(result.substeps)
+    return problem, theta
 
 
 def _sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:

@@ -274,23 +274,6 @@ class GreyBoxFit:
         relative = sizes / np.diag(begin.coordinates.jacobian(begin.theta[:n]))
         return np.asarray(own * np.outer(relative, relative))
 
-    def answers_to_states(self, fit: FitResult) -> list[NDArray[np.float64]]:
-        """Return how the weighted readings of each record answer to its initial states and free offsets, where a fit ended.
-
-        Parameters
-        ----------
-        fit
-            Of these equations to these records.
-
-        Returns
-        -------
-        Shape (n_readings, n_states + n_offsets) each.
-        """
-        begin = self._begin(fit.values, (), fit.initial_states)
-        problem = Problem(self.data, begin.coordinates, begin.n_states, np.full(begin.theta.size, np.inf))
-        problem.substeps = list(fit.substeps)
-        return [answers for _, answers in problem.sensitivities(begin.theta)]
-
     def _recalled(self, key: str, problem: Problem, search: Callable[[], _Outcome]) -> _Outcome:
         """Return the outcome of a search, from memory if it was done before."""
         known = None if self.memory is None else self.memory.recall(key)
