@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,6 +96,21 @@ def test_what_trades_a_slow_error_for_a_fast_one_gains_nothing() -> None:
     )
     assert evidence.gain(friction, single) > 0.0 > evidence.gain(traded, single)
     assert beyond_disturbance(evidence, [single], [traded]) == []
+
+
+@pytest.mark.parametrize(
+    "changes", [{"observed": {"x": 3.0}}, {"free_offsets": ("x",)}], ids=["observer", "offsets"]
+)
+def test_evidence_is_known_under_observers_and_free_offsets(changes: dict[str, Any]) -> None:
+    bench = bench_of({"k_3": 2e3}, 0.01)
+    fitted, scored = (
+        tuple(replace(r, **changes) for r in part) for part in (bench.estimation, bench.scoring)
+    )
+    bench = replace(bench, estimation=fitted, scoring=scored, look=fitted)
+    linear = fit_linear(bench, VALUES)
+    single = fit_candidate(bench, (CUBIC,), linear.fit)
+    evidence = Evidence(bench, linear, single)
+    assert evidence.criterion(single) < evidence.criterion(linear) - 100.0
 
 
 def test_states_that_move_the_readings_alike_cost_as_much() -> None:

@@ -134,7 +134,7 @@ def _place(
     fit: GreyBoxFit, result: FitResult, values: Mapping[str, float], free: Sequence[str]
 ) -> tuple[Problem, Floats]:
     """Return the problem and the coordinates of parameter values, with the initial states and steps of a result."""
-    coordinates = Coordinates.of(fit.structure, free, values, fit.scales)
+    coordinates = Coordinates.of(fit.data.structure, free, values, fit.scales)
     own = coordinates.from_values(values)
     sizes = fit.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
     theta = np.concatenate([own, *(state / sizes for state in result.initial_states)])
