@@ -83,6 +83,10 @@ def test_without_validation_records_that_is_noted() -> None:
         ({"parameters": {"m": -1.0}}, r"stage: rig\.parameters\.m: .*must lie in"),
         ({"effects": ["cubic"]}, r"Effect is 'cubic'\. Did you mean 'cubic_stiffness'"),
         ({"effects": ["cubic_stiffness"]}, r"k_3: is missing"),
+        (
+            {"effects": ["stribeck_friction"], "parameters": {"T_c": 0.5, "T_s": 0.3, "w_s": 0.1}},
+            r"parameters\.T_s: must be at least T_c = 0\.5 in stribeck_friction, got 0\.3",
+        ),
         ({"records": []}, r'none has role = "estimation"'),
         ({"records": [record(role="validation")]}, r'none has role = "estimation"'),
         ({"records": [record(), record()]}, r"several are called 'sweep'"),

@@ -154,6 +154,14 @@ def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) 
                     f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
                 )
             checked[parameter.name] = parameter.default
+    for effect in structure.effects:
+        for pair in effect.ordered:
+            larger, smaller = (structure.parameter_name(effect, name) for name in pair)
+            if checked[larger] < checked[smaller]:
+                raise InputError(
+                    f"{where.at('rig', 'parameters', larger)}: must be at least {smaller} = {checked[smaller]:g} in "
+                    f"{effect.name}, got {checked[larger]:g}."
+                )
     for alternative, determined in ((a.parameter.name, a.gives) for a in rig.alternatives):
         if alternative in checked and determined in checked:
             raise InputError(
