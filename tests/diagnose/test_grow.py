@@ -64,6 +64,27 @@ def test_two_effects_are_found_and_the_stronger_comes_first():
     assert alone["actuator_lag",] > alone["cubic_stiffness",]
 
 
+@pytest.mark.slow
+def test_three_effects_are_found_where_the_second_closes_less_than_half():
+    task = measured(
+        {"cubic_stiffness": {"k_3": 2e5}, "coulomb_friction": {"T_c": 0.05}, "actuator_lag": {"T_a": 0.01}},
+        seed=0,
+    )
+    found = diagnose(task, [effect_named(name) for name in TRIED])
+    assert found.verdict == "effect"
+    assert set(found.effects) == {"cubic_stiffness", "coulomb_friction", "actuator_lag"}
+    assert found.effects[0] == "cubic_stiffness"
+    assert found.gap["x"].after < 1.1 * found.gap["x"].noise_floor
+    best = found.candidates[0]
+    for name, true in (("k_3", 2e5), ("T_c", 0.05), ("T_a", 0.01)):
+        assert best.parameters[name].value == pytest.approx(true, abs=4.5 * best.parameters[name].std)
+    left = {frozenset(c.effects): c.excess for c in found.candidates}
+    pair = min(excess for effects, excess in left.items() if len(effects) == 2)
+    single = min(excess for effects, excess in left.items() if len(effects) == 1)
+    assert pair - 1.0 > 0.5 * (single - 1.0)
+    assert sum(share["x"] for share in found.effect_shares.values()) == pytest.approx(1.0)
+
+
 def test_one_effect_stays_one():
     task = measured({"coulomb_friction": {"T_c": 0.1}}, seed=1)
     found = diagnose(task, [effect_named(name) for name in TRIED])
@@ -99,7 +120,7 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
         beside.extend(parent.names)
         return []
 
-    monkeypatch.setattr(grow, "_grown_from", tried)
+    monkeypatch.setattr(grow, "with_one_more", tried)
     monkeypatch.setattr(grow, "refine", lambda _, pairs: pairs)
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
     grow.grown(None, singles, [nothing, spring], AT_FLOOR, 9.0, forms)

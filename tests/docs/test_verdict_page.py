@@ -25,7 +25,7 @@ STATED = {
     "predictability.PREDICTABLE": (3.0, "more than three times what they do to the linear rig"),
     "candidates.chance._BY_CHANCE": (0.5, "at least half of what the model leaves"),
     "windows._CYCLES": (4, "windows of four cycles"),
-    "candidates.grow.MOST_EFFECTS": (2, "names two effects at most"),
+    "candidates.third_effect.IN_ITS_PLACE": (1.5, "(within 1.5 times)"),
     "candidates.grow._BEAM": (1.3, "within 1.3 times the best error"),
     "candidates.grow._NOTHING_LEFT": (1.03, "leaves more than 1.03 of the floor"),
     "candidates.grow._FINEST_STEPS": (4, "more than 4 integration steps per sample"),

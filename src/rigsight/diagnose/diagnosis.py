@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.advise import advise
-from rigsight.diagnose.candidates.grow import Prepare
+from rigsight.diagnose.candidates.one_more_effect import Prepare
 from rigsight.diagnose.candidates.placed import candidates_on
 from rigsight.diagnose.detect import AT_REST
 from rigsight.diagnose.disturbance import disturbance

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from rigsight.diagnose.adequacy import Adequacy, Checks
 from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
 from rigsight.diagnose.candidates.characterize import contenders, fit_candidate, fit_candidates, fit_linear
-from rigsight.diagnose.candidates.grow import Prepare, grown, pruned
+from rigsight.diagnose.candidates.grow import grown, pruned
 from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
 from rigsight.diagnose.candidates.one_law import told_apart
+from rigsight.diagnose.candidates.one_more_effect import Prepare
 from rigsight.diagnose.data.data_quality import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data.finding import DataQuality
 from rigsight.diagnose.data.offset_question import asked_offsets, with_offsets_free
@@ -26,7 +27,7 @@ from rigsight.diagnose.plausibility import doubts, plausible_first
 from rigsight.diagnose.preparation import start_values_of, workbench_of
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
 from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
-from rigsight.diagnose.second_cause import OtherForms, beyond_disturbance
+from rigsight.diagnose.second_cause import OtherForms, beyond_disturbance, with_parts
 from rigsight.diagnose.task import Task
 from rigsight.diagnose.verdict import (
     AT_FLOOR,
@@ -178,8 +179,8 @@ def examine(
     if in_windows:
         checks = Checks(bench, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
     else:
-        pairs = forms.with_own_evidence(models.singles, pairs)
-        pairs = beyond_disturbance(evidence, models.singles, pairs)
+        stand = beyond_disturbance(evidence, models.singles, forms.with_own_evidence(models.singles, pairs))
+        pairs = with_parts(stand, pairs)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
     candidates = [*models.singles, *pairs]
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)

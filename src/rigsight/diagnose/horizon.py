@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.candidates.grow import Prepare
+from rigsight.diagnose.candidates.one_more_effect import Prepare
 from rigsight.diagnose.observer import Observer, followed_sensors
 from rigsight.diagnose.preparation import start_values_of, workbench_of
 from rigsight.diagnose.task import Task

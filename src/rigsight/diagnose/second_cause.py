@@ -1,4 +1,4 @@
-"""Has a second effect evidence of its own, or does it only soak up what the first one's inexact form leaves?
+"""Has one more effect evidence of its own, or does it only soak up what the inexact form of those before it leaves?
 
 No form is exact on a measured rig: a sign is rounded, a spring bends a little. What that leaves goes with the same signal as the
 effect itself, and many a second effect takes it up as well as a truer form of the first would. So what a pair gains is held
@@ -36,55 +36,59 @@ class OtherForms:
     def __init__(self, bench: Workbench, lower_bound: bool) -> None:
         self._bench = bench
         self._noise = 0.0 if lower_bound else 1.0
-        self._known: dict[str, float] = {}
+        self._known: dict[tuple[str, ...], float] = {}
 
-    def gain(self, single: Scored) -> float:
-        """Return by how much the mean square error of a single effect, in units of the noise floor, falls with another form."""
-        (name,) = single.names
-        if name not in self._known:
-            answers = Answers(
-                self._bench, self._bench.scoring, single.held_out, single.effects, single.fit.free
-            )
-            form = orthonormal(answers.without_free(law_columns(answers, single.effects[0])))
-            self._known[name] = float(np.sum((form.T @ answers.left) ** 2)) / answers.n_measured
-        return self._known[name]
+    def gain(self, model: Scored) -> float:
+        """Return by how much a model's mean square error, in units of the noise floor, falls with another form of one effect."""
+        if model.names not in self._known:
+            answers = Answers(self._bench, self._bench.scoring, model.held_out, model.effects, model.fit.free)
+            forms = [orthonormal(answers.without_free(law_columns(answers, e))) for e in model.effects]
+            gains = [float(np.sum((form.T @ answers.left) ** 2)) for form in forms]
+            self._known[model.names] = max(gains) / answers.n_measured
+        return self._known[model.names]
+
+    def share(self, model: Scored) -> float:
+        """Return the share of what a model leaves above the noise, of squares, that another form of one effect takes."""
+        above_noise = max(model.excess**2 - self._noise, 0.0)
+        return min(1.0, self.gain(model) / above_noise) if above_noise > 0.0 else 1.0
 
     def partners(self, single: Scored, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects that are worth trying beside a single one.
 
         Where another form of it would take most of what it leaves, only those are that make one law with it.
         """
-        above_noise = max(single.excess**2 - self._noise, 0.0)
-        if self.gain(single) < _OTHER_FORM * above_noise:
+        if self.share(single) < _OTHER_FORM:
             return list(effects)
         return [e for e in effects if are_one_law((*single.effects, e), self._bench.rig)]
 
-    def with_own_evidence(self, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
-        """Return the pairs whose second effect explains more than another form of the first would.
+    def with_own_evidence(self, singles: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
+        """Return the models without pairs whose second effect explains less than another form of the first would.
+
+        A third effect has been held against other forms of the first two before it was tried.
 
         Parameters
         ----------
         singles
             Every effect alone, fitted and scored.
-        pairs
-            Fitted and scored, with the effect first that explains more by itself.
+        larger
+            Of several effects, fitted and scored, with the effect first that explains more by itself.
         """
         alone = {model.names[0]: model for model in singles if model.residuals and np.isfinite(model.excess)}
 
-        def stands(pair: Scored) -> bool:
-            single = alone.get(pair.names[0])
+        def stands(model: Scored) -> bool:
+            single = alone.get(model.names[0])
             # Two effects that are one law are another form of each other; they are told apart by other means.
-            if single is None or not pair.residuals or is_one_law(pair):
+            if len(model.effects) > 2 or single is None or not model.residuals or is_one_law(model):
                 return True
-            return self.gain(single) < _OTHER_FORM * (single.excess**2 - pair.excess**2)
+            return self.gain(single) < _OTHER_FORM * (single.excess**2 - model.excess**2)
 
-        return [pair for pair in pairs if stands(pair)]
+        return [model for model in larger if stands(model)]
 
 
 def beyond_disturbance(
-    evidence: Evidence, singles: Sequence[Scored], pairs: Sequence[Scored]
+    evidence: Evidence, singles: Sequence[Scored], larger: Sequence[Scored]
 ) -> list[Scored]:
-    """Return the pairs that explain more than any single effect does beside a disturbance, and make nothing worse.
+    """Return the models that explain more than any single effect does beside a disturbance, and make nothing worse.
 
     A disturbance swings a rig at its resonances, and a second effect with a motion of its own follows that in each record. Where
     the form of the first is not quite right, a second that shakes the rig may soak up a slow error and leaves a fast one instead.
@@ -93,16 +97,22 @@ def beyond_disturbance(
     ----------
     evidence
         Of models of these records.
-    singles, pairs
-        Fitted and scored.
+    singles, larger
+        Of one effect and of several, fitted and scored.
     """
-    alone = {model.names[0]: model for model in singles if model.residuals}
-    if not pairs or not alone:
-        return list(pairs)
-    least = min(evidence.criterion(model) for model in alone.values())
+    alone = [model for model in singles if model.residuals]
+    if not larger or not alone:
+        return list(larger)
+    least = min(evidence.criterion(model) for model in alone)
 
-    def stands(pair: Scored) -> bool:
-        parts = [alone[name] for name in pair.names if name in alone]
-        return evidence.criterion(pair) < least and all(evidence.gain(pair, part) > 0.0 for part in parts)
+    def stands(model: Scored) -> bool:
+        parts = [part for part in (*alone, *larger) if part.residuals and set(part.names) < set(model.names)]
+        return evidence.criterion(model) < least and all(evidence.gain(model, part) > 0.0 for part in parts)
 
-    return [pair for pair in pairs if not pair.residuals or stands(pair)]
+    return [model for model in larger if not model.residuals or stands(model)]
+
+
+def with_parts(chosen: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
+    """Return the chosen models and the others of several effects that are parts of them: they tell the share of each effect."""
+    names = [set(model.names) for model in chosen]
+    return [model for model in larger if any(set(model.names) <= own for own in names)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +36,10 @@ _WIDTH = 5.4
 """Inch; on a phone, where it is scaled to the screen, letters stay readable."""
 _NAMES = 9.0
 """Size of letters beside bars [points]."""
+_LONGEST_NAME = 42
+"""Letters of a name on one line."""
+_FURTHER_LINE = 0.5
+"""Height of each further line, in rows."""
 _DETAIL_PERIODS = 5.0
 _DETAIL_SHARE = 1.0 / 12.0
 _DETAIL_MIN_SAMPLES = 60
@@ -188,12 +193,16 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         Candidates drawn, best first.
     """
     candidates = diagnosis.candidates[:limit]
-    figure = new_figure(_WIDTH, 0.85 + 0.27 * max(1, len(candidates)), layout=None)
+    shown = [fill(name, _LONGEST_NAME) for name in names[: len(candidates)]]
+    # A name of several lines needs a higher row; rows are counted from the top edge of the first.
+    heights = [1.0 + _FURTHER_LINE * name.count("\n") for name in shown] or [1.0]
+    rows = np.cumsum(heights) - 0.5 * np.array(heights)
+    figure = new_figure(_WIDTH, 0.85 + 0.27 * sum(heights), layout=None)
     ax = figure.subplots()
     finite = [c.excess for c in candidates if np.isfinite(c.excess) and c.excess > 0.0]
     left, right = min([1.0, *finite]) / 1.04, max([1.5, *finite])
     tied = set(diagnosis.ambiguous_with)
-    for row, candidate in enumerate(candidates):
+    for row, candidate in zip(rows, candidates, strict=False):
         if not (np.isfinite(candidate.excess) and candidate.excess > 0.0):
             ax.annotate("could not be scored", (max(left, 1.0), row), (6, 0), textcoords="offset points",
                         va="center", fontsize=8, color=MEASURED)  # fmt: skip
@@ -210,13 +219,14 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     ax.set_xlim(left, right * (right / left) ** 0.12)
     plain_log_ticks(ax, left, right)
     ax.axvline(1.0, color=FLOOR, linestyle=(0, (4, 2)), linewidth=1.2)
-    ax.set_yticks(range(len(candidates)), list(names[: len(candidates)]))
-    ax.set_ylim(max(1, len(candidates)) - 0.45, -0.55)
+    ax.set_yticks(rows[: len(shown)], shown)
+    ax.set_ylim(sum(heights) + 0.05, -0.05)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")
     ax.set_axisbelow(True)
     ax.set_xlabel("RMS left over / noise floor (dashed: 1, perfect)")
-    set_margins(figure, 0.14 + text_width(names[: len(candidates)], _NAMES), 0.1, 0.48, 0.08)
+    lines = [line for name in shown for line in name.split("\n")]
+    set_margins(figure, 0.14 + text_width(lines, _NAMES), 0.1, 0.48, 0.08)
     return figure
 
 

@@ -19,7 +19,7 @@ from rigsight.diagnose.candidates.first_look import (
     mean_square,
     widened,
 )
-from rigsight.diagnose.candidates.starts import restart_values, start_values
+from rigsight.diagnose.candidates.starts import restart_values, sized, start_values
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
@@ -29,8 +29,6 @@ _MOST_RESTARTS = 4
 _WORTH_RESTARTING = 1e-3
 """Share of the cost that a fit from elsewhere must remove to be followed."""
 _FAINT = 1e-3
-_ENDLESS = 1e100
-"""Null values from here on stand for infinity."""
 _LONG_PIECE = 20.0
 _STUCK = 2.0
 """Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit counts as stopped short."""
@@ -116,7 +114,7 @@ def _from_hardly_any(bench: Workbench, look: Look, base: FitResult) -> Scored:
     structure, (effect,) = look.structure, look.effects
     start = next(start_values(bench, structure, effect, base, {}))
     faint = {
-        (name := structure.parameter_name(effect, p.name)): _faint(start[name], p.null)
+        (name := structure.parameter_name(effect, p.name)): sized(start[name], p.null, _FAINT)
         for p in effect.parameters
         if p.null is not None
     }
@@ -124,11 +122,6 @@ def _from_hardly_any(bench: Workbench, look: Look, base: FitResult) -> Scored:
     known = bench.constant_forces_beside(look.effects)
     begin = replace(base, values={**start, **base.values, **faint, **known})
     return _fitted(bench, look.effects, structure, look.free, (begin,), promising=False)
-
-
-def _faint(value: float, null: float) -> float:
-    """Return a value that lies by a thousandth on the side of another one from where the effect is absent."""
-    return null + _FAINT * (value - null) if abs(null) < _ENDLESS else value / _FAINT
 
 
 def _shift(model: Scored) -> float:
@@ -187,7 +180,8 @@ def _looks(
     waiting = list(effects)
 
     def one(parents: Mapping[str, FitResult], effect: Effect) -> Look:
-        return look_at(bench, (effect,), linear.fit, parents, regression)
+        regressed = regression.start(effect) if regression is not None else None
+        return look_at(bench, (effect,), linear.fit, parents, [] if regressed is None else [regressed])
 
     while waiting:
         ready = [e for e in waiting if all(p in done or p not in names for p in e.parents)]
@@ -273,8 +267,12 @@ def finished(bench: Workbench, scored: Scored) -> Scored:
     """Fit on from elsewhere, and with exponents and constant forces free that were fixed so far, where that helps."""
     scored = restarted(bench, scored)
     fixed = scored.fit.structure.fixed
-    newest = scored.effects[-1]
-    special = [scored.fit.structure.parameter_name(newest, own) for own in newest.special_cases]
+    names = [
+        scored.fit.structure.parameter_name(effect, own)
+        for effect in scored.effects
+        for own in effect.special_cases
+    ]
+    special = [name for name in names if name in dict(fixed)]
     if special:
         structure = bench.composed(scored.effects, {n: v for n, v in fixed if n not in special})
         scored = _released(bench, scored, structure, special)

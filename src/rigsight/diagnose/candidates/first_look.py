@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.candidates.starts import start_values, with_own_values
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import Effect
-from rigsight.identify import EffectRegression, FitResult
+from rigsight.identify import FitResult
 from rigsight.simulate import Structure
 
 _LOOK_EVALUATIONS = 25
@@ -79,7 +79,7 @@ def look_at(
     effects: tuple[Effect, ...],
     base: FitResult,
     parents: Mapping[str, FitResult],
-    regression: EffectRegression | None = None,
+    further: Sequence[Mapping[str, float]] = (),
     hold: frozenset[str] = frozenset(),
     substeps: Sequence[int] | None = None,
 ) -> Look:
@@ -95,8 +95,8 @@ def look_at(
         Fit without the last.
     parents
         Fits with a simpler effect in place of the last, by name of that effect.
-    regression
-        Gives one more start, where it can.
+    further
+        Own values of the last effect from which it is worth trying beside its declared starts.
     hold
         Rig parameters to keep at their base value.
     substeps
@@ -110,9 +110,7 @@ def look_at(
     if bench.given and bench.leaves_numbers_open(base):
         from_given = replace(base, values={**base.values, **bench.given})
         starts += start_values(bench, structure, effects[-1], from_given, {})
-    regressed = regression.start(effects[-1]) if regression is not None else None
-    if regressed is not None:
-        starts.append({**starts[0], **with_own_values(structure, effects[-1], base, regressed)})
+    starts += [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
     starts = [{**start, **known} for start in starts]
     nearest = _looked(bench, structure, free, starts, substeps)
     if not np.isfinite(nearest[0].cost) and bench.start:

@@ -1,8 +1,7 @@
-"""Does a second effect explain what the best one leaves? Greedy growth from the best models, each pair on held-out records.
+"""Do several effects explain what the best one leaves? Greedy growth from the best, judged by held-out records.
 
-Every effect gets a first look beside the best model; only those that lower the cost clearly are fitted with care. Then each part
-of the best pairs is fitted alone from there. What the growth cannot do without is found by the ranking: the pair competes with
-its own parts.
+Each part of the best pairs is fitted alone from there. What the growth cannot do without is found by the ranking: a model
+competes with its own parts.
 
 References
 ----------
@@ -11,37 +10,32 @@ S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forwa
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from rigsight.diagnose.candidates.characterize import finished, followed, refine
 from rigsight.diagnose.candidates.first_look import Look, look_at, widened
-from rigsight.diagnose.places.search import search_places
-from rigsight.diagnose.places.suspects import structures_of_lineup
+from rigsight.diagnose.candidates.one_more_effect import Prepare, is_among, with_one_more
+from rigsight.diagnose.candidates.third_effect import (
+    IN_ITS_PLACE,
+    parts_of,
+    with_a_third,
+    with_relatives,
+)
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
-from rigsight.simulate import Structure, carried_over
+from rigsight.simulate import carried_over
 
-MOST_EFFECTS = 2
-"""Effects that a verdict can name together."""
 _BEAM = 1.3
 """Singles are grown if their held-out error is within this factor of the best: the simplest, and the best that is unlike it."""
 _TIE = 1.01
-_WORTH_FOLLOWING = 0.85
-"""Factor by which a second effect must lower the cost at a first look to be fitted with care."""
-_MOST_FOLLOWED = 6
-_NEAR_THE_BEST = 2.0
-"""Pairs that cost at most this many times the best at a first look are fitted with care."""
-_BOTH_WAYS = 6
-"""Most promising pairs that are looked at from the fit of the second effect as well: a strong memory hides behind a first one."""
 _MOST_FINISHED = 2
 _MOST_PRUNED = 2
-_MOST_STEPS = 4
-"""Substeps of a first look at a pair beyond its parent's: enough for a lag of a fifth of a sample."""
+_MOST_SWAPS = 2
+"""Times that a more general effect is put into the best pair: once for each of its two."""
 _FINEST_STEPS = 4
 """Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
 and each of its partners would take as fine steps. An assumption, made for the time that it saves."""
@@ -50,15 +44,12 @@ _NOTHING_LEFT = 1.03
 
 An assumption: floors are known to a few percent.
 """
-_IN_ITS_PLACE = 1.5
-"""Effects whose held-out error alone is within this factor of the first one's are tried in its place beside the second."""
 _HALF = 0.5
-"""Share of what the best single leaves above the floor that a second effect must close, as the first must of the whole gap.
+"""Share of what is left above the floor that one more effect must close, as the first must of the whole gap.
 
 An assumption: where the form of the first is not quite that of the rig, many a second one takes a little off the rest.
+Of three effects of one size the second closes less, and the third all that is left.
 """
-
-Prepare = Callable[[Sequence[Structure]], None]
 
 
 def grown(
@@ -70,7 +61,7 @@ def grown(
     forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return pairs of effects that close at least half of what the best single leaves, fitted and scored.
+    """Return models of two and three effects that close half or more of what the best with one less leaves, fitted and scored.
 
     Parameters
     ----------
@@ -91,7 +82,7 @@ def grown(
 
     Returns
     -------
-    Pairs with the effect first that explains more by itself.
+    Each with the effect first that explains more by itself.
     """
     usable = sorted((m for m in singles if m.residuals and np.isfinite(m.excess)), key=lambda m: m.excess)
     if not usable or usable[0].excess <= at_floor:
@@ -105,7 +96,7 @@ def grown(
     first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= _FINEST_STEPS]
-    allowed = usable[0].excess - _HALF * (usable[0].excess - 1.0)
+    allowed = _half_closed(usable[0].excess)
     # An effect that was left out of the singles, as another says the same, may still be half of a pair.
     alone = {effect.name: np.inf for effect in effects} | {model.names[0]: model.excess for model in singles}
     pairs: list[Scored] = []
@@ -118,16 +109,16 @@ def grown(
     for parent, enough in parents:
         if parent not in tried and min((pair.excess for pair in pairs), default=np.inf) > enough:
             tried.append(parent)
-            pairs += _grown_from(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
+            pairs += with_one_more(bench, parent, forms.partners(parent, effects), pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
     if best_pair is not None and best_pair.excess <= allowed:
         # What came second may be right and the first only its relative: another as good alone may do better in its place.
         for second in (model for model in usable if model not in tried):
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
-                instead = [e for e in effects if alone[e.name] <= _IN_ITS_PLACE * alone[name]]
-                pairs += _grown_from(bench, second, forms.partners(second, instead), pairs, usable, prepare)
-    for _ in range(MOST_EFFECTS):
+                instead = [e for e in effects if alone[e.name] <= IN_ITS_PLACE * alone[name]]
+                pairs += with_one_more(bench, second, forms.partners(second, instead), pairs, usable, prepare)
+    for _ in range(_MOST_SWAPS):
         best_pair = min(pairs, key=lambda pair: pair.excess, default=None)
         if best_pair is None or not _NOTHING_LEFT < best_pair.excess <= allowed:
             break
@@ -137,11 +128,26 @@ def grown(
     last = pairs[:_MOST_FINISHED][-1].excess if pairs else 0.0
     n_finished = sum(pair.excess <= _TIE * last for pair in pairs)
     pairs = [*(finished(bench, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
-    return [
-        replace(pair, effects=tuple(sorted(pair.effects, key=lambda effect: alone[effect.name])))
-        for pair in refine(bench, pairs)
-        if pair.excess <= allowed
+    pairs = refine(bench, pairs)
+    triples = with_a_third(bench, usable, pairs, effects, at_floor, forms, prepare)
+    nearest = min((pair.excess for pair in pairs), default=np.inf)
+    triples = [triple for triple in triples if triple.excess <= _half_closed(nearest)]
+    if triples:
+        triples = with_relatives(bench, triples, pairs, usable, effects, prepare)
+        pairs += parts_of(bench, min(triples, key=lambda triple: triple.excess), pairs)
+    of_triples = [set(triple.names) for triple in triples]
+    pairs = [
+        pair for pair in pairs if pair.excess <= allowed or any(set(pair.names) < own for own in of_triples)
     ]
+    return [
+        replace(model, effects=tuple(sorted(model.effects, key=lambda effect: alone[effect.name])))
+        for model in (*pairs, *triples)
+    ]
+
+
+def _half_closed(left: float) -> float:
+    """Return what one more effect may leave of what is left, in units of the noise floor."""
+    return left - _HALF * (left - 1.0)
 
 
 def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect]) -> Scored:
@@ -186,25 +192,6 @@ def pruned(bench: Workbench, singles: Sequence[Scored], pairs: Sequence[Scored])
     return list(better.values())
 
 
-def _grown_from(
-    bench: Workbench,
-    parent: Scored,
-    effects: Sequence[Effect],
-    known: Sequence[Scored],
-    singles: Sequence[Scored],
-    prepare: Prepare | None,
-) -> list[Scored]:
-    open_ones = [
-        effect
-        for effect in bench.offered(effects)
-        if effect not in parent.effects and not _known_pair(known, parent, effect)
-    ]
-    if prepare is not None:
-        prepare(structures_of_lineup(bench.rig, open_ones, (*bench.modelled, *parent.effects)))
-    partners = search_places(bench, parent, open_ones).effects
-    return _pairs(bench, parent, partners, singles, prepare)
-
-
 def _more_general(
     bench: Workbench,
     pair: Scored,
@@ -226,7 +213,7 @@ def _more_general(
                 for child in bench.offered(effects)
                 if member.name in child.parents
                 and child != other
-                and not _known_pair(known, alone[other.name], child)
+                and not is_among(known, {*alone[other.name].names, child.name})
             ]
     if prepare is not None:
         prepare([bench.simplest((other, child)) for other, child, _ in swaps])
@@ -246,63 +233,3 @@ def _alike(one: Scored, other: Scored) -> bool:
     """Return True if one is a special or limiting case of the other: what is missing beside them is the same."""
     parents = {name for model in (one, other) for effect in model.effects for name in effect.parents}
     return bool(parents & {*one.names, *other.names})
-
-
-def _known_pair(pairs: Sequence[Scored], parent: Scored, effect: Effect) -> bool:
-    return any(set(pair.names) == {*parent.names, effect.name} for pair in pairs)
-
-
-def _pairs(
-    bench: Workbench,
-    parent: Scored,
-    partners: Sequence[Effect],
-    singles: Sequence[Scored],
-    prepare: Prepare | None,
-) -> list[Scored]:
-    base = parent.fit
-    if prepare is not None:
-        prepare([bench.simplest((*parent.effects, effect)) for effect in partners])
-
-    alone = {model.names[0]: model.fit for model in singles}
-
-    def steps(effect: Effect) -> tuple[int, ...]:
-        """Return substeps that serve both: a lag needs finer ones than its parent."""
-        own = alone.get(effect.name)
-        if own is None:
-            return base.substeps
-        return tuple(max(n, min(m, _MOST_STEPS)) for n, m in zip(base.substeps, own.substeps, strict=True))
-
-    def one(effect: Effect) -> Look:
-        return look_at(bench, (*parent.effects, effect), base, {}, substeps=steps(effect))
-
-    looks = list(bench.threads.side_by_side(one, partners))
-    near = min((look.nearest for look in looks), default=float("inf"))
-
-    def wide(look: Look) -> list[Look]:
-        return widened(bench, [look], substeps=steps(look.effects[-1]), lowest=near)
-
-    found = list(bench.threads.side_by_side(wide, looks))
-    looks = sorted(itertools.chain.from_iterable(found), key=_cost)[:_BOTH_WAYS]
-
-    def other_way(found: Look) -> Look:
-        second = found.effects[-1]
-        if second.name not in alone:
-            return found
-        substeps = steps(second)
-        turned = look_at(bench, (second, *parent.effects), alone[second.name], {}, substeps=substeps)
-        (wider,) = widened(bench, [turned], substeps=substeps)
-        return min(found, replace(wider, effects=found.effects), key=_cost)
-
-    looks = list(bench.threads.side_by_side(other_way, looks))
-    lowest = min((found.cost for found in looks), default=float("inf"))
-    worth = min(_WORTH_FOLLOWING * base.cost, _NEAR_THE_BEST * lowest)
-    promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
-
-    def follow(found: Look) -> Scored:
-        return followed(bench, found, promising=True, finish=False)
-
-    return list(bench.threads.side_by_side(follow, promising[:_MOST_FOLLOWED]))
-
-
-def _cost(found: Look) -> float:
-    return found.cost

@@ -33,9 +33,10 @@ def pairs_in_windows(
     linear
         The re-identified equations on whole records.
     pairs
-        Fitted to whole records.
+        Fitted to whole records; models of more effects are left out.
     """
-    nearest = sorted(pairs, key=lambda pair: pair.excess)[:_MOST_FITTED]
+    of_two = [pair for pair in pairs if len(pair.effects) == 2]
+    nearest = sorted(of_two, key=lambda pair: pair.excess)[:_MOST_FITTED]
 
     def one(pair: Scored) -> Scored:
         return _fitted(bench, windows, linear, pair)

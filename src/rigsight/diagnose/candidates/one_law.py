@@ -7,6 +7,7 @@ fit had stopped short (seeds 3 to 8, `experiments/blind_small`).
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import sympy as sp
@@ -41,9 +42,15 @@ def told_apart(
     competing: list[Scored] = []
     imitations: list[Scored] = []
     for pair in pairs:
-        stands = not is_one_law(pair) or (pair.excess <= _EXACT and best > allowed)
+        stands = not _has_one_law(pair) or (pair.excess <= _EXACT and best > allowed)
         (competing if stands else imitations).append(pair)
     return competing, imitations
+
+
+def _has_one_law(model: Scored) -> bool:
+    """Return True where two of the effects are one law together."""
+    rig = model.fit.structure.rig
+    return any(are_one_law(two, rig) for two in itertools.combinations(model.effects, 2))
 
 
 def is_one_law(model: Scored) -> bool:

@@ -18,6 +18,9 @@ from rigsight.rigs import Rig, evaluated, joint_of
 from rigsight.simulate import Structure, carried_over
 from rigsight.units import characteristic_value
 
+_ENDLESS = 1e100
+"""Null values from here on stand for infinity."""
+
 
 def start_values(
     bench: Workbench,
@@ -120,6 +123,21 @@ def with_own_values(
         **carried_over(origin.values, origin.structure, structure),
         **{names.get(name, name): value for name, value in own.items()},
     }
+
+
+def sized(value: float, null: float, factor: float) -> float:
+    """Return a value of a parameter that makes its effect so many times as large as another one.
+
+    Parameters
+    ----------
+    value
+        The other one.
+    null
+        Where the effect is absent.
+    factor
+        Positive.
+    """
+    return null + factor * (value - null) if abs(null) < _ENDLESS else value / factor
 
 
 def _known(origin: FitResult, parent: str | None) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rigsight.diagnose.places.suspects import Lineup, Suspect
@@ -28,12 +28,18 @@ class Search:
         All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
     effects
         Candidates that are looked at.
+    most
+        Largest share of the squared remainder that a push takes away.
+    starts
+        Own values of an effect with which its push takes most away, by its name.
     others
         The rest, for a gap that none of these explains.
     """
 
     places: tuple[SuspectedPlace, ...]
     effects: tuple[Effect, ...]
+    most: float
+    starts: Mapping[str, Mapping[str, float]]
     others: tuple[Effect, ...] = ()
 
 
@@ -54,18 +60,23 @@ def search_places(bench: Workbench, model: Scored, effects: Sequence[Effect]) ->
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]
     # One mass shows in seconds what goes with its motion; what tells joints apart may stand in one of the records.
     suspects = Lineup(bench, model, liveliest=bench.rig.has_one_motion).suspects(pushing)
+    most = max((suspect.share for suspect in suspects), default=0.0)
+    starts = {suspect.effect.name: suspect.values for suspect in suspects if suspect.values}
     if bench.rig.has_one_motion:
         promising = _promising(effects, suspects)
-        return Search((), promising, tuple(effect for effect in effects if effect not in promising))
+        return Search(
+            (), promising, most, starts, tuple(effect for effect in effects if effect not in promising)
+        )
     shares = _by_place(bench, suspects)
-    most = max(shares.values(), default=0.0)
     places = sorted(
         (SuspectedPlace(name, share, share >= _WORTH_LOOKING * most) for name, share in shares.items()),
         key=lambda place: -place.share,
     )
     looked_at = {place.name for place in places if place.looked_at}
     first = [e for e in effects if _stands_for_itself(e) or bench.rig.acts_at(e) in looked_at]
-    return Search(tuple(places), tuple(first), tuple(effect for effect in effects if effect not in first))
+    return Search(
+        tuple(places), tuple(first), most, starts, tuple(effect for effect in effects if effect not in first)
+    )
 
 
 def _promising(effects: Sequence[Effect], suspects: Sequence[Suspect]) -> tuple[Effect, ...]:

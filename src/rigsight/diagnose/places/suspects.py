@@ -13,13 +13,13 @@ residual.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.candidates.starts import start_values
+from rigsight.diagnose.candidates.starts import sized, start_values
 from rigsight.diagnose.places.answers import Answers
 from rigsight.diagnose.places.probes import (
     PUSH_SIZE,
@@ -58,10 +58,21 @@ _SUBSTEPS = 4
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect at a place, and the share of the squared residual that a push of its form takes away."""
+    """An effect at a place, and the share of the squared residual that a push of its form takes away.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    share
+        What the best of its pushes takes away.
+    values
+        Values of its own parameters that make a push of that form and size; empty where there are none.
+    """
 
     effect: Effect
     share: float
+    values: Mapping[str, float] = field(default_factory=dict)
 
 
 class Lineup:
@@ -100,24 +111,30 @@ class Lineup:
 
     def _suspect(self, effect: Effect) -> Suspect:
         place = self._bench.rig.acts_at(effect)
-        pushes = [[self._signed(place, signal) for signal in signals] for signals in self._signals(effect)]
+        formed = self._signals(effect)
+        pushes = [[self._signed(place, signal) for signal in signals] for _, signals in formed]
         answers = [self._answers.to_push(place, signals, _SMALL) for signals in pushes]
         columns = self._answers.without_free(np.column_stack(answers)) if answers else np.zeros((1, 0))
         size = np.einsum("ij,ij->j", columns, columns)
         usable = np.flatnonzero(np.isfinite(size) & (size > 0.0))
         along = {int(i): float(columns[:, i] @ self._answers.left) for i in usable}
         best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[:_FITTED]
-        shares = [self._fitted_share(place, pushes[i], along[i] / size[i]) for i in best]
-        return Suspect(effect, max(shares, default=0.0))
+        found = [(*self._fitted_share(place, pushes[i], along[i] / size[i]), formed[i][0]) for i in best]
+        share, factor, own = max(found, key=lambda one: one[0], default=(0.0, 0.0, {}))
+        return Suspect(effect, share, _sized(effect, own, factor))
 
-    def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> float:
-        """Return the share of the cost that goes when a push of this form, the parameters and the initial states are fitted."""
+    def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> tuple[float, float]:
+        """Return the share of the cost that goes when a push of this form, the parameters and the initial states are fitted.
+
+        With it the size of the push.
+        """
         records = [
             record.with_signals(**{push(place): signal})
             for record, signal in zip(self._answers.records, signals, strict=True)
         ]
         fit = self._pushed(records, [*self._free, PUSH_SIZE], push_size)
-        return max(0.0, 1.0 - fit.cost / self._cost) if np.isfinite(fit.cost) else 0.0
+        share = max(0.0, 1.0 - fit.cost / self._cost) if np.isfinite(fit.cost) else 0.0
+        return share, fit.values[PUSH_SIZE]
 
     def _pushed(self, records: Sequence[Record], free: Sequence[str], push_size: float) -> FitResult:
         return self._bench.problem(self._answers.structure, records).fit(
@@ -130,11 +147,12 @@ class Lineup:
             self._fit.substeps,
         )
 
-    def _signals(self, effect: Effect) -> list[list[Floats]]:
-        """Return what an effect by itself adds along each record, from each of its starts."""
+    def _signals(self, effect: Effect) -> list[tuple[dict[str, float], list[Floats]]]:
+        """Return what an effect by itself adds along each record, from each of its starts, with its own values there."""
         place = self._bench.rig.acts_at(effect)
         if _is_late(effect):
-            return [self._late(place, time) for time in self._times(effect)]
+            (delay,) = effect.parameters
+            return [({delay.name: time}, self._late(place, time)) for time in self._times(effect)]
         structure, column = alone(effect)
         of_joint = STIFFNESS in structure.names
         starts = self._starts(effect)
@@ -157,7 +175,11 @@ class Lineup:
             )
             for own, added in zip(found, (out - without).T, strict=True):
                 own.append(added)
-        return [own for own in found if all(np.all(np.isfinite(added)) for added in own)]
+        return [
+            (own, signals)
+            for own, signals in zip(starts, found, strict=True)
+            if all(np.all(np.isfinite(added)) for added in signals)
+        ]
 
     def _beside(self, place: str, effect: Effect, index: int) -> list[Floats]:
         """Return what else an effect sees: the load of its joint, the way along which its drive pushes."""
@@ -202,6 +224,20 @@ class Lineup:
     def _signed(self, place: str, signal: Floats) -> Floats:
         """Return a signal as a push: what an effect adds at a joint resists the motion."""
         return -signal if place in motion_columns(self._bench.rig) else signal
+
+
+def _sized(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
+    """Return own values of an effect that makes so many times the push; as they are where that is no size it could have.
+
+    Where an effect is absent at a value of a parameter, its force grows with the distance from there.
+    """
+    values = {p.name: own[p.name] for p in effect.parameters if p.fitted and p.name in own}
+    if not factor > 0.0:
+        return values
+    nulls = effect.null_values()
+    return {
+        name: sized(value, nulls[name], factor) if name in nulls else value for name, value in values.items()
+    }
 
 
 def structures_of_lineup(
