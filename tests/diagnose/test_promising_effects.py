@@ -22,7 +22,7 @@ from rigsight.simulate import compose, simulate
 DT, N, NOISE = 5e-3, 2000, 2e-5
 VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
 HIDDEN: list[tuple[str, Mapping[str, float]]] = [
-    ("cubic_stiffness", {"k_3": 5e6}),
+    ("cubic_stiffness", {"k_3": 3e4}),
     ("coulomb_friction", {"T_c": 0.3}),
     ("input_dead_zone", {"u_0": 0.4}),
     ("sensor_lag", {"T_m": 0.01}),
@@ -70,6 +70,13 @@ def test_the_true_one_is_looked_at_first(name: str, values: Mapping[str, float])
     assert "periodic_disturbance" in first
     parents = {parent for effect in search.effects for parent in effect.parents}
     assert parents & {effect.name for effect in offered} <= first
+
+
+@pytest.mark.parametrize(("name", "values"), HIDDEN, ids=[name for name, _ in HIDDEN])
+def test_the_best_push_tells_how_large_the_effect_is(name: str, values: Mapping[str, float]) -> None:
+    search, _ = looked_at(name, values)
+    for own, true in values.items():
+        assert 0.5 * true < search.starts[name][own] < 2.0 * true
 
 
 def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:

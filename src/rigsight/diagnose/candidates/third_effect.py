@@ -67,7 +67,7 @@ def with_relatives(
     effects: Sequence[Effect],
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return the triples with those in which another effect stands in the place of one of the best.
+    """Return the triples, and those in which a relative stands for an effect of the best one.
 
     Found beside an incomplete model, an effect may be only a relative of the right one, or more general than what is needed.
 
@@ -82,7 +82,7 @@ def with_relatives(
     singles
         Every effect alone, fitted and scored.
     effects
-        Candidates; those are tried that explain about as much by themselves as the one in whose place they come.
+        Candidates; those are tried that act where the one does in whose place they come, and explain about as much by themselves.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     """
@@ -90,7 +90,8 @@ def with_relatives(
 
     def as_good(replaced: Effect, other: Effect) -> bool:
         near = alone.get(other.name, np.inf) <= IN_ITS_PLACE * alone.get(replaced.name, 0.0)
-        return near and other.name not in replaced.parents
+        at_its_place = bench.rig.acts_at(other) == bench.rig.acts_at(replaced)
+        return near and at_its_place and other.name not in replaced.parents
 
     def plainer(replaced: Effect, other: Effect) -> bool:
         return other.name in replaced.parents
