@@ -13,6 +13,7 @@ import numpy as np
 
 from rigsight.diagnose.candidates.characterize import finished, followed, refine
 from rigsight.diagnose.candidates.first_look import Look
+from rigsight.diagnose.candidates.one_law import are_one_law
 from rigsight.diagnose.candidates.one_more_effect import Prepare, is_among, with_one_more
 from rigsight.diagnose.main_cause import LARGER_PART
 from rigsight.diagnose.second_cause import OtherForms
@@ -82,7 +83,8 @@ def with_relatives(
     singles
         Every effect alone, fitted and scored.
     effects
-        Candidates; those are tried that act where the one does in whose place they come, and explain about as much by themselves.
+        Candidates; those are tried that explain about as much by themselves as the one in whose place they come, and act where it
+        does or are one law with it.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     """
@@ -91,7 +93,8 @@ def with_relatives(
     def as_good(replaced: Effect, other: Effect) -> bool:
         near = alone.get(other.name, np.inf) <= IN_ITS_PLACE * alone.get(replaced.name, 0.0)
         at_its_place = bench.rig.acts_at(other) == bench.rig.acts_at(replaced)
-        return near and at_its_place and other.name not in replaced.parents
+        related = at_its_place or are_one_law((replaced, other), bench.rig)
+        return near and related and other.name not in replaced.parents
 
     def plainer(replaced: Effect, other: Effect) -> bool:
         return other.name in replaced.parents
