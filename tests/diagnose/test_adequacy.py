@@ -89,6 +89,37 @@ def test_a_missing_effect_is_what_the_remainder_goes_with(
     assert asked(bench, fitted(bench, effects, values)).adequate
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "what"),
+    [
+        ("cubic_stiffness", {"k_3": 50.0}, "position of dynamics"),
+        ("quadratic_damping", {"c_2": 0.02}, "velocity of dynamics"),
+    ],
+)
+def test_it_is_told_on_an_element_too(name: str, values: dict[str, float], what: str) -> None:
+    """Its motion is prescribed: a missing force shows in the force that is measured, and moves nothing."""
+    rig, effects, noise = RIGS["element"], (effect_named(name),), 2e-3
+    known = {"d": 0.4, "k": 20.0, "force_off": 0.0}
+    rng, t = np.random.default_rng(3), DT * np.arange(2000)
+    structure, records = compose(rig, effects), []
+    for i, amplitude in enumerate((0.1, 0.2, 0.15)):
+        x = amplitude * np.sin(2.0 * np.pi * (0.3 * t + 0.05 * t**2))
+        clean = simulate(structure, {**known, **values}, Record(f"r{i}", DT, {"x": x}, {}))
+        force = clean["force"] + noise * rng.standard_normal(t.size)
+        records.append(Record(f"r{i}", DT, {"x": x, "force": force}, {}))
+    estimation, scoring = tuple(records[:2]), tuple(records[2:])
+    scales = characteristic_scales(rig, estimation, known)
+    bench = Workbench(
+        rig, estimation, scoring, estimation, scales, {"force": noise}, frozenset({"force_off"}), known
+    )
+    without = asked(bench, fit_linear(bench, known))
+    assert not without.adequate
+    assert without.agreements[0].what == what
+    completed = bench.composed(effects)
+    fit = bench.problem(completed, estimation).fit({**known, **values}, bench.free_parameters(completed))
+    assert asked(bench, bench.score(effects, fit)).adequate
+
+
 def test_a_number_that_differs_in_one_record_is_told() -> None:
     bench = axis_bench(last={"d": 2.0})
     found = asked(bench, fit_linear(bench, VALUES))

@@ -61,6 +61,18 @@ def test_a_push_at_a_joint_acts_along_its_motion() -> None:
     np.testing.assert_allclose(shown(**{push("shaft"): wave})[:, :2], apart[:, :2], atol=1e-7)
 
 
+def test_a_push_at_a_joint_shows_in_a_sensor_of_its_force() -> None:
+    element = RIGS["element"]
+    probed, wave = compose(with_probes(element)), np.sin(7.0 * T)
+    rest = {signal.name: np.zeros(N) for signal in probed.rig.inputs}
+    known = {"d": 0.4, "k": 20.0, "force_off": 0.0, PUSH_SIZE: 1.0}
+
+    def force(**inputs: np.ndarray) -> np.ndarray:
+        return simulate(probed, known, Record("pushed", DT, {**rest, **inputs}, {}))["force"]
+
+    np.testing.assert_allclose(force(x=wave) - force(x=wave, **{push("dynamics"): wave}), wave, atol=1e-9)
+
+
 def test_motions_and_signals_are_shown_behind_the_readings() -> None:
     out = shown(u=np.sin(7.0 * T))
     np.testing.assert_allclose(out[:, motion_columns(TRAIN)["shaft"]], out[:, 0] - out[:, 1], atol=1e-12)

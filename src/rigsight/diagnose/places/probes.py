@@ -105,14 +105,9 @@ def with_probes(rig: Rig) -> Rig:
     pushed = [*(joint.name for joint in mechanism.joints), *(drive.name for drive in mechanism.drives)]
     pushed += [sensor.name for sensor in mechanism.sensors]
     inputs = tuple(map(push, pushed))
-    pushes = tuple(
-        Drive(
-            f"{_PUSH}joint {joint.name}",
-            _real(push(joint.name)),
-            size * _real(f"{_PUSH}joint {joint.name}"),
-            joint.motion,
-        )
-        for joint in mechanism.joints
+    # In the joint's own force, so that a sensor which reads that force shows the push.
+    joints = tuple(
+        replace(joint, force=joint.force - size * _real(push(joint.name))) for joint in mechanism.joints
     )
     drives = tuple(
         replace(drive, signal=drive.signal + size * _real(push(drive.name))) for drive in mechanism.drives
@@ -124,7 +119,7 @@ def with_probes(rig: Rig) -> Rig:
     shown += [Sensor(f"{_LOAD}{joint.name}", mechanism.carried_by(joint), "") for joint in mechanism.joints]
     shown += [Sensor(f"{_SENT}{drive.name}", _real(drive.name), "") for drive in mechanism.drives]
     shown += [Sensor(f"{_ALONG}{drive.name}", drive.along, "") for drive in mechanism.drives]
-    order = (*(drive.name for drive in pushes), *mechanism.order, *(sensor.name for sensor in shown))
+    order = (*mechanism.order, *(sensor.name for sensor in shown))
     return replace(
         rig,
         name=f"{rig.name} with probes",
@@ -133,7 +128,8 @@ def with_probes(rig: Rig) -> Rig:
         mechanism=replace(
             mechanism,
             inputs=(*mechanism.inputs, *inputs),
-            drives=(*drives, *pushes),
+            joints=joints,
+            drives=drives,
             sensors=(*sensors, *shown),
             order=order,
         ),
