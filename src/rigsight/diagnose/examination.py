@@ -162,7 +162,7 @@ def examine(
         in_windows = _explained(cut, cut.singles, at_floor)
     checks = Checks(models.bench, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
     if not in_windows:
-        pairs = _grown(models, effects, forms, checks if lower_bound else None, task.rig.is_driven, ready)
+        pairs = _grown(models, effects, forms, checks if lower_bound else None, ready)
         models = replace(models, singles=pruned(models.bench, models.singles, pairs))
         if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
@@ -291,19 +291,17 @@ def _grown(
     effects: Sequence[Effect],
     forms: OtherForms,
     of_unknown_noise: Checks | None,
-    is_driven: bool,
     prepare: Prepare | None,
 ) -> list[Scored]:
     """Return pairs where a single effect leaves something to explain.
 
     Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
-    An element's equations are no more exact than that bound, and its pairs no more than other forms of them.
     """
     is_excused = False
     if of_unknown_noise is not None and models.singles:
         best = min(models.singles, key=lambda model: model.excess)
         is_excused = best.excess <= AT_LOWER_BOUND
-        if is_excused and (not is_driven or of_unknown_noise.is_adequate(best)):
+        if is_excused and of_unknown_noise.is_adequate(best):
             return []
     worthwhile = models.linear.excess / WORTHWHILE
     pairs = grown(models.bench, models.singles, effects, AT_FLOOR, worthwhile, forms, prepare)
