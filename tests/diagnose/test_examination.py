@@ -13,14 +13,13 @@ PAIR = ("periodic_disturbance", "cubic_stiffness")
 
 
 @pytest.mark.parametrize(
-    ("single", "pair", "adequate", "is_driven", "competes"),
+    ("single", "pair", "adequate", "competes"),
     [
-        pytest.param(1.9, 1.02, False, True, True, id="reaches the very bound"),
-        pytest.param(1.9, 1.3, False, True, False, id="may as well fit noise"),
-        pytest.param(1.9, 1.02, True, True, False, id="nothing but noise is left already"),
-        pytest.param(1.9, 1.02, False, False, False, id="a form of the same force"),
-        pytest.param(20.0, 1.3, False, True, True, id="more is left than noise could be"),
-        pytest.param(1.9, 1.3, None, True, True, id="a measured floor"),
+        pytest.param(1.9, 1.02, False, True, id="reaches the very bound"),
+        pytest.param(1.9, 1.3, False, False, id="may as well fit noise"),
+        pytest.param(1.9, 1.02, True, False, id="nothing but noise is left already"),
+        pytest.param(20.0, 1.3, False, True, id="more is left than noise could be"),
+        pytest.param(1.9, 1.3, None, True, id="a measured floor"),
     ],
 )
 def test_above_a_lower_bound_a_pair_must_reach_it(
@@ -29,7 +28,6 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     single: float,
     pair: float,
     adequate: bool | None,
-    is_driven: bool,
     competes: bool,
 ) -> None:
     found = [scored(PAIR, excess=pair)]
@@ -37,5 +35,5 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     linear = scored((), excess=40.0)
     models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)], linear=linear)
     checks = None if adequate is None else SimpleNamespace(is_adequate=lambda _: adequate)
-    kept = examination._grown(models, [], None, checks, is_driven, None)
+    kept = examination._grown(models, [], None, checks, None)
     assert kept == (found if competes else [])
