@@ -55,7 +55,7 @@ STATED = {
     "second_cause._OTHER_FORM": (0.5, "from half of the gain on"),
     "verdict._HALF": (0.5, "at least half of the re-identified gap closed"),
     "in_catalogue._ODDS_OUTSIDE_ONE": (0.25, "1 : 4 against one effect"),
-    "in_catalogue._ODDS_OUTSIDE_TWO": (1.0, "1 : 1 against two"),
+    "in_catalogue._ODDS_OUTSIDE_SEVERAL": (1.0, "1 : 1 against several"),
     "in_catalogue._ONE_LAW": (0.5, "get at most one half"),
     "candidates.one_law._EXACT": (1.03, "reach 1.03 of the floor"),
     "in_catalogue._AT_MOST_UNKNOWN": (0.3, "together get 0.3"),

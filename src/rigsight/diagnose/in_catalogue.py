@@ -23,10 +23,10 @@ An assumption: that something smaller is missing too and that a relative stands 
 _MOST = 0.99
 _ODDS_OUTSIDE_ONE = 0.25
 """Odds of a cause outside the catalogue against one effect of it, before any record is seen; an assumption."""
-_ODDS_OUTSIDE_TWO = 1.0
-"""The same against two effects together; an assumption."""
+_ODDS_OUTSIDE_SEVERAL = 1.0
+"""The same against two or three effects together; an assumption."""
 _TRIES = 3
-"""Unlike partners that had a chance each to fill by accident what the first effect leaves; an assumption, no count."""
+"""Unlike partners that had a chance each to fill by accident what is left without it; an assumption, no count."""
 _AT_MOST_UNKNOWN = 0.3
 """Given to all candidates together where none takes the larger part of the gap or they contradict each other; an assumption."""
 
@@ -37,8 +37,8 @@ def probability_in_catalogue(
     """Return the probability that the cause is among the candidates, from what the chosen one leaves of what it was to explain.
 
     A relative of the true cause is taken to leave any share of the gap's amplitude as likely as any other. So did the best
-    single effects on rigs with a cause from outside the catalogue (19 blind trials, `experiments/blind_small`). A second effect
-    is to explain what the best single one leaves, which is often faint.
+    single effects on rigs with a cause from outside the catalogue (19 blind trials, `experiments/blind_small`). A second or
+    third effect is to explain what the best model without it leaves, which is often faint.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ def probability_in_catalogue(
     chance = _chance_of_a_relative(left, gap)
     odds = _ODDS_OUTSIDE_ONE
     if len(model.effects) > 1:
-        single = min((m.excess / floor for m in ranking.order if len(m.effects) == 1), default=gap)
-        chance = 1.0 - (1.0 - _chance_of_a_relative(left, single)) ** _TRIES
-        odds = _ODDS_OUTSIDE_TWO
+        fewer = [m.excess / floor for m in ranking.order if len(m.effects) == len(model.effects) - 1]
+        chance = 1.0 - (1.0 - _chance_of_a_relative(left, min(fewer, default=gap))) ** _TRIES
+        odds = _ODDS_OUTSIDE_SEVERAL
     # Above the floor something is left that is not the cause's, if its form is right at all: one half far above.
     form = 0.5 + (_MOST - 0.5) / (1.0 + above)
     share = form / (1.0 + odds * chance)

@@ -105,7 +105,7 @@ def with_relatives(
         known += parts_of(bench, best, known)
         new: list[Scored] = []
         for replaced in best.effects:
-            (pair,) = [p for p in known if set(p.names) == set(best.names) - {replaced.name}]
+            pair = next(p for p in known if set(p.names) == set(best.names) - {replaced.name})
             instead = [effect for effect in effects if is_tried(replaced, effect)]
             if instead and pair.residuals:
                 new += with_one_more(bench, pair, instead, [*found, *new], singles, prepare)
