@@ -232,12 +232,13 @@ def _on_whole_records(
     substeps: Sequence[int] | None = None,
 ) -> tuple[FitResult, ...]:
     whole = bench.problem(structure, bench.estimation, LOOK_ACCURACY)
-    return _distinct(
-        [
-            whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
-            for near in fits
-        ]
-    )
+
+    def one(near: FitResult, steps: Sequence[int] | None) -> FitResult:
+        found = whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, steps)
+        # Steps that served another model may be too long for a lag of a fraction of a sample.
+        return found if steps is None or np.isfinite(found.cost) else one(near, None)
+
+    return _distinct([one(near, substeps) for near in fits])
 
 
 def mean_square(fit: FitResult) -> float:

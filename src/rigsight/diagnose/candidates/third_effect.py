@@ -100,7 +100,7 @@ def with_relatives(
         return other.name in replaced.parents
 
     found, known = list(triples), list(pairs)
-    for is_tried in (as_good, plainer):
+    for is_tried in (as_good, plainer, as_good):
         best = min(found, key=lambda model: model.excess)
         known += parts_of(bench, best, known)
         new: list[Scored] = []
