@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.candidates.first_look import look_at
+from rigsight.diagnose.candidates.first_look import Look, look_at, mean_square, widened
 from rigsight.diagnose.workbench import Workbench
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
@@ -35,3 +35,20 @@ def test_where_a_refit_is_bent_beyond_use_the_values_before_it_are_the_start() -
     assert not np.isfinite(look_at(bench, (HYSTERESIS,), bent, {}).cost)
     rescued = look_at(replace(bench, start=GIVEN), (HYSTERESIS,), bent, {})
     assert rescued.cost < 0.01 * refit.cost
+
+
+def test_a_lag_too_short_for_the_steps_of_another_model_takes_its_own() -> None:
+    lag, short = effect_named("actuator_lag"), 0.12 * DT
+    t = DT * np.arange(2000)
+    run = Record("sweep", DT, {"u": linear_sweep(t, 2.0, 1.0, 40.0)}, {}, role="estimation", hold="zoh")
+    own = {name: value for name, value in GIVEN.items() if name != "k_3"}
+    record = simulate(compose(AXIS, [lag]), {**own, "T_a": short}, run)
+    scales = characteristic_scales(AXIS, [record], own)
+    bench = Workbench(AXIS, (record,), (record,), (record,), scales, {"x": NOISE}, frozenset())
+    structure = bench.composed((lag,))
+    start = bench.problem(structure, (record,)).fit({**own, "T_a": short}, [])
+    assert max(start.substeps) > 1
+    look = Look((lag,), structure, tuple(bench.free_parameters(structure)), (start,), 1.0)
+    assert not np.isfinite(bench.problem(structure, (record,)).fit(start.values, [], substeps=[1]).cost)
+    (wide,) = widened(bench, [look], substeps=[1])
+    assert mean_square(wide.fits[0]) < 1.0
