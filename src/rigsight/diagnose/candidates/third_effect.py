@@ -17,6 +17,7 @@ from rigsight.diagnose.candidates.one_law import are_one_law
 from rigsight.diagnose.candidates.one_more_effect import Prepare, is_among, with_one_more
 from rigsight.diagnose.main_cause import LARGER_PART
 from rigsight.diagnose.second_cause import OtherForms
+from rigsight.diagnose.verdict import WORTHWHILE
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
@@ -53,7 +54,8 @@ def with_a_third(
         Called with the structures that are about to be looked at, to compile them side by side.
     """
     best = min(pairs, key=lambda pair: pair.excess, default=None)
-    if best is None or best.excess <= at_floor:
+    alone = min((model.excess for model in singles), default=np.inf)
+    if best is None or best.excess <= at_floor or not best.excess * WORTHWHILE < alone:
         return []
     least = max(LARGER_PART, forms.share(best))
     found = with_one_more(bench, best, effects, [], singles, prepare, least_share=least)
