@@ -293,7 +293,7 @@ def _grown(
     of_unknown_noise: Checks | None,
     prepare: Prepare | None,
 ) -> list[Scored]:
-    """Return pairs where a single effect leaves something to explain.
+    """Return models of two and three effects where a single effect leaves something to explain.
 
     Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
     """

@@ -18,12 +18,7 @@ import numpy as np
 from rigsight.diagnose.candidates.characterize import finished, followed, refine
 from rigsight.diagnose.candidates.first_look import Look, look_at, widened
 from rigsight.diagnose.candidates.one_more_effect import Prepare, is_among, with_one_more
-from rigsight.diagnose.candidates.third_effect import (
-    IN_ITS_PLACE,
-    parts_of,
-    with_a_third,
-    with_relatives,
-)
+from rigsight.diagnose.candidates.third_effect import IN_ITS_PLACE, with_a_third, with_relatives
 from rigsight.diagnose.second_cause import OtherForms
 from rigsight.diagnose.workbench import Scored, Workbench
 from rigsight.effects import Effect
@@ -133,8 +128,7 @@ def grown(
     nearest = min((pair.excess for pair in pairs), default=np.inf)
     triples = [triple for triple in triples if triple.excess <= _half_closed(nearest)]
     if triples:
-        triples = with_relatives(bench, triples, pairs, usable, effects, prepare)
-        pairs += parts_of(bench, min(triples, key=lambda triple: triple.excess), pairs)
+        triples, pairs = with_relatives(bench, triples, pairs, usable, effects, prepare)
     of_triples = [set(triple.names) for triple in triples]
     pairs = [
         pair for pair in pairs if pair.excess <= allowed or any(set(pair.names) < own for own in of_triples)

@@ -69,8 +69,8 @@ def with_relatives(
     singles: Sequence[Scored],
     effects: Sequence[Effect],
     prepare: Prepare | None = None,
-) -> list[Scored]:
-    """Return the triples, and those in which a relative stands for an effect of the best one.
+) -> tuple[list[Scored], list[Scored]]:
+    """Return the triples with those in which a relative stands for an effect of the best one, and the pairs with their parts.
 
     Found beside an incomplete model, an effect may be only a relative of the right one, or more general than what is needed.
 
@@ -81,7 +81,7 @@ def with_relatives(
     triples
         Fitted and scored.
     pairs
-        Parts of the best triple among others.
+        Fitted and scored; parts of the best triples that are missing are fitted too, so that each effect's share can be told.
     singles
         Every effect alone, fitted and scored.
     effects
@@ -104,7 +104,7 @@ def with_relatives(
     found, known = list(triples), list(pairs)
     for is_tried in (as_good, plainer, as_good):
         best = min(found, key=lambda model: model.excess)
-        known += parts_of(bench, best, known)
+        known += _parts_of(bench, best, known)
         new: list[Scored] = []
         for replaced in best.effects:
             pair = next(p for p in known if set(p.names) == set(best.names) - {replaced.name})
@@ -112,7 +112,8 @@ def with_relatives(
             if instead and pair.residuals:
                 new += with_one_more(bench, pair, instead, [*found, *new], singles, prepare)
         found += _finished(bench, new)
-    return found
+    known += _parts_of(bench, min(found, key=lambda model: model.excess), known)
+    return found, known
 
 
 def _finished(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
@@ -121,18 +122,8 @@ def _finished(bench: Workbench, models: Sequence[Scored]) -> list[Scored]:
     return refine(bench, [*best, *ordered[_MOST_FINISHED:]])
 
 
-def parts_of(bench: Workbench, triple: Scored, known: Sequence[Scored]) -> list[Scored]:
-    """Return the pairs of effects of a triple that have not been fitted so far, fitted from where they stand in it.
-
-    Parameters
-    ----------
-    bench
-        Records, scales and noise.
-    triple
-        Fitted and scored.
-    known
-        Pairs that have been fitted.
-    """
+def _parts_of(bench: Workbench, triple: Scored, known: Sequence[Scored]) -> list[Scored]:
+    """Return the pairs of effects of a triple that have not been fitted so far, fitted from where they stand in it."""
 
     def one(effects: tuple[Effect, ...]) -> Scored:
         structure = bench.simplest(effects)
