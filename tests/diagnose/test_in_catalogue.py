@@ -7,6 +7,7 @@ import pytest
 
 from rigsight.diagnose.in_catalogue import probability_in_catalogue
 from rigsight.diagnose.rank import Ranking
+from rigsight.diagnose.result import Grounds
 from rigsight.diagnose.verdict import Judgement
 
 NOISE = np.random.default_rng(0).standard_normal(2000)
@@ -22,7 +23,9 @@ def stated(scored):
             else (scored((effects[0],), single * NOISE), scored(("backlash",), gap * NOISE))
         )
         order = (model, *others)
-        ranking = Ranking(order, tuple(1.0 / len(order) for _ in order), ())
+        ranking = Ranking(
+            order, tuple(1.0 / len(order) for _ in order), (), tuple(Grounds(0.0, None) for _ in order)
+        )
         return probability_in_catalogue(Judgement(verdict, model, ""), ranking, gap)
 
     return of

@@ -9,6 +9,7 @@ import pytest
 
 from rigsight.diagnose.plausibility import doubts, plausible_first
 from rigsight.diagnose.rank import Ranking
+from rigsight.diagnose.result import Grounds
 from rigsight.diagnose.workbench import Scored
 
 PLACES = {"coulomb_friction": "dynamics", "stribeck_friction": "dynamics", "actuator_lag": "actuator"}
@@ -39,7 +40,9 @@ def models(scored):
 
 
 def ranked(*models: Scored) -> Ranking:
-    return Ranking(models, tuple(np.full(len(models), 1.0 / len(models))), ())
+    return Ranking(
+        models, tuple(np.full(len(models), 1.0 / len(models))), (), tuple(Grounds(0.0, None) for _ in models)
+    )
 
 
 def test_plain_numbers_leave_no_doubt(models) -> None:

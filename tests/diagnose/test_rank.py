@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.rank import Ranking, noise_vector, rank
+from rigsight.diagnose.result import Grounds
 from rigsight.diagnose.workbench import Scored
 
 N = 4000
@@ -106,8 +107,8 @@ def test_failed_models_come_last_with_nothing(scored, white) -> None:
 def test_only_failed_models(scored) -> None:
     failed = scored(("free_play",))
     ranking = ranked(failed)
-    assert ranking == Ranking((failed,), (0.0,), ())
-    assert ranked() == Ranking((), (), ())
+    assert ranking == Ranking((failed,), (0.0,), (), (Grounds(0.0, None),))
+    assert ranked() == Ranking((), (), (), ())
 
 
 def test_a_model_that_left_the_range_of_numbers_has_failed(scored, white) -> None:

@@ -23,6 +23,7 @@ from rigsight.diagnose.result import (
     Candidate,
     Diagnosis,
     Estimate,
+    Grounds,
     NoiseFloor,
     OutputGap,
     Trace,
@@ -190,8 +191,10 @@ def _assembled(
     explained = judgement.verdict in ("none", "parameters")
     without_effect = _candidate(bench, linear, _WITHOUT_EFFECT if explained else 0.0)
     with_effect = [
-        _candidate(bench, model, probability * share)
-        for model, probability in zip(ranking.order, ranking.probabilities, strict=True)
+        _candidate(bench, model, probability * share, grounds)
+        for model, probability, grounds in zip(
+            ranking.order, ranking.probabilities, ranking.grounds, strict=True
+        )
     ]
     candidates = tuple(sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.excess)))
     chosen = judgement.model.effects if is_effect else ()
@@ -288,7 +291,9 @@ def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, NDArray[np.float
     return {name: np.concatenate(parts) for name, parts in shown.items() if parts}
 
 
-def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate:
+def _candidate(
+    bench: Workbench, model: Scored, probability: float, grounds: Grounds | None = None
+) -> Candidate:
     units = {p.name: p.unit for p in model.fit.structure.parameters}
     measured = _measured(bench.rig, bench.scoring)
     fitted = _measured(bench.rig, bench.estimation)
@@ -312,6 +317,7 @@ def _candidate(bench: Workbench, model: Scored, probability: float) -> Candidate
         },
         success=model.fit.success,
         message=model.fit.message,
+        grounds=grounds,
     )
 
 

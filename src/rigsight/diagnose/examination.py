@@ -186,11 +186,12 @@ def examine(
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood takes what is left for noise: it counts where the likeliest model leaves no more than that.
     counts = likeliest is not None and checks.is_adequate(likeliest)
-    criterion = evidence.criterion if counts else None
-    ranking = rank(candidates, vector, rng, linear.excess, criterion)
+    ranking = rank(candidates, vector, rng, linear.excess, evidence.criterion, counts)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
-            ranking = _with_offset_rivals(bench, ranking, effects, vector, rng, linear.excess, criterion)
+            ranking = _with_offset_rivals(
+                bench, ranking, effects, vector, rng, linear.excess, evidence.criterion, counts
+            )
         if ranking.order[0].excess > allowed:
             ranking = plausible_first(ranking, linear, _places(task.rig, ranking))
         best, tied = ranking.order[0], ranking.tied
@@ -356,7 +357,8 @@ def _with_offset_rivals(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
     gap: float,
-    criterion: Callable[[Scored], float] | None,
+    criterion: Callable[[Scored], float],
+    evidence_counts: bool,
 ) -> Ranking:
     """Let an even effect without a constant force compete where the best model needs a constant force.
 
@@ -377,4 +379,4 @@ def _with_offset_rivals(
         if is_even and bench.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
             rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
-    return rank([*ranking.order, *rivals], noise, rng, gap, criterion)
+    return rank([*ranking.order, *rivals], noise, rng, gap, criterion, evidence_counts)

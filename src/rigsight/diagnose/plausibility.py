@@ -99,7 +99,7 @@ def plausible_first(ranking: Ranking, linear: Scored, places: Mapping[str, str])
 
 def _with_first(ranking: Ranking, index: int) -> Ranking:
     """Return the ranking with one model moved to its front, together with the probability of the one that stood there."""
-    order, shares = list(ranking.order), list(ranking.probabilities)
+    order, shares, grounds = list(ranking.order), list(ranking.probabilities), list(ranking.grounds)
     shares[0], shares[index] = shares[index], shares[0]
     chosen, share = order.pop(index), shares.pop(index)
     rivals: Sequence[Scored] = [m for m in ranking.tied if m is not chosen]
@@ -107,5 +107,6 @@ def _with_first(ranking: Ranking, index: int) -> Ranking:
         ranking,
         order=(chosen, *order),
         probabilities=(share, *shares),
+        grounds=(grounds.pop(index), *grounds),
         tied=(ranking.order[0], *rivals),
     )

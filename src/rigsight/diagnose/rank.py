@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.candidates.characterize import CONTENDER
 from rigsight.diagnose.candidates.one_law import is_linear
 from rigsight.diagnose.location.block_means import RESAMPLES, block_means
+from rigsight.diagnose.result import Grounds
 from rigsight.diagnose.verdict import AT_FLOOR
 from rigsight.diagnose.workbench import Scored
 from rigsight.effects.effect import Place
@@ -59,11 +60,14 @@ class Ranking:
         Of each to be the cause among those tried.
     tied
         Models whose held-out error cannot be told from the chosen one's.
+    grounds
+        What each probability rests on, in the same order.
     """
 
     order: tuple[Scored, ...]
     probabilities: tuple[float, ...]
     tied: tuple[Scored, ...]
+    grounds: tuple[Grounds, ...]
 
 
 def rank(
@@ -72,6 +76,7 @@ def rank(
     rng: np.random.Generator,
     gap: float = 1.0,
     criterion: Callable[[Scored], float] | None = None,
+    evidence_counts: bool = True,
 ) -> Ranking:
     """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
 
@@ -89,8 +94,9 @@ def rank(
     gap
         What the rig's own equations leave, re-identified, in units of the noise floor.
     criterion
-        Minus twice the log of a model's evidence, see `evidence`; None ranks by held-out errors alone, as where what the
-        likeliest model leaves is no noise.
+        Minus twice the log of a model's evidence, see `evidence`; None ranks by held-out errors alone.
+    evidence_counts
+        False where what the likeliest model leaves is no noise: then evidence is told and ranks nothing.
 
     References
     ----------
@@ -99,7 +105,9 @@ def rank(
     usable = [m for m in models if m.residuals and np.isfinite(m.excess)]
     failed = [m for m in models if m not in usable]
     if not usable:
-        return Ranking(tuple(models), tuple(0.0 for _ in models), ())
+        return Ranking(
+            tuple(models), tuple(0.0 for _ in models), (), tuple(Grounds(0.0, None) for _ in models)
+        )
     squares = np.column_stack([_blocks(m, noise) for m in usable])
     draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
     means = np.mean(squares[draws], axis=1)
@@ -129,7 +137,8 @@ def rank(
     lowest = np.min(np.where(plain, resampled, np.inf), axis=1, keepdims=True)
     ahead = plain & (resampled <= lowest * (1.0 + fine))
     wins = np.mean((1.0 - _HINT) * _shared(tie, prior) + _HINT * _shared(ahead, prior), axis=0)
-    weights = _evidence_of(usable, errors / best, criterion)
+    evidence = _evidence_of(usable, errors / best, criterion)
+    weights = _tempered(evidence) if evidence_counts else np.ones(len(usable))
     likelihood = (wins + _NEGLIGIBLE * np.exp(-_FALL * (errors / best - 1.0))) * weights
     probabilities = likelihood / np.sum(likelihood)
     chosen = int(np.argmax(probabilities))
@@ -147,24 +156,30 @@ def rank(
         order=(*(usable[i] for i in order), *failed),
         probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
         tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
+        grounds=(
+            *(Grounds(float(wins[i]), evidence[i]) for i in order),
+            *(Grounds(0.0, None) for _ in failed),
+        ),
     )
 
 
 def _evidence_of(
     models: Sequence[Scored], errors: NDArray[np.float64], criterion: Callable[[Scored], float] | None
-) -> NDArray[np.float64]:
-    """Return the tempered evidence of each model in units of the largest.
-
-    Models that are far off were not fitted to their end: they have that of the least of the others.
-    """
+) -> list[float | None]:
+    """Return the log evidence of each model less that of the likeliest; None for those far off, not fitted to their end."""
     if criterion is None:
-        return np.ones(len(models))
-    near = errors <= CONTENDER
-    told = np.array(
-        [criterion(model) if close else -np.inf for model, close in zip(models, near, strict=True)]
-    )
-    told[~near] = np.max(told)
-    return np.asarray(np.exp(-0.5 * _TEMPER * (told - np.min(told))))
+        return [None] * len(models)
+    told = [
+        -0.5 * criterion(m) if error <= CONTENDER else None for m, error in zip(models, errors, strict=True)
+    ]
+    most = max(value for value in told if value is not None)
+    return [None if value is None else value - most for value in told]
+
+
+def _tempered(evidence: Sequence[float | None]) -> NDArray[np.float64]:
+    """Return the tempered evidence in units of the largest; models without one have the least of the others."""
+    least = min((value for value in evidence if value is not None), default=0.0)
+    return np.exp(_TEMPER * np.array([least if value is None else value for value in evidence]))
 
 
 def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[np.float64]:

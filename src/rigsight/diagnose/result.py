@@ -65,6 +65,22 @@ class OutputGap:
 
 
 @dataclass(frozen=True)
+class Grounds:
+    """What the probability of one model rests on.
+
+    Attributes
+    ----------
+    held_out
+        Share of the resamplings of the held-out errors in which it is the simplest of the best.
+    evidence
+        Logarithm of its evidence, less that of the likeliest model [nats]; None where its fit was not finished.
+    """
+
+    held_out: float
+    evidence: float | None
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A set of effects that was fitted and scored.
 
@@ -85,6 +101,8 @@ class Candidate:
         Every fitted parameter of rig and effects.
     success, message
         Whether the fit converged, and the optimizer's words.
+    grounds
+        What the probability rests on; None for the equations without an effect.
     """
 
     effects: tuple[str, ...]
@@ -96,6 +114,7 @@ class Candidate:
     parameters: dict[str, Estimate]
     success: bool
     message: str
+    grounds: Grounds | None = None
 
 
 @dataclass(frozen=True)
@@ -347,6 +366,9 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
             name: {"value": _number(e.value), "std": _number(e.std), "unit": e.unit}
             for name, e in candidate.parameters.items()
         },
+        "n_fitted": len(candidate.parameters),
+        "held_out_share": None if candidate.grounds is None else candidate.grounds.held_out,
+        "log_evidence": None if candidate.grounds is None else candidate.grounds.evidence,
         "success": candidate.success,
         "message": candidate.message,
     }
