@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigsight import plot
-from rigsight.diagnose.result import Trace
+from rigsight.diagnose.location.trace import Trace
 from rigsight.frequency import FrequencyResponse
 
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from rigsight.blind import draw_trial
 from rigsight.diagnose import Task
-from rigsight.diagnose.adequacy import Adequacy, adequacy
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.examination import workbench_of
-from rigsight.diagnose.windows import Windowing
+from rigsight.diagnose.examination import fit_context_of
+from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.errors import RigsightError
 from rigsight.identify import IdleThreads
@@ -59,9 +59,9 @@ def row(seed: int, trial: int) -> Row | None:
     constants = {p.name: drawn.linear.values[p.name] for p in rig.constants}
     task = Task(str(trial), rig, constants, {}, tuple(records))
     noise = {floor.output: floor.std for floor in noise_floors(rig, records)}
-    bench = workbench_of(task, noise, Windowing(), None, IdleThreads(1))
+    bench = fit_context_of(task, noise, Windowing(), None, IdleThreads(1))
     rng = np.random.default_rng(trial)
-    linear = fit_linear(bench, bench.start)
+    linear = reidentify(bench, bench.start)
     effects = tuple(effect_named(name) for name in drawn.key["effects"])
     structure = bench.composed(effects)
     fit = bench.problem(structure, bench.estimation).fit(
@@ -71,7 +71,7 @@ def row(seed: int, trial: int) -> Row | None:
     return Row(
         trial,
         tuple(drawn.key["effects"]),
-        linear.excess,
+        linear.error_over_noise,
         max(bench.problem(structure, [r]).fit(fit.values, ()).weighted_rms for r in bench.records),
         adequacy(bench, true, rng),
         adequacy(bench, linear, rng),

@@ -121,14 +121,16 @@ def tests(trials: list[Campaign]) -> None:
         print(f"<!-- {name}: {dict(Counter(values.tolist()))} -->")
     for (group, x), (name, y) in itertools.product(features(trials).items(), told.items()):
         rng = np.random.default_rng(0)
-        score = told_apart(x, y, parts)
-        shuffled = [told_apart(x, shuffled_within(rigs, y, rng), parts) for _ in range(PERMUTATIONS)]
+        score = split_distinguishable(x, y, parts)
+        shuffled = [
+            split_distinguishable(x, shuffled_within(rigs, y, rng), parts) for _ in range(PERMUTATIONS)
+        ]
         low, high = np.quantile(shuffled, (0.025, 0.975))
         p = (1 + sum(one >= score for one in shuffled)) / (1 + PERMUTATIONS)
         print(f"| {group} | {name} | {score:.2f} | {low:.2f} to {high:.2f} | {p:.3f} |", flush=True)
 
 
-def told_apart(x: Array, y: Any, parts: list[Any]) -> float:
+def split_distinguishable(x: Array, y: Any, parts: list[Any]) -> float:
     """Return the balanced accuracy of a tree on trials that it was not grown on."""
     tree = DecisionTreeClassifier(max_depth=4, min_samples_leaf=3, class_weight="balanced", random_state=0)
     predicted = np.empty_like(y)

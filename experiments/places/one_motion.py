@@ -14,11 +14,11 @@ from pathlib import Path
 from rigsight.blind import draw_trial
 from rigsight.blind.subjects import subject_of
 from rigsight.diagnose import Task
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.places.search import search_places
-from rigsight.diagnose.preparation import workbench_of
-from rigsight.diagnose.windows import Windowing
+from rigsight.diagnose.fitting.preparation import fit_context_of
+from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE
 from rigsight.identify import IdleThreads
 
@@ -40,15 +40,15 @@ def row(seed: int, number: int) -> tuple[int, int, bool, str]:
     constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
     task = Task(str(number), rig, constants, trial.given, trial.records)
     noise = {floor.output: floor.std for floor in noise_floors(rig, task.records, task.drifts, True)}
-    bench = workbench_of(task, noise, Windowing(), None, IdleThreads(1))
-    linear = fit_linear(bench, bench.start)
+    bench = fit_context_of(task, noise, Windowing(), None, IdleThreads(1))
+    linear = reidentify(bench, bench.start)
     offered = bench.offered(CATALOGUE)
     begun = time.process_time()
     found = search_places(bench, linear, offered)
     seconds = time.process_time() - begun
     (true,) = trial.key["effects"]
     kept = true in {effect.name for effect in found.effects}
-    told = f"| {number} | {rig.name} | {true} | {linear.excess:.3g} | {len(found.effects)} | {len(offered)} "
+    told = f"| {number} | {rig.name} | {true} | {linear.error_over_noise:.3g} | {len(found.effects)} | {len(offered)} "
     return len(found.effects), len(offered), kept, f"{told}| {'yes' if kept else '**no**'} | {seconds:.1f} |"
 
 

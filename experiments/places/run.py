@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose import candidates_on
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.candidates.starts import start_values
-from rigsight.diagnose.places.search import search_places
-from rigsight.diagnose.workbench import Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.diagnose.search.starts import start_values
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import RigsightError
 from rigsight.identify import characteristic_scales
@@ -117,21 +117,23 @@ def draw(seed: int) -> Draw | None:
     try:
         without, noise = records((), numbers, drives, rng)
         scales = characteristic_scales(RIG, without, numbers)
-        bench = Workbench(RIG, without, without, without, scales, noise, frozenset(), numbers)
+        bench = FitContext(RIG, without, without, without, scales, noise, frozenset(), numbers)
         structure = compose(RIG, (effect,))
-        starts = list(start_values(bench, structure, effect, fit_linear(bench, numbers).fit, {}))
+        starts = list(start_values(bench, structure, effect, reidentify(bench, numbers).fit, {}))
         hidden = {**starts[int(rng.integers(len(starts)))], **numbers}
         for parameter in effect.parameters:
             if parameter.null == 0.0:
                 hidden[structure.parameter_name(effect, parameter.name)] *= rng.uniform(0.3, 3.0)
         measured, noise = records((effect,), hidden, drives, rng)
         scales = characteristic_scales(RIG, measured, numbers)
-        bench = Workbench(RIG, measured, measured, measured, scales, noise, frozenset(), numbers)
-        linear = fit_linear(bench, numbers)
+        bench = FitContext(RIG, measured, measured, measured, scales, noise, frozenset(), numbers)
+        linear = reidentify(bench, numbers)
         found = search_places(bench, linear, candidates)
     except RigsightError:
         return None
-    return Draw(effect.name, linear.excess, tuple((p.name, p.share, p.looked_at) for p in found.places))
+    return Draw(
+        effect.name, linear.error_over_noise, tuple((p.name, p.share, p.looked_at) for p in found.places)
+    )
 
 
 def main() -> None:

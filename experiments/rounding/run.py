@@ -38,7 +38,7 @@ def outcome(case: Case, seed: int, n_jobs: int) -> dict[str, Any]:
     best = next((c for c in found.candidates if c.effects == found.effects), found.candidates[0])
     return {
         "verdict": " + ".join((found.verdict, *found.effects)),
-        "excess": best.excess,
+        "error_over_noise": best.error_over_noise,
         "values": {name: (e.value, e.std) for name, e in best.parameters.items()},
     }
 
@@ -63,10 +63,10 @@ def line(case: str, repeated: Sequence[dict[str, Any]]) -> str:
             moved = abs(other["values"][key][0] - value) / std if std > 0.0 else 0.0
             if moved > largest:
                 largest, name = moved, key
-    excess = max(abs(other["excess"] - first["excess"]) for other in others)
+    spread = max(abs(other["error_over_noise"] - first["error_over_noise"]) for other in others)
     told = "yes" if same else ", ".join(sorted({r["verdict"] for r in repeated}))
     good = "yes" if same and largest <= ENOUGH else "**no**"
-    return f"| {case} | {first['verdict']} | {first['excess']:.4f} | {told} | {excess:.1e} | {largest:.1e} ({name}) | {good} |"
+    return f"| {case} | {first['verdict']} | {first['error_over_noise']:.4f} | {told} | {spread:.1e} | {largest:.1e} ({name}) | {good} |"
 
 
 def main() -> None:

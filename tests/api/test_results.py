@@ -136,7 +136,7 @@ class TestTables:
 
     def test_candidates(self, diagnoser: rs.Diagnoser) -> None:
         table = diagnoser.diagnosis_.to_dataframe()
-        assert list(table.columns) == ["effects", "probability", "excess", "nrmse_x", "converged"]
+        assert list(table.columns) == ["effects", "probability", "error_over_noise", "nrmse_x", "converged"]
         assert list(table["effects"]) == [", ".join(c.effects) for c in diagnoser.diagnosis_.candidates]
         assert table.iloc[0]["effects"] == "cubic_stiffness"
         assert table["probability"].sum() <= 1.0 + 1e-12

@@ -13,7 +13,7 @@ from rigsight.blind.any_rig_campaign import draw_runs
 from rigsight.blind.any_rig_numbers import DAMPING_RATIOS, FREQUENCIES, draw_numbers
 from rigsight.blind.any_rig_subjects import draw_effects, placed_cells, placed_subject_of
 from rigsight.blind.any_rig_trial import draw_placed_trial
-from rigsight.diagnose.candidates.placed import candidates_on
+from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.effects import CATALOGUE
 from rigsight.rigs import RIGS
 from rigsight.simulate import compose, simulate

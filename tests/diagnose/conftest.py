@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.workbench import Scored
+from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import FitResult
 from rigsight.records.record import Record
@@ -126,12 +126,12 @@ def scored() -> MakeScored:
         effects: tuple[str, ...] = (),
         residuals: NDArray[np.float64] | None = None,
         n_free: int = 4,
-        excess: float | None = None,
+        error_over_noise: float | None = None,
     ) -> Scored:
         chosen = tuple(effect_named(name) for name in effects)
         columns = () if residuals is None else (np.asarray(residuals, dtype=np.float64)[:, None],)
-        if excess is None:
-            excess = float("inf") if residuals is None else float(np.sqrt(np.mean(residuals**2)))
+        if error_over_noise is None:
+            error_over_noise = float("inf") if residuals is None else float(np.sqrt(np.mean(residuals**2)))
         free = tuple(f"p{i}" for i in range(n_free))
         fit = FitResult(
             structure=compose(AXIS, chosen),
@@ -140,13 +140,13 @@ def scored() -> MakeScored:
             values=dict.fromkeys(free, 1.0),
             standard_errors=dict.fromkeys(free, 0.1),
             initial_states=(),
-            cost=excess**2,
+            cost=error_over_noise**2,
             n_samples=1,
             n_evaluations=1,
             free=free,
             covariance=np.eye(n_free),
             residuals=columns,
         )
-        return Scored(chosen, fit, fit, excess)
+        return Scored(chosen, fit, fit, error_over_noise)
 
     return make

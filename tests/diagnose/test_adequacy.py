@@ -10,10 +10,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rigsight.diagnose.adequacy import Adequacy, adequacy
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.second_cause import OtherForms
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record
@@ -30,7 +30,7 @@ def axis_bench(
     seed: int = 0,
     disturbance: float = 0.0,
     last: dict[str, float] | None = None,
-) -> Workbench:
+) -> FitContext:
     """Return records of one mass, moved by multisines; `last` are other numbers of the last record."""
     rng = np.random.default_rng(seed)
     structure, t = compose(AXIS, effects), DT * np.arange(2400)
@@ -48,24 +48,24 @@ def axis_bench(
         )
     fitted, scoring = tuple(records[:2]), tuple(records[2:])
     scales = characteristic_scales(AXIS, fitted, VALUES)
-    return Workbench(AXIS, fitted, scoring, fitted, scales, {"x": NOISE}, frozenset({"force_off"}), VALUES)
+    return FitContext(AXIS, fitted, scoring, fitted, scales, {"x": NOISE}, frozenset({"force_off"}), VALUES)
 
 
-def fitted(bench: Workbench, effects: tuple[Effect, ...], values: dict[str, float]) -> Scored:
-    structure = bench.composed(effects)
-    fit = bench.problem(structure, bench.estimation)
-    return bench.score(effects, fit.fit({**VALUES, **values}, bench.free_parameters(structure)))
+def fitted(context: FitContext, effects: tuple[Effect, ...], values: dict[str, float]) -> Scored:
+    structure = context.composed(effects)
+    fit = context.problem(structure, context.estimation)
+    return context.score(effects, fit.fit({**VALUES, **values}, context.free_parameters(structure)))
 
 
-def asked(bench: Workbench, model: Scored) -> Adequacy:
-    return adequacy(bench, model, np.random.default_rng(1))
+def asked(context: FitContext, model: Scored) -> Adequacy:
+    return adequacy(context, model, np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("disturbance", [0.0, 0.05, 0.5], ids=["white noise", "disturbed", "much disturbed"])
 def test_p_values_of_noise_and_disturbance_are_uniform(disturbance: float) -> None:
     """A disturbing force of 0.5 leaves 80 times the noise, most of it at the resonance."""
     benches = [axis_bench(seed=seed, disturbance=disturbance) for seed in range(16)]
-    p_values = [asked(bench, fit_linear(bench, VALUES)).p_value for bench in benches]
+    p_values = [asked(context, reidentify(context, VALUES)).p_value for context in benches]
     assert kstest(p_values, "uniform").pvalue > 0.01
 
 
@@ -82,11 +82,11 @@ def test_a_missing_effect_is_what_the_remainder_goes_with(
     name: str, values: dict[str, float], what: str
 ) -> None:
     effects = (effect_named(name),)
-    bench = axis_bench(effects, values)
-    without = asked(bench, fit_linear(bench, VALUES))
+    context = axis_bench(effects, values)
+    without = asked(context, reidentify(context, VALUES))
     assert not without.adequate
     assert without.agreements[0].what == what
-    assert asked(bench, fitted(bench, effects, values)).adequate
+    assert asked(context, fitted(context, effects, values)).adequate
 
 
 @pytest.mark.parametrize(
@@ -109,20 +109,20 @@ def test_it_is_told_on_an_element_too(name: str, values: dict[str, float], what:
         records.append(Record(f"r{i}", DT, {"x": x, "force": force}, {}))
     estimation, scoring = tuple(records[:2]), tuple(records[2:])
     scales = characteristic_scales(rig, estimation, known)
-    bench = Workbench(
+    context = FitContext(
         rig, estimation, scoring, estimation, scales, {"force": noise}, frozenset({"force_off"}), known
     )
-    without = asked(bench, fit_linear(bench, known))
+    without = asked(context, reidentify(context, known))
     assert not without.adequate
     assert without.agreements[0].what == what
-    completed = bench.composed(effects)
-    fit = bench.problem(completed, estimation).fit({**known, **values}, bench.free_parameters(completed))
-    assert asked(bench, bench.score(effects, fit)).adequate
+    completed = context.composed(effects)
+    fit = context.problem(completed, estimation).fit({**known, **values}, context.free_parameters(completed))
+    assert asked(context, context.score(effects, fit)).adequate
 
 
 def test_a_number_that_differs_in_one_record_is_told() -> None:
-    bench = axis_bench(last={"d": 2.0})
-    found = asked(bench, fit_linear(bench, VALUES))
+    context = axis_bench(last={"d": 2.0})
+    found = asked(context, reidentify(context, VALUES))
     assert not found.adequate
     assert found.agreements[0].what == "record: d"
 
@@ -134,20 +134,20 @@ def test_the_joint_is_told(train: Any) -> None:
     scoring = tuple(r for r in records if r.role == "validation")
     scales = characteristic_scales(rig, estimation, train.values)
     noise = {signal.name: train.noise for signal in rig.outputs}
-    bench = Workbench(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
-    found = asked(bench, fit_linear(bench, train.values))
+    context = FitContext(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
+    found = asked(context, reidentify(context, train.values))
     assert not found.adequate
     assert found.agreements[0].what == "velocity of load_bearing"
     assert found.agreements[0].place == "load_bearing"
 
 
 def test_what_stands_in_a_few_stretches_is_no_noise() -> None:
-    bench = axis_bench()
-    record = bench.scoring[0]
+    context = axis_bench()
+    record = context.scoring[0]
     x = record["x"].copy()
     x[1000:1040] += 30.0 * NOISE
-    struck = replace(bench, scoring=(record.with_signals(x=x), *bench.scoring[1:]))
-    found = asked(struck, fit_linear(struck, VALUES))
+    struck = replace(context, scoring=(record.with_signals(x=x), *context.scoring[1:]))
+    found = asked(struck, reidentify(struck, VALUES))
     assert not found.adequate
     assert not found.is_spread
 
@@ -169,10 +169,10 @@ def test_a_rounded_sign_is_another_form_and_no_second_effect() -> None:
         torque=T_c * sp.tanh(canonical.v / 0.05),
         signature=coulomb.signature,
     )
-    bench = axis_bench((rounded,), {"T_c": 0.2})
-    single = fitted(bench, (coulomb,), {"T_c": 0.2})
-    assert single.excess > 1.5
-    partners = OtherForms(bench, lower_bound=False).partners(
+    context = axis_bench((rounded,), {"T_c": 0.2})
+    single = fitted(context, (coulomb,), {"T_c": 0.2})
+    assert single.error_over_noise > 1.5
+    partners = OtherForms(context, lower_bound=False).partners(
         single, [effect_named("flexible_mode"), effect_named("quadratic_damping")]
     )
     assert [effect.name for effect in partners] == ["quadratic_damping"]
@@ -181,27 +181,27 @@ def test_a_rounded_sign_is_another_form_and_no_second_effect() -> None:
 def test_a_true_second_effect_is_worth_trying() -> None:
     effects = (effect_named("coulomb_friction"), effect_named("cubic_stiffness"))
     values = {"T_c": 0.05, "k_3": 1e3}
-    bench = axis_bench(effects, values)
-    single = fitted(bench, effects[:1], values)
-    forms = OtherForms(bench, lower_bound=False)
+    context = axis_bench(effects, values)
+    single = fitted(context, effects[:1], values)
+    forms = OtherForms(context, lower_bound=False)
     assert forms.partners(single, effects[1:]) == [effects[1]]
-    pair = fitted(bench, effects, values)
+    pair = fitted(context, effects, values)
     assert forms.with_own_evidence([single], [pair]) == [pair]
 
 
 def test_noise_that_only_motion_makes_is_no_noise_of_a_sensor() -> None:
-    bench, rng = axis_bench(), np.random.default_rng(7)
+    context, rng = axis_bench(), np.random.default_rng(7)
 
     def louder(record: Record) -> Record:
         noise = rng.standard_normal(record.n_samples)
         return record.with_signals(x=record["x"] + 2e-2 * record["x"] * noise)
 
     moved = replace(
-        bench,
-        estimation=tuple(map(louder, bench.estimation)),
-        scoring=tuple(map(louder, bench.scoring)),
+        context,
+        estimation=tuple(map(louder, context.estimation)),
+        scoring=tuple(map(louder, context.scoring)),
     )
-    model = fit_linear(moved, VALUES)
+    model = reidentify(moved, VALUES)
     assert asked(moved, model).adequate
     found = adequacy(moved, model, np.random.default_rng(1), of_steady_size=True)
     assert not found.adequate
@@ -212,10 +212,10 @@ def test_noise_that_only_motion_makes_is_no_noise_of_a_sensor() -> None:
 def test_noise_and_disturbance_are_as_large_where_nothing_moves(disturbance: float) -> None:
     adequate = []
     for seed in range(8):
-        bench = axis_bench(seed=seed, disturbance=disturbance)
-        model = fit_linear(bench, VALUES)
+        context = axis_bench(seed=seed, disturbance=disturbance)
+        model = reidentify(context, VALUES)
         adequate.append(
-            adequacy(bench, model, np.random.default_rng(1), of_steady_size=True).adequate
-            or not asked(bench, model).adequate
+            adequacy(context, model, np.random.default_rng(1), of_steady_size=True).adequate
+            or not asked(context, model).adequate
         )
     assert all(adequate)

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.data.amplitude_response import amplitude_dependences
-from rigsight.diagnose.data.finding import DataQuality
+from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
+from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.records.record import Record
 from rigsight.rigs import ELEMENT, Rig

@@ -55,7 +55,7 @@ def test_the_play_is_named_in_windows_down_to_the_noise(of_play: tuple[Record, .
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", ("backlash",))
     assert diagnosis.window_cycles == 4
     best = diagnosis.candidates[0]
-    assert best.excess == pytest.approx(1.0, abs=0.1)
+    assert best.error_over_noise == pytest.approx(1.0, abs=0.1)
     assert best.parameters["g"].value == pytest.approx(1.35e-4, rel=0.02)
     assert any("windows of 4 cycles" in note for note in diagnosis.notes)
 

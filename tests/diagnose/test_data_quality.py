@@ -13,12 +13,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from rigsight.diagnose.candidates.characterize import fit_candidate, fit_linear
-from rigsight.diagnose.data.data_quality import data_quality, with_best_model
-from rigsight.diagnose.data.finding import DataQuality
-from rigsight.diagnose.data.sensor_faults import sensor_faults
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.workbench import Scored, Workbench, liveliest
+from rigsight.diagnose.data_quality.checks import data_quality, with_best_model
+from rigsight.diagnose.data_quality.finding import DataQuality
+from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales, linear_start
@@ -68,10 +68,10 @@ def sweeps(
 
 def prepared(
     records: Sequence[Record], rig: Rig = AXIS, constants: dict[str, float] = CONSTANTS
-) -> tuple[Workbench, Scored]:
+) -> tuple[FitContext, Scored]:
     estimation = [record for record in records if record.role == "estimation"]
     start = {**constants, **linear_start(rig, estimation, constants, {})}
-    bench = Workbench(
+    context = FitContext(
         rig=rig,
         estimation=tuple(estimation),
         scoring=tuple(record for record in records if record.role == "validation"),
@@ -80,14 +80,14 @@ def prepared(
         noise={floor.output: floor.std for floor in noise_floors(rig, records)},
         held=frozenset(),
     )
-    return bench, fit_linear(bench, start)
+    return context, reidentify(context, start)
 
 
 def looked_at(
     records: Sequence[Record], rig: Rig = AXIS, constants: dict[str, float] = CONSTANTS
 ) -> DataQuality:
-    bench, linear = prepared(records, rig, constants)
-    return data_quality(bench, records, linear)
+    context, reidentified = prepared(records, rig, constants)
+    return data_quality(context, records, reidentified)
 
 
 def misdeclared(records: Sequence[Record], hold: Hold) -> list[Record]:
@@ -176,11 +176,11 @@ def test_a_shift_of_the_time_base_is_measured(sign: int, serious: bool):
 
 
 def test_a_hold_hidden_by_an_effect_shows_with_the_effect_in_the_model():
-    bench, linear = prepared(misdeclared(sweeps(effect=CUBIC, hold="foh"), "zoh"))
-    quality = data_quality(bench, (*bench.estimation, *bench.scoring), linear)
+    context, reidentified = prepared(misdeclared(sweeps(effect=CUBIC, hold="foh"), "zoh"))
+    quality = data_quality(context, (*context.estimation, *context.scoring), reidentified)
     assert quality.findings == ()
-    model = fit_candidate(bench, (effect_named("cubic_stiffness"),), linear.fit)
-    (finding,) = with_best_model(quality, bench, model).findings
+    model = fit_candidate(context, (effect_named("cubic_stiffness"),), reidentified.fit)
+    (finding,) = with_best_model(quality, context, model).findings
     assert finding.kind == "hold"
     assert finding.sentence.startswith("With cubic_stiffness in the model: ")
     assert '"foh"' in finding.mend
@@ -188,10 +188,10 @@ def test_a_hold_hidden_by_an_effect_shows_with_the_effect_in_the_model():
 
 
 def test_a_right_hold_stays_right_with_the_effect_in_the_model():
-    bench, linear = prepared(sweeps(effect=CUBIC))
-    quality = data_quality(bench, (*bench.estimation, *bench.scoring), linear)
-    model = fit_candidate(bench, (effect_named("cubic_stiffness"),), linear.fit)
-    assert with_best_model(quality, bench, model) is quality
+    context, reidentified = prepared(sweeps(effect=CUBIC))
+    quality = data_quality(context, (*context.estimation, *context.scoring), reidentified)
+    model = fit_candidate(context, (effect_named("cubic_stiffness"),), reidentified.fit)
+    assert with_best_model(quality, context, model) is quality
 
 
 def clipped(x):
@@ -285,18 +285,18 @@ def test_the_list_of_the_file_says_the_same():
     assert content[1]["answer"] == "no"
 
 
-def measured(folder: Path, hold: Hold | None = None) -> tuple[Workbench, Scored, DataQuality]:
+def measured(folder: Path, hold: Hold | None = None) -> tuple[FitContext, Scored, DataQuality]:
     campaign = read_campaign(folder)
     records = campaign.records if hold is None else misdeclared(campaign.records, hold)
-    bench, linear = prepared(records, campaign.rig, campaign.constants)
-    return bench, linear, data_quality(bench, records, linear)
+    context, reidentified = prepared(records, campaign.rig, campaign.constants)
+    return context, reidentified, data_quality(context, records, reidentified)
 
 
 def test_measured_oscillator_shows_its_hold_once_the_cubic_spring_is_in(shared_data: Path):
-    bench, linear, quality = measured(shared_data / "silverbox", "foh")
+    context, reidentified, quality = measured(shared_data / "silverbox", "foh")
     assert quality.findings == ()
-    model = fit_candidate(bench, (effect_named("cubic_stiffness"),), linear.fit)
-    (finding,) = with_best_model(quality, bench, model).findings
+    model = fit_candidate(context, (effect_named("cubic_stiffness"),), reidentified.fit)
+    (finding,) = with_best_model(quality, context, model).findings
     assert (finding.kind, finding.serious) == ("hold", True)
     assert '"band_limited"' in finding.mend
     assert finding.explained is not None

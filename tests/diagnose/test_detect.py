@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.result import NoiseFloor
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR

@@ -166,7 +166,7 @@ def test_models_of_an_axis_without_a_spring_follow_its_motion() -> None:
     assert "k" not in diagnosis.candidates[0].parameters
 
 
-def bench(effect: str, own: Mapping[str, float]) -> Diagnosis:
+def context(effect: str, own: Mapping[str, float]) -> Diagnosis:
     values = {"k": 4e3, "d": 120.0, "force_off": 3.0, **own}
     t = T[:800]
     inputs = [0.005 * amplitude * np.sin(3.0 * t + 2.0 * t**2) for amplitude, _ in RUNS]
@@ -183,7 +183,7 @@ def bench(effect: str, own: Mapping[str, float]) -> Diagnosis:
     ],
 )
 def test_a_force_element(effect: str, own: Mapping[str, float]) -> None:
-    diagnosis = bench(effect, own)
+    diagnosis = context(effect, own)
     assert (diagnosis.verdict, diagnosis.effects) == ("effect", (effect,))
     # The noise is 0.05 N; a force that jumps at each reversal must not be taken for it.
     (floor,) = diagnosis.noise_floors

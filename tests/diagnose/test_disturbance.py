@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rigsight.diagnose.disturbance import disturbance
-from rigsight.diagnose.observer import Observer
+from rigsight.diagnose.fitting.observer import Observer
+from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record
 from rigsight.rigs import AXIS, ELEMENT

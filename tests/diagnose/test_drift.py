@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.drift import can_drift
-from rigsight.diagnose.task import Task
+from rigsight.diagnose.fitting.drift import can_drift
+from rigsight.diagnose.fitting.task import Task
 from rigsight.rigs import AXIS, RIGS
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.candidates.characterize import fit_candidate, fit_linear
-from rigsight.diagnose.evidence import Evidence
-from rigsight.diagnose.second_cause import beyond_disturbance
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.noise.evidence import Evidence
+from rigsight.diagnose.search.evidence_for_more import beyond_disturbance
+from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.records import Record
@@ -27,7 +27,7 @@ CUBIC, TONE, FRICTION, LAG = (
 )
 
 
-def bench_of(own: Mapping[str, float], force: float, seed: int = 2) -> Workbench:
+def bench_of(own: Mapping[str, float], force: float, seed: int = 2) -> FitContext:
     """Four runs of many tones; a white force from outside swings the mass, and nobody records it."""
     rng, t = np.random.default_rng(seed), DT * np.arange(N)
     effects = [effect for effect in (CUBIC, FRICTION, LAG) if effect.parameters[0].name in own]
@@ -40,51 +40,51 @@ def bench_of(own: Mapping[str, float], force: float, seed: int = 2) -> Workbench
         records.append(asked.with_signals(x=x + rng.normal(scale=NOISE, size=N)))
     fitted, scored = tuple(records[:2]), tuple(records[2:])
     scales = characteristic_scales(AXIS, fitted, VALUES)
-    return Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
+    return FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
 
 
-def modelled(bench: Workbench) -> tuple[Scored, Scored, Scored, Scored]:
+def modelled(context: FitContext) -> tuple[Scored, Scored, Scored, Scored]:
     """The equations, a spring that hardens, a tone beside it and friction beside it."""
-    linear = fit_linear(bench, VALUES)
-    single = fit_candidate(bench, (CUBIC,), linear.fit)
+    reidentified = reidentify(context, VALUES)
+    single = fit_candidate(context, (CUBIC,), reidentified.fit)
     return (
-        linear,
+        reidentified,
         single,
-        *(fit_candidate(bench, (CUBIC, second), single.fit) for second in (TONE, FRICTION)),
+        *(fit_candidate(context, (CUBIC, second), single.fit) for second in (TONE, FRICTION)),
     )
 
 
 @pytest.mark.parametrize("seed", [4, 5])
 def test_a_tone_that_follows_the_swing_of_a_disturbed_mass_explains_nothing(seed: int) -> None:
-    bench = bench_of({"k_3": 2e3}, 0.01, seed)
-    linear, single, tone, _ = modelled(bench)
-    assert single.excess > 3.0
-    assert tone.excess < 0.98 * single.excess
-    assert beyond_disturbance(Evidence(bench, linear, single), [single], [tone]) == []
+    context = bench_of({"k_3": 2e3}, 0.01, seed)
+    reidentified, single, tone, _ = modelled(context)
+    assert single.error_over_noise > 3.0
+    assert tone.error_over_noise < 0.98 * single.error_over_noise
+    assert beyond_disturbance(Evidence(context, reidentified, single), [single], [tone]) == []
 
 
 @pytest.mark.parametrize("force", [0.0, 0.01])
 def test_a_second_effect_that_is_there_stands_with_and_without_a_disturbance(force: float) -> None:
-    bench = bench_of({"k_3": 2e3, "T_c": 0.02}, force)
-    linear, single, tone, friction = modelled(bench)
-    evidence = Evidence(bench, linear, single)
+    context = bench_of({"k_3": 2e3, "T_c": 0.02}, force)
+    reidentified, single, tone, friction = modelled(context)
+    evidence = Evidence(context, reidentified, single)
     assert beyond_disturbance(evidence, [single], [tone, friction])[-1] is friction
     assert evidence.criterion(friction) < min(evidence.criterion(single), evidence.criterion(tone)) - 100.0
 
 
 def test_the_powers_of_force_and_noise_are_told_apart() -> None:
-    bench = bench_of({"k_3": 2e3}, force=0.01)
-    linear, single, *_ = modelled(bench)
-    ((noise, force),) = Evidence(bench, linear, single).powers
+    context = bench_of({"k_3": 2e3}, force=0.01)
+    reidentified, single, *_ = modelled(context)
+    ((noise, force),) = Evidence(context, reidentified, single).powers
     # Lines are scaled so that white noise has its variance; a tenth of a record is faded.
     assert np.sqrt(noise) == pytest.approx(NOISE, rel=0.1)
     assert np.sqrt(force) == pytest.approx(0.01, rel=0.15)
 
 
 def test_what_trades_a_slow_error_for_a_fast_one_gains_nothing() -> None:
-    bench = bench_of({"k_3": 2e3, "T_c": 0.02}, 0.01)
-    linear, single, _, friction = modelled(bench)
-    evidence, rng = Evidence(bench, linear, single), np.random.default_rng(0)
+    context = bench_of({"k_3": 2e3, "T_c": 0.02}, 0.01)
+    reidentified, single, _, friction = modelled(context)
+    evidence, rng = Evidence(context, reidentified, single), np.random.default_rng(0)
 
     def shaken(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
         return tuple(0.5 * left + rng.normal(scale=3.0 * NOISE, size=left.shape) for left in parts)
@@ -102,22 +102,24 @@ def test_what_trades_a_slow_error_for_a_fast_one_gains_nothing() -> None:
     "changes", [{"observed": {"x": 3.0}}, {"free_offsets": ("x",)}], ids=["observer", "offsets"]
 )
 def test_evidence_is_known_under_observers_and_free_offsets(changes: dict[str, Any]) -> None:
-    bench = bench_of({"k_3": 2e3}, 0.01)
+    context = bench_of({"k_3": 2e3}, 0.01)
     fitted, scored = (
-        tuple(replace(r, **changes) for r in part) for part in (bench.estimation, bench.scoring)
+        tuple(replace(r, **changes) for r in part) for part in (context.estimation, context.scoring)
     )
-    bench = replace(bench, estimation=fitted, scoring=scored, look=fitted)
-    linear = fit_linear(bench, VALUES)
-    single = fit_candidate(bench, (CUBIC,), linear.fit)
-    evidence = Evidence(bench, linear, single)
-    assert evidence.criterion(single) < evidence.criterion(linear) - 100.0
+    context = replace(context, estimation=fitted, scoring=scored, look=fitted)
+    reidentified = reidentify(context, VALUES)
+    single = fit_candidate(context, (CUBIC,), reidentified.fit)
+    evidence = Evidence(context, reidentified, single)
+    assert evidence.criterion(single) < evidence.criterion(reidentified) - 100.0
 
 
 def test_states_that_move_the_readings_alike_cost_as_much() -> None:
     """Between a linear mass and its only sensor a lag of the drive is one of the sensor."""
-    bench = bench_of({"T_a": 0.03}, 0.01)
-    linear = fit_linear(bench, VALUES)
-    late = [fit_candidate(bench, (effect,), linear.fit) for effect in (LAG, effect_named("sensor_lag"))]
-    evidence = Evidence(bench, linear, linear)
+    context = bench_of({"T_a": 0.03}, 0.01)
+    reidentified = reidentify(context, VALUES)
+    late = [
+        fit_candidate(context, (effect,), reidentified.fit) for effect in (LAG, effect_named("sensor_lag"))
+    ]
+    evidence = Evidence(context, reidentified, reidentified)
     drive, sensor = (evidence.criterion(model) for model in late)
     assert drive == pytest.approx(sensor, abs=1.0)

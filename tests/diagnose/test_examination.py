@@ -30,10 +30,12 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
     adequate: bool | None,
     competes: bool,
 ) -> None:
-    found = [scored(PAIR, excess=pair)]
+    found = [scored(PAIR, error_over_noise=pair)]
     monkeypatch.setattr(examination, "grown", lambda *_: found)
-    linear = scored((), excess=40.0)
-    models = SimpleNamespace(bench=None, singles=[scored(SINGLE, excess=single)], linear=linear)
+    reidentified = scored((), error_over_noise=40.0)
+    models = SimpleNamespace(
+        context=None, singles=[scored(SINGLE, error_over_noise=single)], reidentified=reidentified
+    )
     checks = None if adequate is None else SimpleNamespace(is_adequate=lambda _: adequate)
     kept = examination._grown(models, [], None, checks, None)
     assert kept == (found if competes else [])

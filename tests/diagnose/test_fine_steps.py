@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.preparation import workbench_of
-from rigsight.diagnose.windows import Windowing
+from rigsight.diagnose.fitting.preparation import fit_context_of
+from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.identify import IdleThreads
 from rigsight.workflow.campaigns.campaign import read_campaign
 from rigsight.workflow.diagnose import task_of
@@ -17,10 +17,13 @@ def test_a_mass_that_samples_do_not_show_is_not_followed_to_zero(shared_data: Pa
     # At 50 samples a second the pole of a measured servo went to -1073 rad/s, in 16 steps a sample, for a thousandth of the cost.
     task = task_of(read_campaign(shared_data / "so101" / "elbow" / "campaign.toml"))
     noise = {floor.output: floor.std for floor in noise_floors(task.rig, task.records)}
-    bench = workbench_of(task, noise, Windowing(), None, IdleThreads())
-    linear = fit_linear(bench, bench.start)
-    assert max(linear.fit.substeps) <= 4
-    finest = bench.problem(linear.fit.structure, bench.estimation).fit(
-        linear.fit.values, linear.fit.free, linear.fit.initial_states, substeps=[16] * len(bench.estimation)
+    context = fit_context_of(task, noise, Windowing(), None, IdleThreads())
+    reidentified = reidentify(context, context.start)
+    assert max(reidentified.fit.substeps) <= 4
+    finest = context.problem(reidentified.fit.structure, context.estimation).fit(
+        reidentified.fit.values,
+        reidentified.fit.free,
+        reidentified.fit.initial_states,
+        substeps=[16] * len(context.estimation),
     )
-    assert linear.fit.cost < 1.005 * finest.cost
+    assert reidentified.fit.cost < 1.005 * finest.cost

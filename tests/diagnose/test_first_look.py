@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.candidates.first_look import Look, look_at, mean_square, widened
-from rigsight.diagnose.workbench import Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.search.first_look import FirstLook, look_at, mean_square, widened
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
@@ -29,11 +29,11 @@ def test_where_a_refit_is_bent_beyond_use_the_values_before_it_are_the_start() -
     modelled = compose(AXIS, [CUBIC])
     refit = GreyBoxFit(modelled, [record], scales, {"x": NOISE}).fit(GIVEN, [])
     bent = replace(refit, values={**refit.values, "k": 1.0, "k_3": -1e9})
-    bench = Workbench(
+    context = FitContext(
         AXIS, (record,), (record,), (record,), scales, {"x": NOISE}, frozenset(), modelled=(CUBIC,)
     )
-    assert not np.isfinite(look_at(bench, (HYSTERESIS,), bent, {}).cost)
-    rescued = look_at(replace(bench, start=GIVEN), (HYSTERESIS,), bent, {})
+    assert not np.isfinite(look_at(context, (HYSTERESIS,), bent, {}).cost)
+    rescued = look_at(replace(context, start=GIVEN), (HYSTERESIS,), bent, {})
     assert rescued.cost < 0.01 * refit.cost
 
 
@@ -44,11 +44,11 @@ def test_a_lag_too_short_for_the_steps_of_another_model_takes_its_own() -> None:
     own = {name: value for name, value in GIVEN.items() if name != "k_3"}
     record = simulate(compose(AXIS, [lag]), {**own, "T_a": short}, run)
     scales = characteristic_scales(AXIS, [record], own)
-    bench = Workbench(AXIS, (record,), (record,), (record,), scales, {"x": NOISE}, frozenset())
-    structure = bench.composed((lag,))
-    start = bench.problem(structure, (record,)).fit({**own, "T_a": short}, [])
+    context = FitContext(AXIS, (record,), (record,), (record,), scales, {"x": NOISE}, frozenset())
+    structure = context.composed((lag,))
+    start = context.problem(structure, (record,)).fit({**own, "T_a": short}, [])
     assert max(start.substeps) > 1
-    look = Look((lag,), structure, tuple(bench.free_parameters(structure)), (start,), 1.0)
-    assert not np.isfinite(bench.problem(structure, (record,)).fit(start.values, [], substeps=[1]).cost)
-    (wide,) = widened(bench, [look], substeps=[1])
+    look = FirstLook((lag,), structure, tuple(context.free_parameters(structure)), (start,), 1.0)
+    assert not np.isfinite(context.problem(structure, (record,)).fit(start.values, [], substeps=[1]).cost)
+    (wide,) = widened(context, [look], substeps=[1])
     assert mean_square(wide.fits[0]) < 1.0

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.diagnose.candidates import grow
-from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
-from rigsight.diagnose.candidates.grow import grown, pruned
-from rigsight.diagnose.second_cause import OtherForms
-from rigsight.diagnose.verdict import AT_FLOOR
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search import pairs as grow
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.pairs import grown, refit_singles
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.verdict.judgement import AT_FLOOR
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
@@ -59,7 +59,7 @@ def test_two_effects_are_found_and_the_stronger_comes_first():
     assert best.parameters["k_3"].value == pytest.approx(4e5, abs=4.5 * best.parameters["k_3"].std)
     assert best.parameters["T_a"].value == pytest.approx(0.01, abs=4.5 * best.parameters["T_a"].std)
     # Each of the two alone stays among the candidates and leaves more.
-    alone = {c.effects: c.excess for c in found.candidates if len(c.effects) == 1}
+    alone = {c.effects: c.error_over_noise for c in found.candidates if len(c.effects) == 1}
     assert alone["cubic_stiffness",] > 2.0
     assert alone["actuator_lag",] > alone["cubic_stiffness",]
 
@@ -78,9 +78,9 @@ def test_three_effects_are_found_where_the_second_closes_less_than_half():
     best = found.candidates[0]
     for name, true in (("k_3", 2e5), ("T_c", 0.05), ("T_a", 0.01)):
         assert best.parameters[name].value == pytest.approx(true, abs=4.5 * best.parameters[name].std)
-    left = {frozenset(c.effects): c.excess for c in found.candidates}
-    pair = min(excess for effects, excess in left.items() if len(effects) == 2)
-    single = min(excess for effects, excess in left.items() if len(effects) == 1)
+    left = {frozenset(c.effects): c.error_over_noise for c in found.candidates}
+    pair = min(error_over_noise for effects, error_over_noise in left.items() if len(effects) == 2)
+    single = min(error_over_noise for effects, error_over_noise in left.items() if len(effects) == 1)
     assert pair - 1.0 > 0.5 * (single - 1.0)
     assert sum(share["x"] for share in found.effect_shares.values()) == pytest.approx(1.0)
 
@@ -96,12 +96,17 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
     records = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0).records
     scales = characteristic_scales(AXIS, records, VALUES)
     fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
-    bench = Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
+    context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
     spring, lag = effect_named("cubic_stiffness"), effect_named("actuator_lag")
-    linear = fit_linear(bench, VALUES)
-    singles = fit_candidates(bench, linear, [spring])
+    reidentified = reidentify(context, VALUES)
+    singles = fit_candidates(context, reidentified, [spring])
     pairs = grown(
-        bench, singles, [spring, lag], AT_FLOOR, linear.excess, OtherForms(bench, lower_bound=False)
+        context,
+        singles,
+        [spring, lag],
+        AT_FLOOR,
+        reidentified.error_over_noise,
+        OtherForms(context, lower_bound=False),
     )
     assert [pair.names for pair in pairs] == [("cubic_stiffness", "actuator_lag")]
 
@@ -111,12 +116,12 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
 ) -> None:
     nothing, spring = effect_named("actuator_lag"), effect_named("power_law_stiffness")
     singles = [
-        scored((nothing.name,), excess=10.0, residuals=np.ones(8), n_free=4),
-        scored((spring.name,), excess=8.0, residuals=np.ones(8), n_free=6),
+        scored((nothing.name,), error_over_noise=10.0, residuals=np.ones(8), n_free=4),
+        scored((spring.name,), error_over_noise=8.0, residuals=np.ones(8), n_free=6),
     ]
     beside: list[str] = []
 
-    def tried(_: Workbench, parent: Scored, *rest: object) -> list[Scored]:
+    def tried(_: FitContext, parent: Scored, *rest: object) -> list[Scored]:
         beside.extend(parent.names)
         return []
 
@@ -132,20 +137,20 @@ def test_a_single_that_stopped_short_is_found_again_from_a_pair() -> None:
     records = measured({"backlash": {"g": 1e-3}}, seed=2).records
     scales = characteristic_scales(AXIS, records, VALUES)
     fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
-    bench = Workbench(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
+    context = FitContext(AXIS, fitted, scored, fitted, scales, {"x": NOISE}, frozenset())
 
     def model(effects: tuple[Effect, ...], own: dict[str, float]) -> Scored:
-        structure = bench.composed(effects)
-        fit = bench.problem(structure, fitted).fit({**VALUES, **own}, [])
-        free = tuple(bench.free_parameters(structure))
-        return bench.score(effects, replace(fit, free=free))
+        structure = context.composed(effects)
+        fit = context.problem(structure, fitted).fit({**VALUES, **own}, [])
+        free = tuple(context.free_parameters(structure))
+        return context.score(effects, replace(fit, free=free))
 
     stopped, other = model((play,), {"g": 4e-4}), model((spring,), {"k_3": 1e4})
     pair = model((play, spring), {"g": 1.01e-3, "k_3": 1e3})
-    assert stopped.excess > 3.0 * pair.excess
-    again, same = pruned(bench, [stopped, other], [pair])
+    assert stopped.error_over_noise > 3.0 * pair.error_over_noise
+    again, same = refit_singles(context, [stopped, other], [pair])
     assert again.names == ("backlash",)
-    assert again.excess == pytest.approx(1.0, abs=0.1)
+    assert again.error_over_noise == pytest.approx(1.0, abs=0.1)
     assert again.fit.values["g"] == pytest.approx(1e-3, rel=0.01)
-    assert same.excess <= other.excess
-    assert pruned(bench, [again, other], [])[0] is again
+    assert same.error_over_noise <= other.error_over_noise
+    assert refit_singles(context, [again, other], [])[0] is again

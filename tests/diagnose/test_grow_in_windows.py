@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
-from rigsight.diagnose.windows import Windowing
-from rigsight.diagnose.workbench import Workbench, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
+from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.search.pairs_in_windows import pairs_in_windows
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.rigs import AXIS
@@ -21,7 +21,7 @@ PAIR = (effect_named("backlash"), effect_named("input_dead_zone"))
 
 
 @pytest.fixture
-def benches() -> tuple[Workbench, Workbench]:
+def benches() -> tuple[FitContext, FitContext]:
     """The bench of whole records, and that of windows of four cycles."""
     records = measured([effect.name for effect in PAIR], {"g": 1.35e-4, "u_0": 0.1}, 3000)
     made = []
@@ -30,21 +30,21 @@ def benches() -> tuple[Workbench, Workbench]:
         look = liveliest(fitted, AXIS)
         scales = characteristic_scales(AXIS, records, RIG)
         made.append(
-            Workbench(AXIS, fitted, scored, look, scales, {"x": NOISE}, frozenset({"gain"}), start=RIG)
+            FitContext(AXIS, fitted, scored, look, scales, {"x": NOISE}, frozenset({"gain"}), start=RIG)
         )
     return made[0], made[1]
 
 
-def test_a_pair_that_stopped_short_reaches_the_noise(benches: tuple[Workbench, Workbench]) -> None:
+def test_a_pair_that_stopped_short_reaches_the_noise(benches: tuple[FitContext, FitContext]) -> None:
     whole, windows = benches
-    linear = fit_linear(whole, RIG)
+    reidentified = reidentify(whole, RIG)
     structure = whole.composed(PAIR)
     beside = {**TRUTH, "g": 3e-4, "u_0": 0.05}
     free = whole.free_parameters(structure)
     short = whole.problem(structure, whole.estimation).fit(beside, free, max_evaluations=1)
     stopped = whole.score(PAIR, replace(short, values=beside))
-    assert stopped.excess > 3.0
-    (found,) = pairs_in_windows(whole, windows, linear, [stopped])
-    assert found.excess == pytest.approx(1.0, abs=0.1)
+    assert stopped.error_over_noise > 3.0
+    (found,) = pairs_in_windows(whole, windows, reidentified, [stopped])
+    assert found.error_over_noise == pytest.approx(1.0, abs=0.1)
     assert found.fit.values["u_0"] == pytest.approx(0.1, rel=0.02)
     assert found.fit.values["g"] == pytest.approx(1.35e-4, rel=0.02)

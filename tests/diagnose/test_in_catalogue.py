@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.in_catalogue import probability_in_catalogue
-from rigsight.diagnose.rank import Ranking
-from rigsight.diagnose.result import Grounds
-from rigsight.diagnose.verdict import Judgement
+from rigsight.diagnose.verdict.catalogue_coverage import probability_in_catalogue
+from rigsight.diagnose.verdict.judgement import Judgement
+from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 NOISE = np.random.default_rng(0).standard_normal(2000)
 

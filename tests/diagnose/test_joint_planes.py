@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location import joint_planes
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.joint_planes import joint_parts
-from rigsight.diagnose.result import Trace
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.location.trace import Trace
 from rigsight.effects import effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records.record import Record
@@ -20,17 +20,17 @@ from rigsight.records.record import Record
 FRICTION = 0.01
 
 
-def told(train: Any, records: tuple[Record, ...]) -> tuple[Workbench, Scored, list[Trace]]:
+def told(train: Any, records: tuple[Record, ...]) -> tuple[FitContext, Scored, list[Trace]]:
     """The true numbers without the friction on the record that judges."""
     fitted, scored = records[:2], records[2:]
-    bench = Workbench(
+    context = FitContext(
         train.rig, fitted, scored, fitted, characteristic_scales(train.rig, fitted, train.values),
         {signal.name: train.noise for signal in train.rig.outputs}, frozenset(),
     )  # fmt: skip
-    fit = GreyBoxFit(bench.composed(), fitted, bench.scales, bench.noise).fit(train.values, [])
-    linear = bench.score((), fit)
+    fit = GreyBoxFit(context.composed(), fitted, context.scales, context.noise).fit(train.values, [])
+    reidentified = context.score((), fit)
     traces = []
-    for record, residual in zip(scored, linear.residuals, strict=True):
+    for record, residual in zip(scored, reidentified.residuals, strict=True):
         shown = {s.name: record[s.name] for s in train.rig.outputs if s.name in record}
         names = [s.name for s in train.rig.outputs]
         left = {name: shown[name] - residual[:, names.index(name)] for name in shown}
@@ -38,14 +38,14 @@ def told(train: Any, records: tuple[Record, ...]) -> tuple[Workbench, Scored, li
         traces.append(
             Trace(record.name, record.role, "sweep", None, record.t, driven, shown, left, left, left)
         )
-    return bench, linear, traces
+    return context, reidentified, traces
 
 
 @pytest.fixture(scope="module")
 def hidden(train: Any) -> tuple[tuple[StatePart, ...], list[Trace]]:
     records = train.records([placed(effect_named("coulomb_friction"), "load_bearing")], {"T_c": FRICTION})
-    bench, linear, traces = told(train, records)
-    return joint_parts(bench, linear, traces), traces
+    context, reidentified, traces = told(train, records)
+    return joint_parts(context, reidentified, traces), traces
 
 
 def test_the_joint_of_the_friction_comes_first_and_lacks_it(
@@ -75,9 +75,9 @@ def test_of_long_records_the_stretch_with_the_largest_gap_is_mapped(
     train: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(joint_planes, "_MAPPED", 300)
-    bench, linear, (trace,) = told(train, train.records())
+    context, reidentified, (trace,) = told(train, train.records())
     late = {name: np.where(trace.t > 4.0, samples + 1.0, samples) for name, samples in trace.before.items()}
-    parts = joint_parts(bench, linear, [replace(trace, before=late, reidentified=late)])
+    parts = joint_parts(context, reidentified, [replace(trace, before=late, reidentified=late)])
     own = [part for part in parts if (part.joint, part.output) == ("shaft", "load_angle")]
     assert sum(part.n_samples for part in own) == 300
     assert min(part.reidentified for part in own) * np.std(trace.measured["load_angle"][-300:]) > 0.5
@@ -90,6 +90,6 @@ def test_without_a_gap_no_force_is_lacking(train: Any) -> None:
 
 
 def test_beside_a_modelled_effect_there_is_none(train: Any) -> None:
-    bench, linear, traces = told(train, train.records())
-    modelled = replace(bench, modelled=(placed(effect_named("coulomb_friction"), "shaft"),))
-    assert joint_parts(modelled, linear, traces) == ()
+    context, reidentified, traces = told(train, train.records())
+    modelled = replace(context, modelled=(placed(effect_named("coulomb_friction"), "shaft"),))
+    assert joint_parts(modelled, reidentified, traces) == ()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.location.lateral_leg import fit_lateral_leg
-from rigsight.diagnose.workbench import Workbench
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RUNNING_GEAR
@@ -31,7 +31,7 @@ def lateral(t: NDArray[np.float64]) -> NDArray[np.float64]:
     return answer
 
 
-def bench(psi: NDArray[np.float64], y: NDArray[np.float64], noise: Mapping[str, float]) -> Workbench:
+def context(psi: NDArray[np.float64], y: NDArray[np.float64], noise: Mapping[str, float]) -> FitContext:
     rng = np.random.default_rng(0)
     records = []
     for name, role in (("a", "estimation"), ("b", "validation")):
@@ -42,14 +42,14 @@ def bench(psi: NDArray[np.float64], y: NDArray[np.float64], noise: Mapping[str, 
         }
         records.append(Record(name=name, dt=DT, signals=signals, units={}, role=role))  # type: ignore[arg-type]
     fitted, scored = records
-    return Workbench(RUNNING_GEAR, (fitted,), (scored,), (fitted,), {}, noise, frozenset())
+    return FitContext(RUNNING_GEAR, (fitted,), (scored,), (fitted,), {}, noise, frozenset())
 
 
 NOISE = {"psi": 2e-5, "y": 1e-5}
 
 
 def test_the_given_numbers_leave_the_noise_where_they_are_right() -> None:
-    leg = fit_lateral_leg(bench(motion(T), lateral(T), NOISE), VALUES)
+    leg = fit_lateral_leg(context(motion(T), lateral(T), NOISE), VALUES)
     assert leg is not None
     floor = np.hypot(NOISE["y"], leg.noise_gain * NOISE["psi"])
     assert rms(leg.given[0]) == pytest.approx(floor, rel=0.1)
@@ -57,7 +57,7 @@ def test_the_given_numbers_leave_the_noise_where_they_are_right() -> None:
 
 
 def test_wrong_numbers_are_fitted() -> None:
-    leg = fit_lateral_leg(bench(motion(T), lateral(T), NOISE), {**VALUES, "c_y": 0.7, "y_off": 0.0})
+    leg = fit_lateral_leg(context(motion(T), lateral(T), NOISE), {**VALUES, "c_y": 0.7, "y_off": 0.0})
     assert leg is not None
     assert rms(leg.given[0]) > 50.0 * rms(leg.fitted[0])
 
@@ -66,7 +66,7 @@ def test_wrong_numbers_are_fitted() -> None:
 def test_a_late_sensor_shows_as_a_shift_of_its_sign(delay: float) -> None:
     """Late psi (positive) needs psi from later samples; late y the other way round."""
     late_psi, late_y = max(delay, 0.0), max(-delay, 0.0)
-    leg = fit_lateral_leg(bench(motion(T - late_psi), lateral(T - late_y), NOISE), VALUES)
+    leg = fit_lateral_leg(context(motion(T - late_psi), lateral(T - late_y), NOISE), VALUES)
     assert leg is not None
     assert leg.shift == pytest.approx(delay, abs=5.0 * leg.shift_std)
     assert leg.shift_std < 0.002
@@ -74,7 +74,7 @@ def test_a_late_sensor_shows_as_a_shift_of_its_sign(delay: float) -> None:
 
 
 def test_what_delays_the_motion_itself_leaves_the_leg_alone() -> None:
-    leg = fit_lateral_leg(bench(motion(T - 0.05), lateral(T - 0.05), NOISE), VALUES)
+    leg = fit_lateral_leg(context(motion(T - 0.05), lateral(T - 0.05), NOISE), VALUES)
     assert leg is not None
     assert abs(leg.shift) < 5.0 * leg.shift_std
 
@@ -82,17 +82,17 @@ def test_what_delays_the_motion_itself_leaves_the_leg_alone() -> None:
 def test_the_noise_of_the_motion_is_propagated() -> None:
     """With a noisy motion sensor alone, what is left of y is that noise behind the PT1."""
     noise = {"psi": 1e-3, "y": 1e-9}
-    leg = fit_lateral_leg(bench(motion(T), lateral(T), noise), VALUES)
+    leg = fit_lateral_leg(context(motion(T), lateral(T), noise), VALUES)
     assert leg is not None
     assert rms(leg.given[0]) == pytest.approx(leg.noise_gain * noise["psi"], rel=0.35)
 
 
 def test_a_rig_without_a_lateral_part_has_no_such_leg() -> None:
     record = Record(name="a", dt=DT, signals={"u": T, "x": T}, units={})
-    axis = Workbench(AXIS, (record,), (record,), (record,), {}, {"x": 1.0}, frozenset())
+    axis = FitContext(AXIS, (record,), (record,), (record,), {}, {"x": 1.0}, frozenset())
     assert fit_lateral_leg(axis, {}) is None
     gear = Record(name="a", dt=DT, signals={"u": T, "psi": T}, units={})
     assert (
-        fit_lateral_leg(Workbench(RUNNING_GEAR, (gear,), (gear,), (gear,), {}, {}, frozenset()), VALUES)
+        fit_lateral_leg(FitContext(RUNNING_GEAR, (gear,), (gear,), (gear,), {}, {}, frozenset()), VALUES)
         is None
     )

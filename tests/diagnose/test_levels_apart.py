@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.data.finding import Finding
-from rigsight.diagnose.data.offset_question import levels_apart
-from rigsight.diagnose.workbench import Workbench
+from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.diagnose.data_quality.offsets_by_record import levels_apart
+from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -20,7 +20,7 @@ T = 0.01 * np.arange(500)
 def told(rig: Rig, records: Sequence[Record], given: Mapping[str, float] = NUMBERS) -> list[Finding]:
     noise = {signal.name: 1e-4 for signal in rig.outputs}
     shown = tuple(records)
-    return levels_apart(Workbench(rig, shown, shown, shown, {}, noise, frozenset(), given=given), shown)
+    return levels_apart(FitContext(rig, shown, shown, shown, {}, noise, frozenset(), given=given), shown)
 
 
 def runs(zero: float, push: float = 0.0) -> list[Record]:

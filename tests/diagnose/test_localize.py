@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rigsight.diagnose.candidates.characterize import fit_linear
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.localize import localize
-from rigsight.diagnose.result import STAGES, NoiseFloor, Trace
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.location.trace import STAGES, Trace
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
@@ -49,9 +50,9 @@ def measured(
     return tuple(records)
 
 
-def workbench(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> Workbench:
+def workbench(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) -> FitContext:
     fitted = tuple(r for r in records if r.role == "estimation")
-    return Workbench(
+    return FitContext(
         rig=rig,
         estimation=fitted,
         scoring=tuple(r for r in records if r.role == "validation"),
@@ -62,21 +63,21 @@ def workbench(rig: Rig, records: Sequence[Record], values: Mapping[str, float]) 
     )
 
 
-def as_given(bench: Workbench, values: Mapping[str, float]) -> Scored:
+def as_given(context: FitContext, values: Mapping[str, float]) -> Scored:
     """The simulation with these very numbers; only initial states are estimated."""
-    fit = GreyBoxFit(bench.composed(), bench.estimation, bench.scales, bench.noise).fit(values, [])
-    return bench.score((), fit)
+    fit = GreyBoxFit(context.composed(), context.estimation, context.scales, context.noise).fit(values, [])
+    return context.score((), fit)
 
 
-def traces(bench: Workbench, *stages: Scored) -> tuple[Trace, ...]:
-    names = [signal.name for signal in bench.rig.outputs]
+def traces(context: FitContext, *stages: Scored) -> tuple[Trace, ...]:
+    names = [signal.name for signal in context.rig.outputs]
     found = []
-    for i, record in enumerate(bench.scoring):
+    for i, record in enumerate(context.scoring):
         outputs = {n: record[n] for n in names}
         simulated = [
             {n: record[n] - model.residuals[i][:, j] for j, n in enumerate(names)} for model in stages
         ]
-        source = bench.rig.inputs[0].name
+        source = context.rig.inputs[0].name
         found.append(
             Trace(
                 record.name,
@@ -93,10 +94,10 @@ def traces(bench: Workbench, *stages: Scored) -> tuple[Trace, ...]:
 
 
 def localized(
-    bench: Workbench, before: Scored, linear: Scored, after: Scored
+    context: FitContext, before: Scored, reidentified: Scored, after: Scored
 ) -> tuple[Localization, tuple[Trace, ...]]:
-    shown = traces(bench, before, linear, after)
-    where = localize(bench, shown, "validation", before, linear, after, np.random.default_rng(0))
+    shown = traces(context, before, reidentified, after)
+    where = localize(context, shown, "validation", before, reidentified, after, np.random.default_rng(0))
     return where, shown
 
 
@@ -104,10 +105,10 @@ def localized(
 def friction() -> tuple[Localization, tuple[Trace, ...]]:
     """Coulomb friction of 0.5 N hidden from a stage that is otherwise simulated with its true numbers."""
     records = measured(AXIS, ["coulomb_friction"], {**STAGE, "T_c": 0.5})
-    bench = workbench(AXIS, records, STAGE)
-    given = as_given(bench, {**STAGE, "d": 8.0})
-    true = as_given(bench, STAGE)
-    return localized(bench, given, true, true)
+    context = workbench(AXIS, records, STAGE)
+    given = as_given(context, {**STAGE, "d": 8.0})
+    true = as_given(context, STAGE)
+    return localized(context, given, true, true)
 
 
 def test_shares_of_a_split_add_up_to_the_gap(friction: tuple[Localization, tuple[Trace, ...]]) -> None:
@@ -176,9 +177,9 @@ def test_it_is_plain_json(friction: tuple[Localization, tuple[Trace, ...]]) -> N
 
 def test_a_gap_at_the_floor_lacks_no_force() -> None:
     records = measured(AXIS, [], STAGE)
-    bench = workbench(AXIS, records, STAGE)
-    true = as_given(bench, STAGE)
-    where, _ = localized(bench, true, true, true)
+    context = workbench(AXIS, records, STAGE)
+    true = as_given(context, STAGE)
+    where, _ = localized(context, true, true, true)
     assert all(np.isnan(part.force_mean) for part in where.by_state)
     assert where.by_path[0].noise_share == pytest.approx(1.0, abs=0.1)
 
@@ -186,9 +187,9 @@ def test_a_gap_at_the_floor_lacks_no_force() -> None:
 def test_the_force_of_a_bench_is_its_residual() -> None:
     values = {"k": 100.0, "d": 2.0, "force_off": 0.0}
     records = measured(ELEMENT, ["coulomb_friction"], {**values, "T_c": 0.5})
-    bench = workbench(ELEMENT, records, values)
-    true = as_given(bench, values)
-    where, shown = localized(bench, true, true, true)
+    context = workbench(ELEMENT, records, values)
+    true = as_given(context, values)
+    where, shown = localized(context, true, true, true)
     samples = sum(part.n_samples for part in where.by_state)
     squares = sum(part.n_samples * part.force_rms**2 for part in where.by_state) / samples
     residual = np.concatenate([trace.residual("reidentified", "force") for trace in shown])
@@ -206,9 +207,9 @@ def test_the_path_tells_a_late_input_from_a_late_sensor(
     effect: str, values: dict[str, float], said: str
 ) -> None:
     """Both delay u -> psi alike; only the leg from the measured psi to y knows which of them it is."""
-    bench = workbench(RUNNING_GEAR, measured(RUNNING_GEAR, [effect], {**GEAR, **values}, 30.0), GEAR)
-    linear = fit_linear(bench, GEAR)
-    where, _ = localized(bench, as_given(bench, GEAR), linear, linear)
+    context = workbench(RUNNING_GEAR, measured(RUNNING_GEAR, [effect], {**GEAR, **values}, 30.0), GEAR)
+    reidentified = reidentify(context, GEAR)
+    where, _ = localized(context, as_given(context, GEAR), reidentified, reidentified)
     motion, lateral = where.by_path
     assert said in where.sentence
     assert motion.reidentified > 5.0 * motion.noise_floor
@@ -221,9 +222,9 @@ def test_the_path_tells_a_late_input_from_a_late_sensor(
 
 def test_the_path_tells_a_gap_of_the_lateral_part_from_a_late_sensor() -> None:
     records = measured(RUNNING_GEAR, ["creep_saturation"], {**GEAR, "s": 0.03}, 30.0)
-    bench = workbench(RUNNING_GEAR, records, GEAR)
-    linear = fit_linear(bench, GEAR)
-    where, _ = localized(bench, as_given(bench, GEAR), linear, linear)
+    context = workbench(RUNNING_GEAR, records, GEAR)
+    reidentified = reidentify(context, GEAR)
+    where, _ = localized(context, as_given(context, GEAR), reidentified, reidentified)
     motion, lateral = where.by_path
     assert motion.reidentified < 1.1 * motion.noise_floor
     assert lateral.reidentified > 2.0 * lateral.noise_floor
@@ -231,18 +232,18 @@ def test_the_path_tells_a_gap_of_the_lateral_part_from_a_late_sensor() -> None:
 
 
 def test_a_clean_path_says_so() -> None:
-    bench = workbench(RUNNING_GEAR, measured(RUNNING_GEAR, [], GEAR, 30.0), GEAR)
-    true = as_given(bench, GEAR)
-    where, _ = localized(bench, true, true, true)
+    context = workbench(RUNNING_GEAR, measured(RUNNING_GEAR, [], GEAR, 30.0), GEAR)
+    true = as_given(context, GEAR)
+    where, _ = localized(context, true, true, true)
     assert "No leg of the path has a gap" in where.sentence
 
 
 def test_the_floor_of_a_band_follows_the_noise_where_it_was_seen_alone() -> None:
     """Noise below 6 rad/s only: the bands there carry the floor, those above nothing; white noise spreads over all."""
     records = measured(AXIS, ["coulomb_friction"], {**STAGE, "T_c": 0.5})
-    bench = workbench(AXIS, records, STAGE)
-    true = as_given(bench, STAGE)
-    shown = traces(bench, true, true, true)
+    context = workbench(AXIS, records, STAGE)
+    true = as_given(context, STAGE)
+    shown = traces(context, true, true, true)
     rng = np.random.default_rng(0)
     slow = scipy.signal.sosfiltfilt(
         scipy.signal.butter(4, 6.0 * DT / np.pi, output="sos"), rng.standard_normal(4000)
@@ -250,7 +251,9 @@ def test_the_floor_of_a_band_follows_the_noise_where_it_was_seen_alone() -> None
     seen = NoiseFloor("x", "m", NOISE, "stretches in which the input rests", stretches=((slow, DT),))
 
     def localized_with(*floors: NoiseFloor) -> Localization:
-        return localize(bench, shown, "validation", true, true, true, np.random.default_rng(0), floors=floors)
+        return localize(
+            context, shown, "validation", true, true, true, np.random.default_rng(0), floors=floors
+        )
 
     colored, white = localized_with(seen), localized_with()
     assert (colored.noise_shape, white.noise_shape) == ({"x": "measured"}, {"x": "white"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.main_cause import main_cause
+from rigsight.diagnose.verdict.main_cause import main_cause
 from rigsight.rigs import AXIS
 
 N = 4000
@@ -15,10 +15,10 @@ N = 4000
 def cause(scored):
     def of(left: np.ndarray, tied: tuple[str, ...] = (), others_left: np.ndarray | None = None):
         rng = np.random.default_rng(0)
-        linear = scored((), residuals=10.0 * rng.standard_normal(N))
+        reidentified = scored((), residuals=10.0 * rng.standard_normal(N))
         best = scored(("coulomb_friction",), residuals=left)
         rivals = [scored((name,), residuals=left if others_left is None else others_left) for name in tied]
-        return main_cause(AXIS, linear, best, rivals, np.ones(1), np.random.default_rng(1))
+        return main_cause(AXIS, reidentified, best, rivals, np.ones(1), np.random.default_rng(1))
 
     return of
 

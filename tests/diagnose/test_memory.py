@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Diagnosis, Task, diagnose
-from rigsight.diagnose.candidates.starts import restart_values
+from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records.record import Record
@@ -68,7 +68,7 @@ def test_its_numbers_come_back(name: str) -> None:
     truth, found = TRUTHS[name], diagnosed(name)
     assert found.effects == ("iwan_hysteresis",)
     best = found.candidates[0]
-    assert best.excess < 1.1
+    assert best.error_over_noise < 1.1
     for number in ("k", "a", "x_s", "q"):
         assert best.parameters[number].value == pytest.approx(truth[number], rel=0.02), number
 
@@ -77,7 +77,7 @@ def test_its_numbers_come_back(name: str) -> None:
 def test_no_draw_of_noise_leads_to_a_wrong_minimum(draw: int) -> None:
     """Another one, with sliders that reach sixty times as far, leaves eight times the noise."""
     best = diagnose(recorded(NEARLY_ALL_MEMORY, draw, disturbance=1), [IWAN]).candidates[0]
-    assert best.excess < 1.1
+    assert best.error_over_noise < 1.1
     for name in ("k", "a", "x_s", "q"):
         assert best.parameters[name].value == pytest.approx(NEARLY_ALL_MEMORY[name], rel=0.02), name
 

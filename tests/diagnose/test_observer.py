@@ -10,8 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.diagnose.horizon import windowing_of
-from rigsight.diagnose.observer import Observer, followed_sensors, structures_to_fit
+from rigsight.diagnose.fitting.observer import Observer, followed_sensors, structures_to_fit
+from rigsight.diagnose.search.horizon import windowing_of
 from rigsight.effects import CATALOGUE, effect_named, placed
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.records import Record

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.candidates.one_law import is_linear, is_one_law, told_apart
+from rigsight.diagnose.search.one_law import is_linear, is_one_law, split_distinguishable
 from rigsight.effects import CATALOGUE
 
 SPRINGS = ("bouc_wen_hysteresis", "cubic_stiffness")
@@ -40,14 +40,16 @@ def test_one_law_is_told_from_two(scored, effects: tuple[str, ...], one: bool) -
 def test_a_pair_of_one_law_must_be_exact_and_needed(
     scored, effects: tuple[str, ...], left: float, single: float, stays: bool
 ) -> None:
-    pair = scored(effects, excess=left)
-    kept, imitations = told_apart([pair], [scored((effects[0],), excess=single)], allowed=1.15)
+    pair = scored(effects, error_over_noise=left)
+    kept, imitations = split_distinguishable(
+        [pair], [scored((effects[0],), error_over_noise=single)], allowed=1.15
+    )
     assert (kept, imitations) == (([pair], []) if stays else ([], [pair]))
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_linear_effects_are_known(effect) -> None:
-    linear = {
+    reidentified = {
         "flexible_mode", "maxwell_branch", "inertia", "actuator_lag", "input_delay", "sensor_lag", "sensor_delay", "time_shift",
     }  # fmt: skip
-    assert is_linear(effect) == (effect.name in linear)
+    assert is_linear(effect) == (effect.name in reidentified)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.candidates.persistent_line import persistent_line
+from rigsight.diagnose.search.persistent_line import persistent_line
 from rigsight.excitation import linear_sweep
 
 DT = 0.01

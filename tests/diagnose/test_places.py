@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, candidates_on, diagnose
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.places.search import search_places
-from rigsight.diagnose.workbench import Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named, placed
 from rigsight.identify import characteristic_scales
 from rigsight.rigs import RIGS
@@ -35,10 +35,10 @@ def test_the_place_comes_first(train: Any, name: str, place: str, values: dict[s
     fitted = tuple(record for record in records if record.role == "estimation")
     noise = {signal.name: train.noise for signal in TRAIN.outputs}
     scales = characteristic_scales(TRAIN, fitted, train.values)
-    bench = Workbench(TRAIN, fitted, fitted, fitted, scales, noise, frozenset(), train.values)
-    linear = fit_linear(bench, train.values)
+    context = FitContext(TRAIN, fitted, fitted, fitted, scales, noise, frozenset(), train.values)
+    reidentified = reidentify(context, train.values)
     effects = candidates_on(TRAIN, EFFECTS)
-    search = search_places(bench, linear, effects)
+    search = search_places(context, reidentified, effects)
     assert search.places[0].name == place
     assert all(effect in search.effects for effect in effects if effect.at == place)
     assert len(search.effects) + len(search.others) == len(effects)

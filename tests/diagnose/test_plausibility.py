@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.plausibility import doubts, plausible_first
-from rigsight.diagnose.rank import Ranking
-from rigsight.diagnose.result import Grounds
-from rigsight.diagnose.workbench import Scored
+from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
+from rigsight.diagnose.verdict.ranking import Grounds, Ranking
 
 PLACES = {"coulomb_friction": "dynamics", "stribeck_friction": "dynamics", "actuator_lag": "actuator"}
 
@@ -22,8 +21,8 @@ def with_numbers(model: Scored, values: dict[str, float], errors: dict[str, floa
 
 @pytest.fixture
 def models(scored):
-    linear = with_numbers(
-        scored((), excess=20.0), {"m": 1.0, "d": 1.0, "k": 100.0}, dict.fromkeys("mdk", 0.1)
+    reidentified = with_numbers(
+        scored((), error_over_noise=20.0), {"m": 1.0, "d": 1.0, "k": 100.0}, dict.fromkeys("mdk", 0.1)
     )
     own = {"m": 1.0, "d": 1.0, "k": 100.0}
     coulomb = with_numbers(
@@ -36,7 +35,7 @@ def models(scored):
         {**own, "T_c": 0.5, "T_s": 1.0, "w_s": 0.1},
         {**dict.fromkeys([*"mdk", "T_c"], 0.1), "T_s": np.inf, "w_s": np.inf},
     )
-    return linear, coulomb, stribeck
+    return reidentified, coulomb, stribeck
 
 
 def ranked(*models: Scored) -> Ranking:
@@ -46,38 +45,38 @@ def ranked(*models: Scored) -> Ranking:
 
 
 def test_plain_numbers_leave_no_doubt(models) -> None:
-    linear, coulomb, _ = models
-    assert doubts(coulomb, linear) == ()
+    reidentified, coulomb, _ = models
+    assert doubts(coulomb, reidentified) == ()
 
 
 def test_numbers_that_records_do_not_determine_are_grave(models) -> None:
-    linear, _, stribeck = models
-    (doubt,) = doubts(stribeck, linear)
+    reidentified, _, stribeck = models
+    (doubt,) = doubts(stribeck, reidentified)
     assert doubt.grave
     assert "T_s, w_s" in doubt.text
 
 
 def test_a_stiffness_a_hundred_times_off_and_a_number_at_its_bound_are_told(models) -> None:
-    linear, coulomb, _ = models
+    reidentified, coulomb, _ = models
     values = {**coulomb.fit.values, "k": 1.1e4, "T_c": 0.0}
-    found = doubts(with_numbers(coulomb, values, coulomb.fit.standard_errors), linear)
+    found = doubts(with_numbers(coulomb, values, coulomb.fit.standard_errors), reidentified)
     assert not any(doubt.grave for doubt in found)
     assert any("k = 1.1e+04" in doubt.text for doubt in found)
     assert any("T_c = 0 stands at the bound" in doubt.text for doubt in found)
 
 
 def test_a_plausible_model_at_the_same_place_comes_first(models) -> None:
-    linear, coulomb, stribeck = models
-    found = plausible_first(ranked(stribeck, coulomb), linear, PLACES)
+    reidentified, coulomb, stribeck = models
+    found = plausible_first(ranked(stribeck, coulomb), reidentified, PLACES)
     assert found.order[0] is coulomb
     assert found.tied == (stribeck,)
     assert sum(found.probabilities) == pytest.approx(1.0)
 
 
 def test_a_model_that_is_far_worse_or_elsewhere_does_not(models, scored) -> None:
-    linear, coulomb, stribeck = models
-    worse = replace(coulomb, excess=10.0)
+    reidentified, coulomb, stribeck = models
+    worse = replace(coulomb, error_over_noise=10.0)
     lag = with_numbers(
         scored(("actuator_lag",), residuals=np.full(9, 5.1)), coulomb.fit.values, coulomb.fit.standard_errors
     )
-    assert plausible_first(ranked(stribeck, lag, worse), linear, PLACES).order[0] is stribeck
+    assert plausible_first(ranked(stribeck, lag, worse), reidentified, PLACES).order[0] is stribeck

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.predictability import growth_of_disturbances
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.effects import effect_named, placed
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
@@ -18,7 +18,7 @@ DT, NOISE = 0.01, 1e-5
 VALUES = {"gain": 1.0, "m": 1.0, "d": 1.6, "k": 100.0, "x_off": 0.0, "force_off": 0.0}
 
 
-def model_of(effects: dict[str, dict[str, float]]) -> tuple[Workbench, Scored]:
+def model_of(effects: dict[str, dict[str, float]]) -> tuple[FitContext, Scored]:
     structure = compose(AXIS, [effect_named(name) for name in effects])
     values = {**VALUES, **{name: value for own in effects.values() for name, value in own.items()}}
     t = DT * np.arange(4000)
@@ -26,15 +26,15 @@ def model_of(effects: dict[str, dict[str, float]]) -> tuple[Workbench, Scored]:
     record = simulate(structure, values, run)
     scales = characteristic_scales(AXIS, [record], VALUES)
     noise = {"x": NOISE}
-    bench = Workbench(AXIS, (record,), (record,), (record,), scales, noise, frozenset())
+    context = FitContext(AXIS, (record,), (record,), (record,), scales, noise, frozenset())
     fit = GreyBoxFit(structure, [record], scales, noise).fit(values, [])
-    return bench, Scored(structure.effects, fit, fit, fit.weighted_rms)
+    return context, Scored(structure.effects, fit, fit, fit.weighted_rms)
 
 
 def growth(effects: dict[str, dict[str, float]]) -> float:
-    bench, model = model_of(effects)
-    _, linear = model_of({})
-    return growth_of_disturbances(bench, linear, model, np.random.default_rng(0))
+    context, model = model_of(effects)
+    _, reidentified = model_of({})
+    return growth_of_disturbances(context, reidentified, model, np.random.default_rng(0))
 
 
 def test_the_linear_rig_moves_by_the_noise() -> None:
@@ -61,10 +61,10 @@ def test_each_input_is_disturbed_and_each_sensor_looked_at(two_masses: Rig) -> N
         structure = compose(two_masses, effects)
         record = simulate(structure, values | own, Record("sweep", DT, drives, {}, hold="zoh"))
         scales = characteristic_scales(two_masses, [record], values)
-        bench = Workbench(two_masses, (record,), (record,), (record,), scales, noise, frozenset())
+        context = FitContext(two_masses, (record,), (record,), (record,), scales, noise, frozenset())
         fit = GreyBoxFit(structure, [record], scales, noise).fit(values | own, [])
         models.append(Scored(structure.effects, fit, fit, fit.weighted_rms))
-    linear, with_play = models
+    reidentified, with_play = models
     rng = np.random.default_rng(0)
-    assert growth_of_disturbances(bench, linear, linear, rng) == pytest.approx(1.0, rel=1e-6)
-    assert growth_of_disturbances(bench, linear, with_play, rng) > 3.0
+    assert growth_of_disturbances(context, reidentified, reidentified, rng) == pytest.approx(1.0, rel=1e-6)
+    assert growth_of_disturbances(context, reidentified, with_play, rng) > 3.0

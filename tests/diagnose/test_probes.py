@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigsight.diagnose.places.probes import (
+from rigsight.diagnose.pushes.probes import (
     PUSH_SIZE,
     STIFFNESS,
     alone,

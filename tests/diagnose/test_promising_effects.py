@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Diagnosis, Task, diagnose
-from rigsight.diagnose.candidates.characterize import fit_linear
-from rigsight.diagnose.places.search import Search, search_places
-from rigsight.diagnose.places.suspects import Lineup
-from rigsight.diagnose.workbench import Workbench, liveliest
+from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
+from rigsight.diagnose.search.places import Search, search_places
+from rigsight.diagnose.search.screening import Lineup
+from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import characteristic_scales
@@ -54,9 +54,9 @@ def diagnosed(effects: Sequence[str], values: Mapping[str, float], tried: Sequen
 def looked_at(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effect]]:
     fitted = tuple(record for record in records([name], values) if record.role == "estimation")
     scales = characteristic_scales(AXIS, fitted, VALUES)
-    bench = Workbench(AXIS, fitted, fitted, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
-    offered = bench.offered(CATALOGUE)
-    return search_places(bench, fit_linear(bench, VALUES), offered), offered
+    context = FitContext(AXIS, fitted, fitted, fitted, scales, {"x": NOISE}, frozenset(), VALUES)
+    offered = context.offered(CATALOGUE)
+    return search_places(context, reidentify(context, VALUES), offered), offered
 
 
 @pytest.mark.parametrize(("name", "values"), HIDDEN, ids=[name for name, _ in HIDDEN])
@@ -80,11 +80,11 @@ def test_no_push_claims_what_other_numbers_of_the_equations_take_away() -> None:
     """Numbers that suit all records do not suit the stretches of resonance in them: any push comes with other ones there."""
     fitted = tuple(r for r in records(["cubic_stiffness"], {"k_3": 2e7}) if r.role == "estimation")
     scales = characteristic_scales(AXIS, fitted, VALUES)
-    bench = Workbench(
+    context = FitContext(
         AXIS, fitted, fitted, liveliest(fitted, AXIS, 600), scales, {"x": NOISE}, frozenset(), VALUES
     )
     at_the_drive = [effect_named(name) for name in ("input_delay", "actuator_lag", "input_dead_zone")]
-    lineup = Lineup(bench, fit_linear(bench, VALUES), liveliest=True)
+    lineup = Lineup(context, reidentify(context, VALUES), liveliest=True)
     assert all(suspect.share < 0.1 for suspect in lineup.suspects(at_the_drive))
 
 

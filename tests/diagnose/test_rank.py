@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.rank import Ranking, noise_vector, rank
-from rigsight.diagnose.result import Grounds
-from rigsight.diagnose.workbench import Scored
+from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.verdict.ranking import Grounds, Ranking, noise_vector, rank
 
 N = 4000
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose.candidates.characterize import fit_candidates, fit_linear
-from rigsight.diagnose.rank import noise_vector, rank
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
+from rigsight.diagnose.verdict.ranking import noise_vector, rank
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.records.record import Record
@@ -85,21 +85,23 @@ def measured(case: Case, seed: int = 3) -> tuple[Record, ...]:
     return tuple(records)
 
 
-def bench_of(case: Case, records: tuple[Record, ...]) -> Workbench:
+def bench_of(case: Case, records: tuple[Record, ...]) -> FitContext:
     rig = RIGS[case.rig]
     fitted, scored = (tuple(r for r in records if r.role == role) for role in ("estimation", "validation"))
     values = dict(case.values)
     scales = characteristic_scales(rig, fitted, values)
     noise = {s.name: NOISE * float(np.std(records[0][s.name])) for s in rig.outputs}
     held = frozenset({"k"} if values.get("k") == 0.0 else ())
-    return Workbench(rig, fitted, scored, fitted, scales, noise, held, values, values)
+    return FitContext(rig, fitted, scored, fitted, scales, noise, held, values, values)
 
 
 def ranked(case: Case, names: tuple[str, ...]) -> tuple[Scored, ...]:
     """Return each effect alone, fitted and scored, the likeliest first."""
-    bench = bench_of(case, measured(case))
-    models = fit_candidates(bench, fit_linear(bench, bench.start), [effect_named(name) for name in names])
-    noise = noise_vector([s.name for s in bench.rig.outputs], bench.noise)
+    context = bench_of(case, measured(case))
+    models = fit_candidates(
+        context, reidentify(context, context.start), [effect_named(name) for name in names]
+    )
+    noise = noise_vector([s.name for s in context.rig.outputs], context.noise)
     return rank(models, noise, np.random.default_rng(0)).order
 
 
@@ -159,9 +161,9 @@ def test_it_is_told_from_its_relatives(case: Case) -> None:
         error = own.fit.standard_errors[name]
         assert abs(own.fit.values[name] - value) < SIGMAS * error, (name, own.fit.values[name], error)
         assert error < 0.2 * abs(value)
-    left = {name: found[name].excess / own.excess for name in case.relatives}
+    left = {name: found[name].error_over_noise / own.error_over_noise for name in case.relatives}
     assert min(left.values()) > WORSE, left
-    assert order[0] is own, [(model.names, model.excess) for model in order]
+    assert order[0] is own, [(model.names, model.error_over_noise) for model in order]
 
 
 def test_the_stiffness_of_a_power_law_is_told_at_the_size_of_the_motion() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose import Task, diagnose
-from rigsight.diagnose.unknown_cause import traced_to
-from rigsight.diagnose.workbench import liveliest
+from rigsight.diagnose.fitting.fit_context import liveliest
+from rigsight.diagnose.verdict.unknown_cause import traced_to
 from rigsight.discover import JointForce, JointLaw
 from rigsight.effects import effect_named, placed
 from rigsight.records.record import Record

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.main_cause import MainCause
-from rigsight.diagnose.verdict import AT_FLOOR, Judgement, judge, most_left
+from rigsight.diagnose.verdict.judgement import AT_FLOOR, Judgement, judge, most_left
+from rigsight.diagnose.verdict.main_cause import MainCause
 
 ABOVE, BELOW = 1.001, 0.999
 
@@ -14,7 +14,7 @@ ABOVE, BELOW = 1.001, 0.999
 def verdict(scored):
     def of(
         before: float,
-        linear: float,
+        reidentified: float,
         best: float,
         lower_bound: bool = False,
         adequate: bool = False,
@@ -22,11 +22,13 @@ def verdict(scored):
         contradicted: bool = False,
         equalled: bool = False,
     ) -> Judgement:
-        model, rival = (scored((name,), excess=best) for name in ("cubic_stiffness", "actuator_lag"))
+        model, rival = (
+            scored((name,), error_over_noise=best) for name in ("cubic_stiffness", "actuator_lag")
+        )
         contradicting, equal = ((rival,) if is_so else () for is_so in (contradicted, equalled))
         return judge(
             before,
-            scored((), excess=linear),
+            scored((), error_over_noise=reidentified),
             model,
             lambda _: adequate,
             lambda: MainCause(at_least, at_least, contradicting, equal),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.windows import Windowing, cut, window_length
+from rigsight.diagnose.fitting.windows import Windowing, cut, window_length
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.diagnose.windows import Windowing
+from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales

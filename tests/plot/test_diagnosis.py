@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.result import Trace
+from rigsight.diagnose.location.trace import Trace
 from rigsight.plot import detail_window, step_window
 
 DT = 0.01

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rigsight import plot
 from rigsight.diagnose.location.gap_parts import BandPart, RecordPart, TimePart
-from rigsight.diagnose.result import Stage
+from rigsight.diagnose.location.trace import Stage
 from rigsight.frequency import FrequencyResponse
 from rigsight.plot.drawing import new_figure
 

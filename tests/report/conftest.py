@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose.data.finding import AmplitudeDependence, DataQuality, Finding
+from rigsight.diagnose.advise import Advice
+from rigsight.diagnose.data_quality.finding import AmplitudeDependence, DataQuality, Finding
 from rigsight.diagnose.location.gap_parts import (
     AmplitudePart,
     BandPart,
@@ -20,7 +21,9 @@ from rigsight.diagnose.location.gap_parts import (
     StatePart,
     TimePart,
 )
-from rigsight.diagnose.result import Advice, Candidate, Diagnosis, Estimate, NoiseFloor, OutputGap, Trace
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
 from rigsight.discover.missing_force import MissingForce, ShapeTerm
 from rigsight.report import render_report
 
@@ -49,14 +52,16 @@ def trace(
     )
 
 
-def candidate(effects: tuple[str, ...], probability: float, excess: float, **fields: Any) -> Candidate:
+def candidate(
+    effects: tuple[str, ...], probability: float, error_over_noise: float, **fields: Any
+) -> Candidate:
     floor = {"psi": 0.009, "y": 0.011}
     values: dict[str, Any] = {
         "effects": effects,
         "probability": probability,
-        "validation_nrmse": {name: excess * f for name, f in floor.items()},
-        "estimation_nrmse": {name: 0.9 * excess * f for name, f in floor.items()},
-        "excess": excess,
+        "validation_nrmse": {name: error_over_noise * f for name, f in floor.items()},
+        "estimation_nrmse": {name: 0.9 * error_over_noise * f for name, f in floor.items()},
+        "error_over_noise": error_over_noise,
         "parameters": {
             "J_z": Estimate(0.5612, 0.0021, "kg m^2"),
             "k_c": Estimate(700.4, 1.7, "N m/rad"),

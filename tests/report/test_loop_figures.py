@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.report.drawing.loop_figures import loop_figures
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.report import responses
 from rigsight.report.drawing.response_charts import amplitude_figures
 from rigsight.report.responses import record_responses

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from rigsight.diagnose.remainder import Remainder
 from rigsight.diagnose.result import Diagnosis, Estimate
+from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.report.quantities import Written, estimate_text, gap_percent, written
 from rigsight.report.wording import percent, remainder_sentence, verdict_name, verdict_sentence
 

@@ -12,7 +12,7 @@ import pytest
 
 from rigsight.compare.comparison import Competitor
 from rigsight.diagnose import Diagnosis
-from rigsight.diagnose.detect import noise_floors
+from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep

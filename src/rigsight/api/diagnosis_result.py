@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, Self, get_args
 from rigsight.api.choice import named
 from rigsight.api.tables import data_frame
 from rigsight.diagnose import Diagnosis
-from rigsight.diagnose.result import STAGES
+from rigsight.diagnose.location.trace import STAGES
 from rigsight.effects import Effect
 from rigsight.errors import check_option
 from rigsight.report.notebook import diagnosis_html
@@ -141,13 +141,13 @@ class DiagnosisResult(Diagnosis):
                 {
                     "effects": ", ".join(candidate.effects),
                     "probability": candidate.probability,
-                    "excess": candidate.excess,
+                    "error_over_noise": candidate.error_over_noise,
                     **{f"nrmse_{output}": error for output, error in candidate.validation_nrmse.items()},
                     "converged": candidate.success,
                 }
                 for candidate in self.candidates
             ),
-            ("effects", "probability", "excess"),
+            ("effects", "probability", "error_over_noise"),
         )
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigsight.blind.outside import OUTSIDE
 from rigsight.blind.subjects import NOISES, Kind, Noise, Tier
-from rigsight.diagnose.candidates.placed import candidates_on
+from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.effects import CATALOGUE, Effect, Place, kind_of, placed
 from rigsight.rigs import RIGS, Rig
 

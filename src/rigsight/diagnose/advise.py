@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import Advice
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep, step
 from rigsight.records.record import Hold, Record
@@ -38,8 +37,31 @@ class _Experiment:
     inputs: Mapping[str, NDArray[np.float64]]
 
 
+@dataclass(frozen=True)
+class Advice:
+    """The experiment that would tell a rival from the named effects.
+
+    Attributes
+    ----------
+    rival
+        Names of the rival's effects.
+    waveform, source, amplitude, band
+        What to drive which input with: amplitude in the unit of the input, band [rad/s] where the waveform has one.
+    output, separation
+        Where the two differ most, and the RMS difference of their predictions there in standard deviations of the noise.
+    """
+
+    rival: tuple[str, ...]
+    waveform: str
+    source: str
+    amplitude: float
+    band: tuple[float, float] | None
+    output: str
+    separation: float
+
+
 def advise(
-    bench: Workbench, chosen: Scored, rivals: Sequence[Scored], noise: Mapping[str, float]
+    context: FitContext, chosen: Scored, rivals: Sequence[Scored], noise: Mapping[str, float]
 ) -> tuple[Advice, ...]:
     """Return, for each rival, the experiment of the menu that would separate it most from the chosen model.
 
@@ -58,12 +80,12 @@ def advise(
         Noise floor of each output.
     """
     found = []
-    menu = list(_menu(bench))
+    menu = list(_menu(context))
     for rival in rivals:
         scored = [
             (separation, experiment)
             for experiment in menu
-            for separation in _separations(bench, chosen, rival, experiment, noise)
+            for separation in _separations(context, chosen, rival, experiment, noise)
         ]
         if scored:
             (output, size), experiment = max(scored, key=lambda pair: pair[0][1])
@@ -82,11 +104,11 @@ def advise(
 
 
 def _separations(
-    bench: Workbench, chosen: Scored, rival: Scored, experiment: _Experiment, noise: Mapping[str, float]
+    context: FitContext, chosen: Scored, rival: Scored, experiment: _Experiment, noise: Mapping[str, float]
 ) -> Iterator[tuple[str, float]]:
-    hold: Hold = bench.estimation[0].hold
-    units = {source.name: source.unit for source in bench.rig.inputs}
-    record = Record("advice", bench.estimation[0].dt, experiment.inputs, units, hold=hold)
+    hold: Hold = context.estimation[0].hold
+    units = {source.name: source.unit for source in context.rig.inputs}
+    record = Record("advice", context.estimation[0].dt, experiment.inputs, units, hold=hold)
     try:
         one, other = (simulate(m.fit.structure, m.fit.values, record, accuracy=1e-5) for m in (chosen, rival))
     except SimulationError:
@@ -95,9 +117,9 @@ def _separations(
         yield output, float(np.sqrt(np.mean((one[output] - other[output]) ** 2)) / size)
 
 
-def _menu(bench: Workbench) -> Iterator[_Experiment]:
-    dt = bench.estimation[0].dt
-    omega = 1.0 / bench.scales["time"]
+def _menu(context: FitContext) -> Iterator[_Experiment]:
+    dt = context.estimation[0].dt
+    omega = 1.0 / context.scales["time"]
     n_samples = max(200, min(40_000, round(_PERIODS * 2.0 * math.pi / omega / dt)))
     t = dt * np.arange(n_samples, dtype=np.float64)
     fast = min(_FAST * omega, 0.4 * math.pi / dt)
@@ -106,11 +128,11 @@ def _menu(bench: Workbench) -> Iterator[_Experiment]:
         ("slow sine", (_SLOW * omega, _SLOW * omega), lambda a: a * np.sin(_SLOW * omega * t)),
         ("sine at resonance", (omega, omega), lambda a: a * np.sin(omega * t)),
     )
-    if bench.rig.is_driven:
+    if context.rig.is_driven:
         drives += (("step", None, lambda a: step(t, a, 0.1 * float(t[-1]))),)
     recorded = {
-        signal.name: np.concatenate([record[signal.name] for record in bench.estimation])
-        for signal in bench.rig.inputs
+        signal.name: np.concatenate([record[signal.name] for record in context.estimation])
+        for signal in context.rig.inputs
     }
     middles = {name: float(np.median(samples)) for name, samples in recorded.items()}
     rest = {name: np.full(n_samples, middle) for name, middle in middles.items()}

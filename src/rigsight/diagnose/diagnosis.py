@@ -9,29 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.advise import advise
-from rigsight.diagnose.candidates.one_more_effect import Prepare
-from rigsight.diagnose.candidates.placed import candidates_on
-from rigsight.diagnose.detect import AT_REST
-from rigsight.diagnose.disturbance import disturbance
 from rigsight.diagnose.examination import Examination, examine
-from rigsight.diagnose.in_catalogue import probability_in_catalogue
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.diagnose.fitting.task import Task
+from rigsight.diagnose.fitting.windows import WINDOW, readings
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
-from rigsight.diagnose.predictability import PREDICTABLE, growth_of_disturbances
-from rigsight.diagnose.remainder import remainder_of
-from rigsight.diagnose.result import (
-    Candidate,
-    Diagnosis,
-    Estimate,
-    Grounds,
-    NoiseFloor,
-    OutputGap,
-    Trace,
-)
-from rigsight.diagnose.task import Task
-from rigsight.diagnose.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
-from rigsight.diagnose.windows import WINDOW, readings
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.noise.detection import AT_REST
+from rigsight.diagnose.noise.disturbance import disturbance
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
+from rigsight.diagnose.search.one_more_effect import Prepare
+from rigsight.diagnose.search.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.verdict.catalogue_coverage import probability_in_catalogue
+from rigsight.diagnose.verdict.ranking import Grounds
+from rigsight.diagnose.verdict.remainder import remainder_of
+from rigsight.diagnose.verdict.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
@@ -125,7 +120,7 @@ def diagnose(
             f"records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own initial state."
         )
     elif found.judgement.verdict == "unknown":
-        growth = growth_of_disturbances(found.bench, found.linear, found.judgement.model, rng)
+        growth = growth_of_disturbances(found.context, found.reidentified, found.judgement.model, rng)
         if growth > PREDICTABLE:
             notes.append(
                 f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
@@ -133,16 +128,16 @@ def diagnose(
             )
     notes += [*found.quality.notes, found.judgement.reason, *found.doubts]
     if found.judgement.verdict == "unknown" and found.imitations:
-        nearest = min(found.imitations, key=lambda pair: pair.excess)
+        nearest = min(found.imitations, key=lambda pair: pair.error_over_noise)
         notes.append(
-            f"Together {' and '.join(nearest.names)} leave {nearest.excess:.3g} times the noise floor, but as one law: many "
-            "another form of it would come as near, so they are not named."
+            f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act "
+            "as one law, and other laws of its kind fit equally well: they are not named."
         )
     diagnosis = _assembled(task, found, notes, scored_on, rng)
     diagnosis = replace(diagnosis, data_quality=found.quality)
     if found.judgement.verdict != "unknown":
         return diagnosis
-    forces = forces_at_joints(found.bench, found.linear)
+    forces = forces_at_joints(found.context, found.reidentified)
     if forces:
         say("missing force at each joint")
     # A push that takes most of the gap away says more than a force of any course.
@@ -150,13 +145,15 @@ def diagnose(
     return replace(
         diagnosis,
         where=diagnosis.where if pushed else traced_to(task.rig, forces) or diagnosis.where,
-        missing_force=force_of_one_motion(found.bench, found.linear, task.absent_spring is not None, rng),
+        missing_force=force_of_one_motion(
+            found.context, found.reidentified, task.absent_spring is not None, rng
+        ),
         joint_forces=forces,
     )
 
 
 def _least_left(found: Examination) -> float:
-    return min(model.excess for model in (found.before, found.linear, *found.ranking.order))
+    return min(model.error_over_noise for model in (found.before, found.reidentified, *found.ranking.order))
 
 
 def _assembled(
@@ -166,19 +163,19 @@ def _assembled(
     scored_on: str,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    rig, bench, before, linear = task.rig, found.bench, found.before, found.linear
+    rig, context, before, reidentified = task.rig, found.context, found.before, found.reidentified
     ranking, judgement, floors = found.ranking, found.judgement, found.floors
     is_effect = judgement.verdict == "effect"
-    after = judgement.model if is_effect else (before if judgement.verdict == "none" else linear)
+    after = judgement.model if is_effect else (before if judgement.verdict == "none" else reidentified)
     noise = {floor.output: floor for floor in floors}
-    measured = _measured(rig, bench.scoring)
-    traces = _traces(task, bench, before, linear, after)
+    measured = _measured(rig, context.scoring)
+    traces = _traces(task, context, before, reidentified, after)
     scored = [trace for trace in traces if trace.role == scored_on]
     at_floor = {name: noise[name].std / float(np.std(values)) for name, values in measured.items()}
     gap = {
         name: OutputGap(
             before=nrmse(_column(rig, before, name), measured[name]),
-            reidentified=nrmse(_column(rig, linear, name), measured[name]),
+            reidentified=nrmse(_column(rig, reidentified, name), measured[name]),
             after=nrmse(_column(rig, after, name), measured[name]),
             noise_floor=at_floor[name],
             intervals=budget_intervals(scored, name, at_floor[name], rng),
@@ -186,17 +183,22 @@ def _assembled(
         for name in measured
     }
     share = probability_in_catalogue(
-        judgement, ranking, linear.excess, found.adequacy is not None and found.adequacy.adequate
+        judgement,
+        ranking,
+        reidentified.error_over_noise,
+        found.adequacy is not None and found.adequacy.adequate,
     )
     explained = judgement.verdict in ("none", "parameters")
-    without_effect = _candidate(bench, linear, _WITHOUT_EFFECT if explained else 0.0)
+    without_effect = _candidate(context, reidentified, _WITHOUT_EFFECT if explained else 0.0)
     with_effect = [
-        _candidate(bench, model, probability * share, grounds)
+        _candidate(context, model, probability * share, grounds)
         for model, probability, grounds in zip(
             ranking.order, ranking.probabilities, ranking.grounds, strict=True
         )
     ]
-    candidates = tuple(sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.excess)))
+    candidates = tuple(
+        sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
+    )
     chosen = judgement.model.effects if is_effect else ()
     tied = tuple(model.names for model in ranking.tied) if is_effect else ()
     where = tuple(rig.where(effect) for effect in chosen)
@@ -207,9 +209,9 @@ def _assembled(
         floors = tuple(_up_to(floor, _column(rig, judgement.model, floor.output)) for floor in floors)
     if found.adequacy is not None:
         lower_bound = any(floor.lower_bound for floor in floors)
-        left = remainder_of(linear, judgement.model, found.adequacy, lower_bound, is_effect)
+        left = remainder_of(reidentified, judgement.model, found.adequacy, lower_bound, is_effect)
     if judgement.verdict != "unknown":
-        floors = _with_disturbance(bench, judgement.model, floors, found.windowing.bandwidth)
+        floors = _with_disturbance(context, judgement.model, floors, found.windowing.bandwidth)
     return Diagnosis(
         title=task.title,
         rig=rig.name,
@@ -228,13 +230,13 @@ def _assembled(
         window_cycles=found.windowing.cycles,
         bandwidth=found.windowing.bandwidth,
         scored_on=scored_on,
-        advice=advise(bench, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
+        advice=advise(context, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
         if is_effect
         else (),
         places=found.places,
         adequate=None if found.adequacy is None else found.adequacy.adequate,
         remainder=left,
-        localization=localize(bench, traces, scored_on, before, linear, after, rng, floors),
+        localization=localize(context, traces, scored_on, before, reidentified, after, rng, floors),
         effect_shares=effect_shares(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
@@ -242,17 +244,19 @@ def _assembled(
 
 
 def _with_disturbance(
-    bench: Workbench, model: Scored, floors: Sequence[NoiseFloor], bandwidth: float | None
+    context: FitContext, model: Scored, floors: Sequence[NoiseFloor], bandwidth: float | None
 ) -> tuple[NoiseFloor, ...]:
     """Return the floors, that of the first output with the force that would leave what a model leaves above it."""
-    first = bench.rig.outputs[0].name
-    if not all(first in record for record in bench.scoring):
+    first = context.rig.outputs[0].name
+    if not all(first in record for record in context.scoring):
         return tuple(floors)
     left = [residual[:, 0] for residual in model.residuals]
     return tuple(
         replace(
             floor,
-            disturbance=disturbance(bench.rig, model.fit.values, bench.scoring, left, floor.std, bandwidth),
+            disturbance=disturbance(
+                context.rig, model.fit.values, context.scoring, left, floor.std, bandwidth
+            ),
         )
         if floor.output == first
         else floor
@@ -274,7 +278,7 @@ def _evidence(found: Examination) -> tuple[str, ...]:
     """
     if found.places:
         return tuple(place.name for place in found.places if place.looked_at and place.share > 0.0)
-    rig = found.bench.rig
+    rig = found.context.rig
     if found.gap_at:
         return ("sensor" if found.gap_at in {signal.name for signal in rig.outputs} else found.gap_at,)
     return tuple(dict.fromkeys(rig.where(effect) for effect in found.judgement.model.effects))
@@ -292,25 +296,27 @@ def _measured(rig: Rig, records: Sequence[Record]) -> dict[str, NDArray[np.float
 
 
 def _candidate(
-    bench: Workbench, model: Scored, probability: float, grounds: Grounds | None = None
+    context: FitContext, model: Scored, probability: float, grounds: Grounds | None = None
 ) -> Candidate:
     units = {p.name: p.unit for p in model.fit.structure.parameters}
-    measured = _measured(bench.rig, bench.scoring)
-    fitted = _measured(bench.rig, bench.estimation)
+    measured = _measured(context.rig, context.scoring)
+    fitted = _measured(context.rig, context.estimation)
     estimation = Scored(model.effects, model.fit, model.fit, 0.0)
     return Candidate(
         effects=model.names,
-        where=tuple(bench.rig.where(effect) for effect in model.effects),
+        where=tuple(context.rig.where(effect) for effect in model.effects),
         probability=probability,
         validation_nrmse={
-            name: nrmse(_column(bench.rig, model, name), values) if model.residuals else float("inf")
+            name: nrmse(_column(context.rig, model, name), values) if model.residuals else float("inf")
             for name, values in measured.items()
         },
         estimation_nrmse={
-            name: nrmse(_column(bench.rig, estimation, name), values) if model.fit.residuals else float("inf")
+            name: nrmse(_column(context.rig, estimation, name), values)
+            if model.fit.residuals
+            else float("inf")
             for name, values in fitted.items()
         },
-        excess=model.excess,
+        error_over_noise=model.error_over_noise,
         parameters={
             name: Estimate(model.fit.values[name], model.fit.standard_errors[name], units[name])
             for name in model.fit.free
@@ -321,13 +327,15 @@ def _candidate(
     )
 
 
-def _traces(task: Task, bench: Workbench, before: Scored, linear: Scored, after: Scored) -> tuple[Trace, ...]:
+def _traces(
+    task: Task, context: FitContext, before: Scored, reidentified: Scored, after: Scored
+) -> tuple[Trace, ...]:
     """Return measured and simulated outputs of all records, those that score first, windows joined again."""
-    scored = _joined(task.rig, bench.scoring, before.residuals, linear.residuals, after.residuals)
-    if bench.scoring == bench.estimation:
+    scored = _joined(task.rig, context.scoring, before.residuals, reidentified.residuals, after.residuals)
+    if context.scoring == context.estimation:
         return scored
     fitted = _joined(
-        task.rig, bench.estimation, before.fit.residuals, linear.fit.residuals, after.fit.residuals
+        task.rig, context.estimation, before.fit.residuals, reidentified.fit.residuals, after.fit.residuals
     )
     return (*scored, *fitted)
 

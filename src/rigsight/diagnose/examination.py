@@ -8,28 +8,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.adequacy import Adequacy, Checks
-from rigsight.diagnose.candidates.chance import fitted_in_windows, is_predictable
-from rigsight.diagnose.candidates.characterize import contenders, fit_candidate, fit_candidates, fit_linear
-from rigsight.diagnose.candidates.grow import grown, pruned
-from rigsight.diagnose.candidates.grow_in_windows import pairs_in_windows
-from rigsight.diagnose.candidates.one_law import told_apart
-from rigsight.diagnose.candidates.one_more_effect import Prepare
-from rigsight.diagnose.data.data_quality import data_quality, with_best_model, with_offsets_told
-from rigsight.diagnose.data.finding import DataQuality
-from rigsight.diagnose.data.offset_question import asked_offsets, with_offsets_free
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.evidence import Evidence
-from rigsight.diagnose.horizon import brings_back, preparing, windowing_of
-from rigsight.diagnose.main_cause import main_cause
-from rigsight.diagnose.places.search import Search, search_places
-from rigsight.diagnose.plausibility import doubts, plausible_first
-from rigsight.diagnose.preparation import start_values_of, workbench_of
-from rigsight.diagnose.rank import Ranking, noise_vector, rank
-from rigsight.diagnose.result import NoiseFloor, SuspectedPlace
-from rigsight.diagnose.second_cause import OtherForms, beyond_disturbance, with_parts
-from rigsight.diagnose.task import Task
-from rigsight.diagnose.verdict import (
+from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
+from rigsight.diagnose.data_quality.finding import DataQuality
+from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fitting.task import Task
+from rigsight.diagnose.fitting.windows import Windowing, leading_output
+from rigsight.diagnose.noise.adequacy import Adequacy, Checks
+from rigsight.diagnose.noise.detection import noise_floors
+from rigsight.diagnose.noise.evidence import Evidence
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.search.evidence_for_more import OtherForms, beyond_disturbance, with_parts
+from rigsight.diagnose.search.horizon import brings_back, preparing, windowing_of
+from rigsight.diagnose.search.one_law import split_distinguishable
+from rigsight.diagnose.search.one_more_effect import Prepare
+from rigsight.diagnose.search.pairs import grown, refit_singles
+from rigsight.diagnose.search.pairs_in_windows import pairs_in_windows
+from rigsight.diagnose.search.places import Search, SuspectedPlace, search_places
+from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
+from rigsight.diagnose.search.single_effects import contenders, fit_candidate, fit_candidates, reidentify
+from rigsight.diagnose.verdict.judgement import (
     AT_FLOOR,
     AT_LOWER_BOUND,
     MOST_LEFT,
@@ -38,8 +37,9 @@ from rigsight.diagnose.verdict import (
     judge,
     most_left,
 )
-from rigsight.diagnose.windows import Windowing, leading_output
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.verdict.main_cause import main_cause
+from rigsight.diagnose.verdict.plausibility import doubts, plausible_first
+from rigsight.diagnose.verdict.ranking import Ranking, noise_vector, rank
 from rigsight.effects import Effect
 from rigsight.errors import InputError, SimulationError
 from rigsight.identify import (
@@ -87,10 +87,10 @@ class Examination:
     """
 
     floors: tuple[NoiseFloor, ...]
-    bench: Workbench
+    context: FitContext
     windowing: Windowing
     before: Scored
-    linear: Scored
+    reidentified: Scored
     ranking: Ranking
     judgement: Judgement
     quality: DataQuality
@@ -146,8 +146,12 @@ def examine(
         noise = {floor.output: floor.std for floor in floors}
     ready = preparing(prepare, windowing.cut(task.records))
     models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
-    allowed = AT_LOWER_BOUND if lower_bound else most_left(models.linear.excess)
-    asked = asked_offsets(models.bench, models.linear, models.singles, allowed) if windowing.whole else None
+    allowed = AT_LOWER_BOUND if lower_bound else most_left(models.reidentified.error_over_noise)
+    asked = (
+        asked_offsets(models.context, models.reidentified, models.singles, allowed)
+        if windowing.whole
+        else None
+    )
     if asked is not None:
         say("offsets by record")
         freed = with_offsets_free(task)
@@ -155,29 +159,33 @@ def examine(
         return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
     pairs: list[Scored] = []
     cut, in_windows = None, False
-    forms = OtherForms(models.bench, lower_bound)
-    if windowing.whole and not is_predictable(models.bench, models.linear, models.singles, at_floor, rng):
+    forms = OtherForms(models.context, lower_bound)
+    if windowing.whole and not is_predictable(
+        models.context, models.reidentified, models.singles, at_floor, rng
+    ):
         cut = _cut(task, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
-    checks = Checks(models.bench, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
+    checks = Checks(models.context, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
     if not in_windows:
         pairs = _grown(models, effects, forms, checks if lower_bound else None, ready)
-        models = replace(models, singles=pruned(models.bench, models.singles, pairs))
-        if windowing.whole and not is_predictable(models.bench, models.linear, pairs, allowed, rng):
+        models = replace(models, singles=refit_singles(models.context, models.singles, pairs))
+        if windowing.whole and not is_predictable(models.context, models.reidentified, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
-            found = pairs_in_windows(models.bench, cut.bench, models.linear, pairs)
+            found = pairs_in_windows(models.context, cut.context, models.reidentified, pairs)
             say("pairs in windows")
             in_windows = _explained(cut, found, AT_FLOOR)
             pairs = found if in_windows else pairs
     if cut is not None and in_windows:
         models = cut
-    bench, before, linear = models.bench, models.before, models.linear
-    pairs, imitations = told_apart(pairs, models.singles, allowed)
-    best_single = min(contenders(models.singles), key=lambda model: model.excess, default=linear)
-    evidence = Evidence(bench, linear, best_single)
+    context, before, reidentified = models.context, models.before, models.reidentified
+    pairs, imitations = split_distinguishable(pairs, models.singles, allowed)
+    best_single = min(
+        contenders(models.singles), key=lambda model: model.error_over_noise, default=reidentified
+    )
+    evidence = Evidence(context, reidentified, best_single)
     if in_windows:
-        checks = Checks(bench, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
+        checks = Checks(context, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
     else:
         stand = beyond_disturbance(evidence, models.singles, forms.with_own_evidence(models.singles, pairs))
         pairs = with_parts(stand, pairs)
@@ -186,43 +194,52 @@ def examine(
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood takes what is left for noise: it counts where the likeliest model leaves no more than that.
     counts = likeliest is not None and checks.is_adequate(likeliest)
-    ranking = rank(candidates, vector, rng, linear.excess, evidence.criterion, counts)
+    ranking = rank(candidates, vector, rng, reidentified.error_over_noise, evidence.criterion, counts)
     if ranking.order and ranking.order[0].residuals:
         if not in_windows:
             ranking = _with_offset_rivals(
-                bench, ranking, effects, vector, rng, linear.excess, evidence.criterion, counts
+                context,
+                ranking,
+                effects,
+                vector,
+                rng,
+                reidentified.error_over_noise,
+                evidence.criterion,
+                counts,
             )
-        if ranking.order[0].excess > allowed:
-            ranking = plausible_first(ranking, linear, _places(task.rig, ranking))
+        if ranking.order[0].error_over_noise > allowed:
+            ranking = plausible_first(ranking, reidentified, _places(task.rig, ranking))
         best, tied = ranking.order[0], ranking.tied
         judgement = judge(
-            before.excess,
-            linear,
+            before.error_over_noise,
+            reidentified,
             best,
             checks.is_adequate,
-            lambda: main_cause(task.rig, linear, best, tied, vector, rng),
+            lambda: main_cause(task.rig, reidentified, best, tied, vector, rng),
             lower_bound,
         )
     else:
-        judgement = Judgement("unknown", linear, "No candidate could be fitted.")
-    quality = with_best_model(models.quality, bench, judgement.model)
-    quality = with_offsets_told(quality, bench, judgement.model)
+        judgement = Judgement("unknown", reidentified, "No candidate could be fitted.")
+    quality = with_best_model(models.quality, context, judgement.model)
+    quality = with_offsets_told(quality, context, judgement.model)
     left = checks.of(judgement.model) if judgement.model.residuals else None
     say("adequacy")
     return Examination(
         floors,
-        models.bench,
+        models.context,
         models.windowing,
         before,
-        linear,
+        reidentified,
         ranking,
         judgement,
         quality,
         tuple(imitations),
         models.search.places,
         left,
-        tuple(doubt.text for doubt in doubts(judgement.model, linear)) if judgement.model.effects else (),
-        checks.of(linear).place if judgement.verdict == "unknown" else "",
+        tuple(doubt.text for doubt in doubts(judgement.model, reidentified))
+        if judgement.model.effects
+        else (),
+        checks.of(reidentified).place if judgement.verdict == "unknown" else "",
     )
 
 
@@ -240,9 +257,9 @@ class _Singly:
     """What every effect explains by itself."""
 
     windowing: Windowing
-    bench: Workbench
+    context: FitContext
     before: Scored
-    linear: Scored
+    reidentified: Scored
     quality: DataQuality
     singles: list[Scored]
     search: Search
@@ -258,33 +275,33 @@ def _singly(
     prepare: Prepare | None,
     memory: FitMemory | None,
 ) -> _Singly:
-    bench = workbench_of(task, noise, windowing, memory, IdleThreads(n_jobs))
-    linear = fit_linear(bench, bench.start)
-    if not linear.residuals:
+    context = fit_context_of(task, noise, windowing, memory, IdleThreads(n_jobs))
+    reidentified = reidentify(context, context.start)
+    if not reidentified.residuals:
         raise SimulationError(
-            f"The equations of {task.rig.name} cannot be fitted to the records: {linear.fit.message}"
+            f"The equations of {task.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
-    bent = bool(task.given) and bench.leaves_numbers_open(linear.fit)
+    bent = bool(task.given) and context.leaves_numbers_open(reidentified.fit)
     if bent or not task.rig.has_one_motion:
         # What moves between the sensors, and which forces do it, is known once the equations fit, or from the given simulation.
-        known = {**task.constants, **linear.fit.values, **(task.given if bent else {})}
-        bench = replace(bench, scales=characteristic_scales(task.rig, task.estimation, known))
+        known = {**task.constants, **reidentified.fit.values, **(task.given if bent else {})}
+        context = replace(context, scales=characteristic_scales(task.rig, task.estimation, known))
     say("re-identified")
-    before = _before(task, bench, linear)
+    before = _before(task, context, reidentified)
     if task.given:
         say("given simulation")
-    quality = data_quality(bench, task.records, linear)
-    search = search_places(bench, linear, bench.offered(effects))
+    quality = data_quality(context, task.records, reidentified)
+    search = search_places(context, reidentified, context.offered(effects))
     say("suspects")
     if prepare is not None:
-        prepare([bench.simplest((effect,)) for effect in search.effects])
-    singles = fit_candidates(bench, linear, search.effects, say)
-    if search.others and min((model.excess for model in singles), default=np.inf) > AT_FLOOR:
+        prepare([context.simplest((effect,)) for effect in search.effects])
+    singles = fit_candidates(context, reidentified, search.effects, say)
+    if search.others and min((model.error_over_noise for model in singles), default=np.inf) > AT_FLOOR:
         # Nothing right may be lost where places or effects were ranked wrongly.
         if prepare is not None:
-            prepare([bench.simplest((effect,)) for effect in search.others])
-        singles = fit_candidates(bench, linear, search.others, say, singles)
-    return _Singly(windowing, bench, before, linear, quality, singles, search)
+            prepare([context.simplest((effect,)) for effect in search.others])
+        singles = fit_candidates(context, reidentified, search.others, say, singles)
+    return _Singly(windowing, context, before, reidentified, quality, singles, search)
 
 
 def _grown(
@@ -300,48 +317,48 @@ def _grown(
     """
     is_excused = False
     if of_unknown_noise is not None and models.singles:
-        best = min(models.singles, key=lambda model: model.excess)
-        is_excused = best.excess <= AT_LOWER_BOUND
+        best = min(models.singles, key=lambda model: model.error_over_noise)
+        is_excused = best.error_over_noise <= AT_LOWER_BOUND
         if is_excused and of_unknown_noise.is_adequate(best):
             return []
-    worthwhile = models.linear.excess / WORTHWHILE
-    pairs = grown(models.bench, models.singles, effects, AT_FLOOR, worthwhile, forms, prepare)
-    return [pair for pair in pairs if not is_excused or pair.excess <= AT_FLOOR]
+    worthwhile = models.reidentified.error_over_noise / WORTHWHILE
+    pairs = grown(models.context, models.singles, effects, AT_FLOOR, worthwhile, forms, prepare)
+    return [pair for pair in pairs if not is_excused or pair.error_over_noise <= AT_FLOOR]
 
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
     """Return the models in windows of a few cycles."""
     leading = leading_output(task.rig, task.records)
     windowing = Windowing.by_cycles({leading: noise[leading], **noise})
-    bench = workbench_of(task, noise, windowing, models.bench.memory, models.bench.threads)
-    linear = fit_linear(bench, models.linear.fit.values)
-    singles = fitted_in_windows(bench, linear, models.singles)
-    before = _before(task, bench, linear) if linear.residuals else models.before
-    return _Singly(windowing, bench, before, linear, models.quality, singles, models.search)
+    context = fit_context_of(task, noise, windowing, models.context.memory, models.context.threads)
+    reidentified = reidentify(context, models.reidentified.fit.values)
+    singles = fitted_in_windows(context, reidentified, models.singles)
+    before = _before(task, context, reidentified) if reidentified.residuals else models.before
+    return _Singly(windowing, context, before, reidentified, models.quality, singles, models.search)
 
 
 def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
     """Return True if one of the models explains the records in windows and the equations without an effect do not."""
-    best = min((model.excess for model in models), default=float("inf"))
-    return bool(cut.linear.residuals) and best <= at_floor < cut.linear.excess
+    best = min((model.error_over_noise for model in models), default=float("inf"))
+    return bool(cut.reidentified.residuals) and best <= at_floor < cut.reidentified.error_over_noise
 
 
-def _before(task: Task, bench: Workbench, linear: Scored) -> Scored:
+def _before(task: Task, context: FitContext, reidentified: Scored) -> Scored:
     """Score the given simulation; parameters that were not given are identified with the given ones held."""
     if not task.given:
-        return linear
-    structure = bench.composed()
-    start = {**start_values_of(task), **linear.fit.values, **task.given}
-    missing = [name for name in bench.free_parameters(structure) if name not in task.given]
-    fit = bench.problem(structure, bench.estimation).fit(start, missing)
+        return reidentified
+    structure = context.composed()
+    start = {**start_values_of(task), **reidentified.fit.values, **task.given}
+    missing = [name for name in context.free_parameters(structure) if name not in task.given]
+    fit = context.problem(structure, context.estimation).fit(start, missing)
     if not fit.residuals:
-        raise InputError(_why_not_run(bench, structure, start))
-    return bench.score((), fit)
+        raise InputError(_why_not_run(context, structure, start))
+    return context.score((), fit)
 
 
-def _why_not_run(bench: Workbench, structure: Structure, values: Mapping[str, float]) -> str:
+def _why_not_run(context: FitContext, structure: Structure, values: Mapping[str, float]) -> str:
     """Name the records that the given simulation cannot follow, with what decides it."""
-    failing = [r for r in bench.estimation if not bench.problem(structure, [r]).fit(values, ()).residuals]
+    failing = [r for r in context.estimation if not context.problem(structure, [r]).fit(values, ()).residuals]
     told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
     where = f" in {told}" if told else ""
     return (
@@ -351,7 +368,7 @@ def _why_not_run(bench: Workbench, structure: Structure, values: Mapping[str, fl
 
 
 def _with_offset_rivals(
-    bench: Workbench,
+    context: FitContext,
     ranking: Ranking,
     effects: Sequence[Effect],
     noise: NDArray[np.float64],
@@ -365,7 +382,7 @@ def _with_offset_rivals(
     A symmetric spring under a constant force and an asymmetric spring without one obey the same equation.
     """
     best = ranking.order[0]
-    released = bench.releasable_parameters(best.fit.structure)
+    released = context.releasable_parameters(best.fit.structure)
     needed = [
         name
         for name in best.fit.free
@@ -376,7 +393,7 @@ def _with_offset_rivals(
     rivals = []
     for effect in effects:
         is_even = effect.signature.even_harmonics and not effect.holds_constant_force
-        if is_even and bench.rig.offers(effect) and effect not in best.effects:
+        if is_even and context.rig.offers(effect) and effect not in best.effects:
             base = replace(best.fit, values={**best.fit.values, **dict.fromkeys(needed, 0.0)})
-            rivals.append(fit_candidate(bench, (*best.effects, effect), base, hold=frozenset(needed)))
+            rivals.append(fit_candidate(context, (*best.effects, effect), base, hold=frozenset(needed)))
     return rank([*ranking.order, *rivals], noise, rng, gap, criterion, evidence_counts)

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rigsight.diagnose.data.finding import DataQuality
-from rigsight.diagnose.disturbance import Disturbance
+from rigsight.diagnose.advise import Advice
+from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.location.gap_parts import Localization
-from rigsight.diagnose.remainder import Remainder
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.search.places import SuspectedPlace
+from rigsight.diagnose.verdict.judgement import Verdict
+from rigsight.diagnose.verdict.ranking import Grounds
+from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.discover import JointForce, MissingForce
 from rigsight.effects import kind_of
-
-Verdict = Literal["effect", "parameters", "none", "unknown"]
-Stage = Literal["before", "reidentified", "after"]
-STAGES: tuple[Stage, ...] = ("before", "reidentified", "after")
 
 SCHEMA_VERSION = 1
 
@@ -65,22 +64,6 @@ class OutputGap:
 
 
 @dataclass(frozen=True)
-class Grounds:
-    """What the probability of one model rests on.
-
-    Attributes
-    ----------
-    held_out
-        Share of the resamplings of the held-out errors in which it is the simplest of the best.
-    evidence
-        Logarithm of its evidence, less that of the likeliest model [nats]; None where its fit was not finished.
-    """
-
-    held_out: float
-    evidence: float | None
-
-
-@dataclass(frozen=True)
 class Candidate:
     """A set of effects that was fitted and scored.
 
@@ -95,7 +78,7 @@ class Candidate:
         That this set is the cause, given the records and the candidates tried.
     validation_nrmse, estimation_nrmse
         NRMSE by output.
-    excess
+    error_over_noise
         Weighted RMS of the validation residuals in units of the noise floor; 1 is perfect.
     parameters
         Every fitted parameter of rig and effects.
@@ -110,115 +93,11 @@ class Candidate:
     probability: float
     validation_nrmse: dict[str, float]
     estimation_nrmse: dict[str, float]
-    excess: float
+    error_over_noise: float
     parameters: dict[str, Estimate]
     success: bool
     message: str
     grounds: Grounds | None = None
-
-
-@dataclass(frozen=True)
-class Advice:
-    """The experiment that would tell a rival from the named effects.
-
-    Attributes
-    ----------
-    rival
-        Names of the rival's effects.
-    waveform, source, amplitude, band
-        What to drive which input with: amplitude in the unit of the input, band [rad/s] where the waveform has one.
-    output, separation
-        Where the two differ most, and the RMS difference of their predictions there in standard deviations of the noise.
-    """
-
-    rival: tuple[str, ...]
-    waveform: str
-    source: str
-    amplitude: float
-    band: tuple[float, float] | None
-    output: str
-    separation: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the entry of ``advice`` in ``diagnosis.json``."""
-        return {
-            "rival": list(self.rival),
-            "waveform": self.waveform,
-            "input": self.source,
-            "amplitude": _number(self.amplitude),
-            "band": None if self.band is None else [_number(omega) for omega in self.band],
-            "output": self.output,
-            "separation": _number(self.separation),
-        }
-
-
-@dataclass(frozen=True)
-class SuspectedPlace:
-    """A joint, drive or sensor, and the share of the squared residual that the best push there takes away."""
-
-    name: str
-    share: float
-    looked_at: bool
-
-
-Stretches = tuple[tuple[NDArray[np.float64], float], ...]
-"""Pieces of noise alone, shape (n_samples,) each, with their sample time [s]."""
-
-
-@dataclass(frozen=True)
-class NoiseFloor:
-    """Standard deviation of what no model can explain in an output, and how it was found.
-
-    ``lower_bound`` says that only part of the noise was seen: colored noise and disturbances may stand above it. ``interval``
-    are its 95 % limits; the upper one of a lower bound is what an adequate model leaves, infinite without one. ``stretches``
-    are pieces of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise.
-    ``disturbance`` is the force that would leave what the diagnosed model leaves above this noise, where the records show one.
-    """
-
-    output: str
-    unit: str
-    std: float
-    method: str
-    lower_bound: bool = False
-    interval: tuple[float, float] = (0.0, math.inf)
-    stretches: Stretches = field(default=(), compare=False, repr=False)
-    disturbance: Disturbance | None = None
-
-
-@dataclass(frozen=True)
-class Trace:
-    """Measured and simulated outputs of one record.
-
-    Attributes
-    ----------
-    record, role, kind, amplitude
-        As in the campaign.
-    t
-        Shape (n_samples,) [s].
-    inputs, measured, before, reidentified, after
-        Signal name -> shape (n_samples,).
-    """
-
-    record: str
-    role: str
-    kind: str
-    amplitude: float | None
-    t: NDArray[np.float64]
-    inputs: Mapping[str, NDArray[np.float64]]
-    measured: Mapping[str, NDArray[np.float64]]
-    before: Mapping[str, NDArray[np.float64]]
-    reidentified: Mapping[str, NDArray[np.float64]]
-    after: Mapping[str, NDArray[np.float64]]
-
-    @property
-    def dt(self) -> float:
-        """Sample time [s]."""
-        return float(self.t[-1] - self.t[0]) / max(1, self.t.size - 1)
-
-    def residual(self, stage: Stage, output: str) -> NDArray[np.float64]:
-        """Return measured minus simulated of a stage, shape (n_samples,)."""
-        simulated = {"before": self.before, "reidentified": self.reidentified, "after": self.after}[stage]
-        return np.asarray(self.measured[output] - simulated[output], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -349,7 +228,7 @@ class Diagnosis:
             "observer_bandwidth": self.bandwidth,
             "scored_on": self.scored_on,
             "data_quality": [] if self.data_quality is None else self.data_quality.to_json(),
-            "advice": [advice.to_json() for advice in self.advice],
+            "advice": [_advice(advice) for advice in self.advice],
             "notes": list(self.notes),
         }
 
@@ -361,7 +240,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "probability": _number(candidate.probability),
         "validation_nrmse": {k: _number(v) for k, v in candidate.validation_nrmse.items()},
         "estimation_nrmse": {k: _number(v) for k, v in candidate.estimation_nrmse.items()},
-        "excess": _number(candidate.excess),
+        "error_over_noise": _number(candidate.error_over_noise),
         "parameters": {
             name: {"value": _number(e.value), "std": _number(e.std), "unit": e.unit}
             for name, e in candidate.parameters.items()
@@ -371,6 +250,18 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "log_evidence": None if candidate.grounds is None else candidate.grounds.evidence,
         "success": candidate.success,
         "message": candidate.message,
+    }
+
+
+def _advice(advice: Advice) -> dict[str, Any]:
+    return {
+        "rival": list(advice.rival),
+        "waveform": advice.waveform,
+        "input": advice.source,
+        "amplitude": _number(advice.amplitude),
+        "band": None if advice.band is None else [_number(omega) for omega in advice.band],
+        "output": advice.output,
+        "separation": _number(advice.separation),
     }
 
 

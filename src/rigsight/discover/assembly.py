@@ -62,7 +62,7 @@ def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Fou
         found.how,
         selection,
         found.chosen,
-        found.judged.excess,
+        found.judged.error_over_noise,
         terms,
         found.held,
         found.force,
@@ -81,8 +81,8 @@ def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Fou
         alternatives=tuple(_alternative(trial, selection) for trial in selection.trials),
         force_equation={} if found.force is None else dict(found.force.inclusion),
         held_out=tuple(record.name for record in found.held_out),
-        held_out_error=found.judged.excess,
-        held_out_nrmse=found.judged.excess * task.noise[output] / size,
+        held_out_error=found.judged.error_over_noise,
+        held_out_nrmse=found.judged.error_over_noise * task.noise[output] / size,
         noise_floor=task.noise[output] / size,
         independent=selection.independent,
         runs=_runs(bench, found, output),
@@ -118,7 +118,7 @@ def _terms(bench: Bench, found: Found, coefficients: Mapping[str, Coefficient]) 
 def _alternative(trial: Trial, selection: Selection) -> Alternative:
     bic = criterion(trial, selection.independent)
     aic = bic - trial.n_free * (math.log(selection.independent) - 2.0)
-    return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.excess, aic, bic)
+    return Alternative(tuple(sorted(trial.support)), trial.n_free, trial.error_over_noise, aic, bic)
 
 
 def _runs(bench: Bench, found: Found, output: str) -> tuple[Run, ...]:

@@ -41,7 +41,7 @@ class Trial:
         Names of the effects.
     fit
         Output-error fit to the estimation records.
-    excess
+    error_over_noise
         RMS of the first output's held-out free-run error in units of the noise floor.
     residuals
         Held-out errors of the first output in units of the noise floor, all records one after the other; empty where a rough
@@ -50,7 +50,7 @@ class Trial:
 
     support: Support
     fit: FitResult
-    excess: float
+    error_over_noise: float
     residuals: NDArray[np.float64]
 
     @property
@@ -109,12 +109,12 @@ class _RoughTrial:
     score: FitResult | None
 
     @property
-    def excess(self) -> float:
+    def error_over_noise(self) -> float:
         """The held-out error is no larger than this."""
         return float("inf") if self.score is None else float(np.sqrt(self.score.cost / self.score.n_samples))
 
     def as_it_is(self) -> Trial:
-        return Trial(self.support, self.fit, self.excess, np.zeros(0))
+        return Trial(self.support, self.fit, self.error_over_noise, np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,7 @@ class Bench:
                 Attempt(support, release, start, to_beat=first.fit.cost if same else float("inf"))
             )
         pairs = zip(before, self._polished(attempts), strict=True)
-        return [again if again.excess < first.excess else first for first, again in pairs]
+        return [again if again.error_over_noise < first.error_over_noise else first for first, again in pairs]
 
     def scored(self, support: Support, fit: FitResult) -> Trial:
         """Simulate the held-out records with a fit; only their initial states are estimated, to full precision."""
@@ -281,11 +281,13 @@ class Bench:
         for trial in self.threads.side_by_side(further, looks):
             progress(trial.support)
             rough.append(trial)
-        errors = [trial.excess for trial in self.trials.values()] + [trial.excess for trial in rough]
+        errors = [trial.error_over_noise for trial in self.trials.values()] + [
+            trial.error_over_noise for trial in rough
+        ]
         far = _FAR * min(errors, default=float("inf"))
 
         def finished(trial: _RoughTrial) -> Trial:
-            return self._finely_scored(trial) if trial.excess < far else trial.as_it_is()
+            return self._finely_scored(trial) if trial.error_over_noise < far else trial.as_it_is()
 
         return list(self.threads.side_by_side(finished, rough))
 
@@ -347,7 +349,7 @@ class Bench:
         return _RoughTrial(support, fit, problem, score)
 
     def _finely_scored(self, trial: _RoughTrial, tolerance: float = _TOLERANCE) -> Trial:
-        if not np.isfinite(trial.excess) or trial.score is None:
+        if not np.isfinite(trial.error_over_noise) or trial.score is None:
             return trial.as_it_is()
         score = trial.problem.fit(trial.fit.values, [], trial.score.initial_states, tolerance=tolerance)
         if not score.residuals:

@@ -121,7 +121,7 @@ def discover(
         threads=threads,
     )
     selection = select(bench, say)
-    if not math.isfinite(selection.best.excess):
+    if not math.isfinite(selection.best.error_over_noise):
         raise SimulationError(
             f"The equations of {task.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
         )
@@ -129,7 +129,7 @@ def discover(
     final, held = _polished(task, bench, chosen)
     # A record that was set aside is fitted by the polish as well: only the equation before it has not seen it.
     judged = chosen if how else bench.scored(chosen.support, final)
-    if not math.isfinite(judged.excess):
+    if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The polished equations cannot be simulated on the held-out records.")
     say("polished")
     included = inclusion(task, bench, selection, final, motions, rows, rng)

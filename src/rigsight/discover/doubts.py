@@ -66,7 +66,7 @@ def warnings_of(
     how: str,
     selection: Selection,
     chosen: Trial,
-    excess: float,
+    error_over_noise: float,
     terms: Sequence[Term],
     held: str,
     force: ForceEquation | None,
@@ -109,9 +109,9 @@ def warnings_of(
             f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change it by less: "
             f"every term left out is in doubt. Regression would take {likeliest} next, which in such noise proves nothing."
         )
-    if excess > _FLOOR:
+    if error_over_noise > _FLOOR:
         found.append(
-            f"The equations leave {excess:.1f} times the noise floor in free run on the held-out records: "
+            f"The equations leave {error_over_noise:.1f} times the noise floor in free run on the held-out records: "
             "something is still missing, or disturbances are larger than the floor says."
         )
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
@@ -152,17 +152,21 @@ def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Re
 def _one_amplitude(selection: Selection, chosen: Trial) -> str:
     """Return what records of a single amplitude tell apart, and what they do not."""
     others = sorted(
-        (t for t in selection.trials if not t.support >= chosen.support and math.isfinite(t.excess)),
-        key=lambda t: t.excess,
+        (
+            t
+            for t in selection.trials
+            if not t.support >= chosen.support and math.isfinite(t.error_over_noise)
+        ),
+        key=lambda t: t.error_over_noise,
     )
-    near = [t for t in others if t.excess < _NEAR * chosen.excess]
+    near = [t for t in others if t.error_over_noise < _NEAR * chosen.error_over_noise]
     if not others:
         told = "Softening, hardening, friction or hysteresis may look like other numbers of the same equation there"
     elif near:
         listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in near[:3])
         told = f"Nearly as good there is {listed}"
     else:
-        ratio = others[0].excess / chosen.excess
+        ratio = others[0].error_over_noise / chosen.error_over_noise
         told = f"There the terms are told apart (the next equation leaves {ratio:.3g} times as much), elsewhere they are untested"
     return (
         f"The records have one amplitude: how a force grows with it has not been seen. {told}. "

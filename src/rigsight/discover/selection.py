@@ -52,16 +52,16 @@ def at_floor(trial: Trial) -> bool:
     if n == 0:
         return False
     return bool(
-        trial.excess <= 1.0 + _CHANCE / np.sqrt(2.0 * n)
+        trial.error_over_noise <= 1.0 + _CHANCE / np.sqrt(2.0 * n)
         and independent_samples(trial.residuals) >= _WHITE * n
     )
 
 
 def criterion(trial: Trial, independent: float) -> float:
     """Return the information criterion of a held-out error."""
-    if not np.isfinite(trial.excess):
+    if not np.isfinite(trial.error_over_noise):
         return float("inf")
-    return information_criterion(trial.excess**2, trial.n_free, independent)
+    return information_criterion(trial.error_over_noise**2, trial.n_free, independent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +102,12 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
             [Attempt(support) for support in supports],
             lambda support: progress(", ".join(sorted(support)) or "linear"),
         )
-        enough = HOPELESS * min(trial.excess for trial in bench.trials.values())
+        enough = HOPELESS * min(trial.error_over_noise for trial in bench.trials.values())
         special = {trial.support: dict(trial.fit.structure.fixed) for trial in trials}
         releases = [
             Attempt(t.support, frozenset(own), {**t.fit.values, **own})
             for t in trials
-            if (own := special[t.support]) and t.excess < enough and not at_floor(t)
+            if (own := special[t.support]) and t.error_over_noise < enough and not at_floor(t)
         ]
         released = {trial.support: trial for trial in bench.trials_of(releases)}
         return [_better(trial, released.get(trial.support)) for trial in trials]
@@ -120,7 +120,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
     if not any(at_floor(trial) for trial in pool):
         # A rich term may stand for a simple one in the regression, and its fit stop where that of the simple one does not.
         pool += tried(_special_cases(bench, [trial.support for trial in pool]))
-    independent = independent_samples(min(pool, key=lambda t: t.excess).residuals)
+    independent = independent_samples(min(pool, key=lambda t: t.error_over_noise).residuals)
 
     def cost(trial: Trial) -> float:
         return criterion(trial, independent)
@@ -135,7 +135,7 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         pool += tried([*shorter, *longer])
         # What stopped short from the regression's values may go on from those of the longer equation.
         pool += bench.shortened([support for support in shorter if support], best)
-        finest = min(pool, key=lambda t: t.excess)
+        finest = min(pool, key=lambda t: t.error_over_noise)
         independent = independent_samples(finest.residuals)
         found = _fewest(pool, cost)
         if found is best:
@@ -150,7 +150,11 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
 
 def _better(held: Trial, released: Trial | None) -> Trial:
     """Return the trial with the special values released where that is worth more parameters."""
-    return held if released is None or released.excess >= _RELEASED * held.excess else released
+    return (
+        held
+        if released is None or released.error_over_noise >= _RELEASED * held.error_over_noise
+        else released
+    )
 
 
 def _fewest(trials: Sequence[Trial], cost: Callable[[Trial], float]) -> Trial:

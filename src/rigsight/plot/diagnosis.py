@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import Diagnosis, Stage, Trace
+from rigsight.diagnose.location.trace import Stage, Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.plot.drawing import (
     FLOOR,
     GIVEN,
@@ -199,11 +200,13 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     rows = np.cumsum(heights) - 0.5 * np.array(heights)
     figure = new_figure(_WIDTH, 0.85 + 0.27 * sum(heights), layout=None)
     ax = figure.subplots()
-    finite = [c.excess for c in candidates if np.isfinite(c.excess) and c.excess > 0.0]
+    finite = [
+        c.error_over_noise for c in candidates if np.isfinite(c.error_over_noise) and c.error_over_noise > 0.0
+    ]
     left, right = min([1.0, *finite]) / 1.04, max([1.5, *finite])
     tied = set(diagnosis.ambiguous_with)
     for row, candidate in zip(rows, candidates, strict=False):
-        if not (np.isfinite(candidate.excess) and candidate.excess > 0.0):
+        if not (np.isfinite(candidate.error_over_noise) and candidate.error_over_noise > 0.0):
             ax.annotate("could not be scored", (max(left, 1.0), row), (6, 0), textcoords="offset points",
                         va="center", fontsize=8, color=MEASURED)  # fmt: skip
             continue
@@ -211,9 +214,15 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
         color = WITH_EFFECT if is_named else OTHER
         hatch = "////" if candidate.effects in tied else None
         ax.barh(
-            row, candidate.excess - left, left=left, height=0.62, color=color, hatch=hatch, edgecolor="white"
+            row,
+            candidate.error_over_noise - left,
+            left=left,
+            height=0.62,
+            color=color,
+            hatch=hatch,
+            edgecolor="white",
         )
-        ax.annotate(f"{candidate.excess:.3g} ×", (max(candidate.excess, left), row), (4, 0),
+        ax.annotate(f"{candidate.error_over_noise:.3g} ×", (max(candidate.error_over_noise, left), row), (4, 0),
                     textcoords="offset points", va="center", fontsize=8.5, color=FLOOR)  # fmt: skip
     ax.set_xscale("log")
     ax.set_xlim(left, right * (right / left) ** 0.12)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rigsight.diagnose.result import Stage
+    from rigsight.diagnose.location.trace import Stage
 
 P = ParamSpec("P")
 R = TypeVar("R")

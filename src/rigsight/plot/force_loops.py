@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import Stage
+from rigsight.diagnose.location.trace import Stage
 from rigsight.plot.drawing import MEASURED, STAGE_STYLES, in_style, new_figure, set_margins, shown_in
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from rigsight.diagnose.location.gap_parts import (
     StatePart,
     TimePart,
 )
-from rigsight.diagnose.result import Stage
+from rigsight.diagnose.location.trace import Stage
 from rigsight.plot.drawing import (
     FLOOR,
     MEASURED,

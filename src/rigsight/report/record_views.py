@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight import plot
-from rigsight.diagnose.result import STAGES, Diagnosis, Stage, Trace
+from rigsight.diagnose.location.trace import STAGES, Stage, Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.metrics import nrmse
 from rigsight.report.drawing.charts import (
     Chart,

@@ -11,7 +11,8 @@ from importlib.resources import files
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from rigsight.diagnose.result import STAGES, Diagnosis
+from rigsight.diagnose.location.trace import STAGES
+from rigsight.diagnose.result import Diagnosis
 from rigsight.effects import Effect
 from rigsight.report import location, sections
 from rigsight.report.drawing.loop_figures import loop_figures
@@ -26,7 +27,7 @@ from rigsight.report.wording import (
     ambiguity_sentence,
     basis_sentence,
     effects_label,
-    excess,
+    error_over_noise,
     missing_force_sentence,
     percent,
     remainder_sentence,
@@ -80,7 +81,7 @@ def render_report(
             stages=stage_names(diagnosis),
             rivals=[sentence_case(effects_label(effects)) for effects in diagnosis.ambiguous_with],
             effects=sections.effect_summaries(diagnosis, known),
-            left={stage: times_floor(excess(diagnosis, stage)) for stage in STAGES},
+            left={stage: times_floor(error_over_noise(diagnosis, stage)) for stage in STAGES},
             probability=next(
                 (percent(c.probability) for c in diagnosis.candidates if c.effects == diagnosis.effects), ""
             )

@@ -17,7 +17,8 @@ from rigsight.compare.response_error import (
     simulated_response,
     without_shares,
 )
-from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse
 from rigsight.identify.transfer.record_response import Method

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rigsight import plot
-from rigsight.diagnose.result import STAGES, Diagnosis, Estimate, NoiseFloor
+from rigsight.diagnose.location.trace import STAGES
+from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.result import Diagnosis, Estimate
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
 from rigsight.report.declared import effect_of, rig_of
@@ -123,9 +125,9 @@ def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
     """Return the ranking with the words that go with it."""
     names = [effects_label(candidate.effects) for candidate in diagnosis.candidates]
     scored = [
-        f"{name} {c.excess:.3g}"
+        f"{name} {c.error_over_noise:.3g}"
         for name, c in zip(names, diagnosis.candidates, strict=True)
-        if math.isfinite(c.excess)
+        if math.isfinite(c.error_over_noise)
     ]
     hatched = " Hatched: cannot be told from it by these records." if diagnosis.ambiguous_with else ""
     named = " Blue: the one named." if diagnosis.effects else ""
@@ -152,7 +154,9 @@ def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 else "not scored"
                 for output in diagnosis.gap
             ],
-            "excess": f"{candidate.excess:.3g} {TIMES}" if math.isfinite(candidate.excess) else "not scored",
+            "error_over_noise": f"{candidate.error_over_noise:.3g} {TIMES}"
+            if math.isfinite(candidate.error_over_noise)
+            else "not scored",
             "converged": "yes" if candidate.success else "no",
             "message": candidate.message,
         }

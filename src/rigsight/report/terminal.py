@@ -105,6 +105,10 @@ def diagnosis_rows(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
 
 
 def _candidate(candidate: Candidate) -> str:
-    left = f"{candidate.excess:.3g} x floor" if math.isfinite(candidate.excess) else "not scored"
+    left = (
+        f"{candidate.error_over_noise:.3g} x floor"
+        if math.isfinite(candidate.error_over_noise)
+        else "not scored"
+    )
     unfinished = "" if candidate.success else ", not converged"
     return f"{effects_label(candidate.effects)} {percent(candidate.probability)} ({left}{unfinished})"

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigsight.diagnose.location.gap_parts import GapPart
-from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap, Stage
-from rigsight.diagnose.verdict import AT_FLOOR, AT_LOWER_BOUND
+from rigsight.diagnose.location.trace import Stage
+from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap
+from rigsight.diagnose.verdict.judgement import AT_FLOOR, AT_LOWER_BOUND
 from rigsight.discover import not_contradicted
 from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
@@ -125,11 +126,11 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f} %" if share > 0.99 else f"{100.0 * share:.0f} %"
 
 
-def times_floor(excess: float) -> str:
+def times_floor(error_over_noise: float) -> str:
     """Return ``"1.04 × the noise floor"``."""
     return (
-        f"{excess:.3g} {TIMES} the noise floor"
-        if math.isfinite(excess)
+        f"{error_over_noise:.3g} {TIMES} the noise floor"
+        if math.isfinite(error_over_noise)
         else "an unknown multiple of the noise floor"
     )
 
@@ -139,7 +140,7 @@ def named_candidate(diagnosis: Diagnosis) -> Candidate | None:
     return next((c for c in diagnosis.candidates if c.effects == diagnosis.effects), None)
 
 
-def excess(diagnosis: Diagnosis, stage: str) -> float:
+def error_over_noise(diagnosis: Diagnosis, stage: str) -> float:
     """Return the RMS left over all outputs in units of the noise floor.
 
     Parameters
@@ -157,7 +158,7 @@ def excess(diagnosis: Diagnosis, stage: str) -> float:
 
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict in one plain sentence."""
-    before, after = excess(diagnosis, "before"), excess(diagnosis, "after")
+    before, after = error_over_noise(diagnosis, "before"), error_over_noise(diagnosis, "after")
     if diagnosis.verdict == "effect":
         return _effect_sentence(diagnosis)
     if diagnosis.verdict == "parameters":
@@ -188,7 +189,7 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
     places = listed(dict.fromkeys(map(place_label, named)))
     sure = "most likely caused" if diagnosis.ambiguous_with else "caused"
     it = "them" if len(diagnosis.effects) > 1 else "it"
-    left = times_floor(excess(diagnosis, "after"))
+    left = times_floor(error_over_noise(diagnosis, "after"))
     if _leaves_more(diagnosis):
         sure = "mainly caused, most likely," if diagnosis.ambiguous_with else "mainly caused"
     return (
@@ -198,20 +199,20 @@ def _effect_sentence(diagnosis: Diagnosis) -> str:
 
 
 def _unknown_sentence(diagnosis: Diagnosis) -> str:
-    scored = [c for c in diagnosis.candidates if c.effects and math.isfinite(c.excess)]
-    best = min(scored, key=lambda c: c.excess, default=None)
+    scored = [c for c in diagnosis.candidates if c.effects and math.isfinite(c.error_over_noise)]
+    best = min(scored, key=lambda c: c.error_over_noise, default=None)
     places = listed(dict.fromkeys(map(place_label, diagnosis.where)))
     points = f"; the evidence points to something {places}" if places else ""
     if best is None:
         return f"The cause of the gap is unknown{points}."
     return (
         f"The cause of the gap is unknown: the best of {len(scored)} candidates, {effects_label(best.effects)}, "
-        f"still leaves {times_floor(best.excess)}{points}."
+        f"still leaves {times_floor(best.error_over_noise)}{points}."
     )
 
 
 def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
-    before, after = excess(diagnosis, "before"), excess(diagnosis, "after")
+    before, after = error_over_noise(diagnosis, "before"), error_over_noise(diagnosis, "after")
     if not before > 1.0:
         return f"{closes} none of it, as there is hardly any"
     share = (before - after) / (before - 1.0)

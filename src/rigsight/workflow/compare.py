@@ -11,9 +11,9 @@ from typing import cast
 from joblib import Parallel, delayed
 
 from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.drift import can_drift
-from rigsight.diagnose.windows import cut, window_length
+from rigsight.diagnose.fitting.drift import can_drift
+from rigsight.diagnose.fitting.windows import cut, window_length
+from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.errors import InputError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method

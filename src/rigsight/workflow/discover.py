@@ -10,8 +10,8 @@ from typing import cast
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose.detect import noise_floors
-from rigsight.diagnose.windows import cut, window_length
+from rigsight.diagnose.fitting.windows import cut, window_length
+from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, Task, discover
 from rigsight.discover.discovery import Method
 from rigsight.errors import RigsightError, check_option

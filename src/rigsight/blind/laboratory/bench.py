@@ -19,7 +19,7 @@ from rigsight.blind.laboratory.subjects import LaboratorySubject
 from rigsight.blind.laboratory.surroundings import GAPS, LEAST_BESIDE, Surroundings
 from rigsight.blind.strength import Sized, draw_shape, sized
 from rigsight.blind.waveforms import low_pass_noise
-from rigsight.diagnose.windows import cut, window_length
+from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.effects import Effect, effect_named, kind_of, placed
 from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, GreyBoxFit, characteristic_scales

@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from rigsight.blind.laboratory.stands import STANDS, Stand
-from rigsight.diagnose.candidates.placed import candidates_on
+from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.effects import CATALOGUE, Effect, Place, kind_of
 from rigsight.rigs import joint_of
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.state_plane import NOTHING, Plane, plane_parts, plane_units
-from rigsight.diagnose.result import Trace
-from rigsight.diagnose.verdict import AT_FLOOR
-from rigsight.diagnose.windows import WINDOW
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.verdict.judgement import AT_FLOOR
 from rigsight.discover import JointMotion, joint_motions
 from rigsight.errors import SimulationError
 from rigsight.metrics import rms
@@ -27,7 +27,7 @@ _MAPPED = 8000
 """Samples that are followed: about a second of processor time per thousand on a drive train."""
 
 
-def joint_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
     """Return the gap of each output over the plane of each joint's motion.
 
     The joint first at which a force agrees best with the sensors. Where much is lacking, the re-identified numbers are far
@@ -45,30 +45,32 @@ def joint_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tu
     scored
         Records, of which the stretches with the largest gap are looked at.
     """
-    if not scored or bench.modelled or not bench.rig.mechanism.free:
+    if not scored or context.modelled or not context.rig.mechanism.free:
         return ()
-    if any(record.free_offsets for record in bench.scoring):
+    if any(record.free_offsets for record in context.scoring):
         return ()
     share = max(1, _MAPPED // len(scored))
-    stretches = [_stretch(bench, trace, share) for trace in scored]
-    records = [_record(bench, trace) for trace in stretches]
+    stretches = [_stretch(context, trace, share) for trace in scored]
+    records = [_record(context, trace) for trace in stretches]
     try:
-        motions = joint_motions(bench.rig, records, linear.fit.values, bench.noise)
+        motions = joint_motions(context.rig, records, reidentified.fit.values, context.noise)
     except (SimulationError, np.linalg.LinAlgError):
         # A map is no reason to have no diagnosis.
         return ()
     motions = tuple(motion for motion in motions if np.isfinite(motion.left))
     parts: list[StatePart] = []
     for motion in sorted(motions, key=lambda motion: motion.left):
-        parts += plane_parts(bench, _plane(bench, motion, linear.excess > AT_FLOOR), stretches)
+        parts += plane_parts(
+            context, _plane(context, motion, reidentified.error_over_noise > AT_FLOOR), stretches
+        )
     return tuple(parts)
 
 
-def _stretch(bench: Workbench, trace: Trace, n_samples: int) -> Trace:
+def _stretch(context: FitContext, trace: Trace, n_samples: int) -> Trace:
     """Return the stretch of a record, at most so long, in which the gap is largest."""
     if trace.t.size <= n_samples:
         return trace
-    left = sum((trace.residual("reidentified", name) / bench.noise[name]) ** 2 for name in trace.measured)
+    left = sum((trace.residual("reidentified", name) / context.noise[name]) ** 2 for name in trace.measured)
     energy = np.append(0.0, np.cumsum(left))
     start = int(np.argmax(energy[n_samples:] - energy[:-n_samples]))
     kept = slice(start, start + n_samples)
@@ -87,12 +89,12 @@ def _stretch(bench: Workbench, trace: Trace, n_samples: int) -> Trace:
     )
 
 
-def _record(bench: Workbench, trace: Trace) -> Record:
-    origin = next(r for r in bench.scoring if r.name.split(WINDOW)[0] == trace.record)
+def _record(context: FitContext, trace: Trace) -> Record:
+    origin = next(r for r in context.scoring if r.name.split(WINDOW)[0] == trace.record)
     return replace(origin, name=trace.record, signals={**trace.inputs, **trace.measured})
 
 
-def _plane(bench: Workbench, motion: JointMotion, lacks: bool) -> Plane:
+def _plane(context: FitContext, motion: JointMotion, lacks: bool) -> Plane:
     force = -np.concatenate(motion.force)
     return Plane(
         x=np.concatenate(motion.displacement),
@@ -100,7 +102,7 @@ def _plane(bench: Workbench, motion: JointMotion, lacks: bool) -> Plane:
         # What resists the motion is what the equations lack with the other sign.
         force=force if lacks else np.full(force.size, NOTHING),
         force_noise=rms(np.concatenate(motion.error)) if lacks else NOTHING,
-        forced=tuple(signal.name for signal in bench.rig.outputs),
-        units=plane_units(bench.rig.units_at(motion.joint.name)),
+        forced=tuple(signal.name for signal in context.rig.outputs),
+        units=plane_units(context.rig.units_at(motion.joint.name)),
         joint=motion.joint.name,
     )

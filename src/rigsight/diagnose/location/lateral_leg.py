@@ -16,7 +16,7 @@ import sympy as sp
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rigsight.diagnose.workbench import Workbench
+from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
@@ -58,7 +58,7 @@ class _Numbers:
     shift: float = 0.0
 
 
-def fit_lateral_leg(bench: Workbench, given: Mapping[str, float]) -> LateralLeg | None:
+def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralLeg | None:
     """Fit the lateral equation with the measured motion as input; None where no record holds both.
 
     Parameters
@@ -68,12 +68,12 @@ def fit_lateral_leg(bench: Workbench, given: Mapping[str, float]) -> LateralLeg 
     given
         Parameters of the given simulation.
     """
-    rig = bench.rig
+    rig = context.rig
     if rig.follower is None:
         return None
     names = (rig.outputs[0].name, rig.follower.symbol.name)
-    fitted_to = [r for r in bench.estimation if names[1] in r]
-    scored_on = [r for r in bench.scoring if names[1] in r]
+    fitted_to = [r for r in context.estimation if names[1] in r]
+    scored_on = [r for r in context.scoring if names[1] in r]
     if not fitted_to or not scored_on:
         return None
     start = _given(rig, given)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location.bands import band_edges, band_powers, dominant_frequency
 from rigsight.diagnose.location.gap_parts import (
     AmplitudePart,
@@ -21,8 +22,8 @@ from rigsight.diagnose.location.joint_planes import joint_parts
 from rigsight.diagnose.location.paths import path_parts, path_sentence
 from rigsight.diagnose.location.quantify import budget_intervals
 from rigsight.diagnose.location.state_plane import state_parts
-from rigsight.diagnose.result import STAGES, NoiseFloor, Stretches, Trace
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.location.trace import STAGES, Trace
+from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
 from rigsight.metrics import rms
 
 _STRETCHES = 24
@@ -33,11 +34,11 @@ _LEAST_NOISE = 250
 
 
 def localize(
-    bench: Workbench,
+    context: FitContext,
     traces: Sequence[Trace],
     scored_on: str,
     before: Scored,
-    linear: Scored,
+    reidentified: Scored,
     after: Scored,
     rng: np.random.Generator,
     floors: Sequence[NoiseFloor] = (),
@@ -61,17 +62,17 @@ def localize(
     """
     stretches = {floor.output: _long_enough(floor.stretches) for floor in floors}
     scored = [trace for trace in traces if trace.role == scored_on]
-    one_motion = bench.rig.has_one_motion
-    by_path = path_parts(bench, before, linear, after) if one_motion else ()
+    one_motion = context.rig.has_one_motion
+    by_path = path_parts(context, before, reidentified, after) if one_motion else ()
     return Localization(
-        by_record=tuple(_by_record(traces, scored_on, bench.noise, rng)),
-        by_amplitude=tuple(_by_amplitude(bench, traces, scored_on)),
-        by_band=tuple(_by_band(scored, bench.noise, stretches)),
-        by_state=(state_parts if one_motion else joint_parts)(bench, linear, scored),
-        by_time=tuple(_by_time(scored, bench.noise)),
+        by_record=tuple(_by_record(traces, scored_on, context.noise, rng)),
+        by_amplitude=tuple(_by_amplitude(context, traces, scored_on)),
+        by_band=tuple(_by_band(scored, context.noise, stretches)),
+        by_state=(state_parts if one_motion else joint_parts)(context, reidentified, scored),
+        by_time=tuple(_by_time(scored, context.noise)),
         by_path=by_path,
-        sentence=path_sentence(by_path, bench.rig),
-        noise_shape={output: "measured" if stretches.get(output) else "white" for output in bench.noise},
+        sentence=path_sentence(by_path, context.rig),
+        noise_shape={output: "measured" if stretches.get(output) else "white" for output in context.noise},
     )
 
 
@@ -100,26 +101,26 @@ def _by_record(
     return parts
 
 
-def _by_amplitude(bench: Workbench, traces: Sequence[Trace], scored_on: str) -> list[AmplitudePart]:
-    units = {"amplitude": bench.rig.inputs[0].unit if bench.rig.inputs else "1"}
+def _by_amplitude(context: FitContext, traces: Sequence[Trace], scored_on: str) -> list[AmplitudePart]:
+    units = {"amplitude": context.rig.inputs[0].unit if context.rig.inputs else "1"}
     known = {(trace.role != scored_on, trace.amplitude) for trace in traces if trace.amplitude is not None}
     parts = []
     for fitted, amplitude in sorted(known):
         alike = [trace for trace in traces if (trace.role != scored_on) == fitted]
         group = [trace for trace in alike if trace.amplitude == amplitude]
-        for output in (signal.name for signal in bench.rig.outputs):
+        for output in (signal.name for signal in context.rig.outputs):
             holding = [trace for trace in group if output in trace.measured]
             if holding:
                 parts.append(
                     AmplitudePart(
                         output=output,
-                        **_figures(holding, output, bench.noise[output], alike),
+                        **_figures(holding, output, context.noise[output], alike),
                         amplitude=amplitude,
                         role=holding[0].role,
                         scored=not fitted,
                         records=tuple(trace.record for trace in holding),
                         measured_rms=_spread(holding, output),
-                        units={**units, "measured_rms": _unit(bench, output)},
+                        units={**units, "measured_rms": _unit(context, output)},
                     )
                 )
     return parts
@@ -253,5 +254,5 @@ def _input(trace: Trace) -> NDArray[np.float64]:
     return max(trace.inputs.values(), key=lambda samples: float(np.ptp(samples)))
 
 
-def _unit(bench: Workbench, output: str) -> str:
-    return next(signal.unit for signal in bench.rig.outputs if signal.name == output)
+def _unit(context: FitContext, output: str) -> str:
+    return next(signal.unit for signal in context.rig.outputs if signal.name == output)

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location.gap_parts import PathPart
 from rigsight.diagnose.location.lateral_leg import LateralLeg, fit_lateral_leg
-from rigsight.diagnose.verdict import AT_FLOOR
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.verdict.judgement import AT_FLOOR
 from rigsight.effects import Place
 from rigsight.metrics import rms
 from rigsight.records.record import Record
@@ -27,7 +27,9 @@ _WORTHWHILE = 1.1
 """Factor by which a shift must lower what the leg leaves to be spoken of; an assumption."""
 
 
-def path_parts(bench: Workbench, before: Scored, linear: Scored, after: Scored) -> tuple[PathPart, ...]:
+def path_parts(
+    context: FitContext, before: Scored, reidentified: Scored, after: Scored
+) -> tuple[PathPart, ...]:
     """Return every leg of the signal path with what it leaves of its output when its input is taken as measured.
 
     Parameters
@@ -37,21 +39,21 @@ def path_parts(bench: Workbench, before: Scored, linear: Scored, after: Scored) 
     before, linear, after
         The given simulation, the re-identified equations, the model of the verdict.
     """
-    rig = bench.rig
+    rig = context.rig
     source, motion = rig.inputs[0].name, rig.outputs[0].name
-    own = _motion_alone(bench, linear)
+    own = _motion_alone(context, reidentified)
     parts = [
         _part(
-            bench.scoring,
+            context.scoring,
             motion,
             source,
             {"before": _column(before, 0), "reidentified": _column(own, 0), "after": _column(after, 0)},
-            bench.noise[motion],
+            context.noise[motion],
         )
     ]
-    leg = fit_lateral_leg(bench, before.fit.values)
+    leg = fit_lateral_leg(context, before.fit.values)
     if leg is not None and rig.follower is not None:
-        parts.append(_lateral_part(bench, leg, motion, rig.follower.symbol.name))
+        parts.append(_lateral_part(context, leg, motion, rig.follower.symbol.name))
     return tuple(parts)
 
 
@@ -100,21 +102,23 @@ def _words(rig: Rig) -> str:
     return rig.place_name(Place.DYNAMICS).replace("_", " ")
 
 
-def _motion_alone(bench: Workbench, linear: Scored) -> Scored:
+def _motion_alone(context: FitContext, reidentified: Scored) -> Scored:
     """Re-identify the motion without regard to what it drives: a gap there must not bend the numbers here."""
-    downstream = bench.rig.downstream_parameters
-    if not downstream or downstream <= bench.held:
-        return linear
-    names = {symbol.name for symbol in bench.rig.downstream}
+    downstream = context.rig.downstream_parameters
+    if not downstream or downstream <= context.held:
+        return reidentified
+    names = {symbol.name for symbol in context.rig.downstream}
     alone = replace(
-        bench,
-        estimation=tuple(_without(record, names) for record in bench.estimation),
-        scoring=tuple(_without(record, names) for record in bench.scoring),
-        held=bench.held | downstream,
+        context,
+        estimation=tuple(_without(record, names) for record in context.estimation),
+        scoring=tuple(_without(record, names) for record in context.scoring),
+        held=context.held | downstream,
     )
-    structure = linear.fit.structure
-    fit = alone.problem(structure, alone.estimation).fit(linear.fit.values, alone.free_parameters(structure))
-    return alone.score((), fit) if fit.residuals else linear
+    structure = reidentified.fit.structure
+    fit = alone.problem(structure, alone.estimation).fit(
+        reidentified.fit.values, alone.free_parameters(structure)
+    )
+    return alone.score((), fit) if fit.residuals else reidentified
 
 
 def _without(record: Record, names: set[str]) -> Record:
@@ -125,9 +129,9 @@ def _column(model: Scored, index: int) -> list[NDArray[np.float64]]:
     return [residual[:, index] for residual in model.residuals]
 
 
-def _lateral_part(bench: Workbench, leg: LateralLeg, motion: str, output: str) -> PathPart:
-    records = [record for record in bench.scoring if output in record]
-    noise = float(np.hypot(bench.noise[output], leg.noise_gain * bench.noise[motion]))
+def _lateral_part(context: FitContext, leg: LateralLeg, motion: str, output: str) -> PathPart:
+    records = [record for record in context.scoring if output in record]
+    noise = float(np.hypot(context.noise[output], leg.noise_gain * context.noise[motion]))
     part = _part(records, output, motion, {"before": leg.given, "reidentified": leg.fitted}, noise)
     spread = float(np.std(np.concatenate([record[output] for record in records]))) or 1.0
     shifted = rms(np.concatenate(leg.shifted)) / spread

@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.location.block_means import RESAMPLES, block_means
-from rigsight.diagnose.result import STAGES, Trace
+from rigsight.diagnose.location.trace import STAGES, Trace
+from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
 
 _LIMITS = (0.025, 0.975)
 

@@ -15,10 +15,10 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location.bands import spectrum
 from rigsight.diagnose.location.gap_parts import StatePart
-from rigsight.diagnose.result import STAGES, Trace
-from rigsight.diagnose.workbench import Scored, Workbench
+from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.metrics import rms
 from rigsight.rigs import evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -71,7 +71,7 @@ class Plane:
     joint: str = ""
 
 
-def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+def state_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
     """Return the gap of each output over a coarse grid of the measured motion's displacement and velocity.
 
     Parameters
@@ -85,7 +85,7 @@ def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tu
     """
     if not scored:
         return ()
-    motions = [_motion(bench, linear.fit.values, trace) for trace in scored]
+    motions = [_motion(context, reidentified.fit.values, trace) for trace in scored]
     # Where no record's residual stands out there is no force to speak of, and of the others the noisiest speaks for all.
     levels = [motion.force_noise for motion in motions if np.isfinite(motion.force_noise)]
     plane = Plane(
@@ -93,13 +93,13 @@ def state_parts(bench: Workbench, linear: Scored, scored: Sequence[Trace]) -> tu
         v=np.concatenate([motion.v for motion in motions]),
         force=np.concatenate([motion.force for motion in motions]),
         force_noise=max(levels, default=NOTHING),
-        forced=(bench.rig.outputs[0].name,),
-        units=plane_units(bench.rig.units),
+        forced=(context.rig.outputs[0].name,),
+        units=plane_units(context.rig.units),
     )
-    return plane_parts(bench, plane, scored)
+    return plane_parts(context, plane, scored)
 
 
-def plane_parts(bench: Workbench, plane: Plane, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
+def plane_parts(context: FitContext, plane: Plane, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
     """Return the gap of each output over a coarse grid of a plane.
 
     Parameters
@@ -115,7 +115,7 @@ def plane_parts(bench: Workbench, plane: Plane, scored: Sequence[Trace]) -> tupl
     rows, v_edges = _cells(plane.v)
     cell = columns * _CELLS + rows
     parts = []
-    for signal in bench.rig.outputs:
+    for signal in context.rig.outputs:
         holding = np.concatenate([np.full(t.t.size, signal.name in t.measured) for t in scored])
         if not np.any(holding):
             continue
@@ -124,7 +124,7 @@ def plane_parts(bench: Workbench, plane: Plane, scored: Sequence[Trace]) -> tupl
         residuals = {s: np.concatenate([t.residual(s, signal.name) for t in with_output]) for s in STAGES}
         own_cell, own_force = cell[holding], plane.force[holding]
         total = float(np.sum(residuals["reidentified"] ** 2)) or 1.0
-        noise = bench.noise[signal.name]
+        noise = context.noise[signal.name]
         is_forced = signal.name in plane.forced
         for i in np.unique(own_cell):
             inside = own_cell == i
@@ -153,17 +153,17 @@ def plane_parts(bench: Workbench, plane: Plane, scored: Sequence[Trace]) -> tupl
     return tuple(parts)
 
 
-def _motion(bench: Workbench, values: Mapping[str, float], trace: Trace) -> _Motion:
-    rig = bench.rig
+def _motion(context: FitContext, values: Mapping[str, float], trace: Trace) -> _Motion:
+    rig = context.rig
     response = rig.outputs[0].name
     if not rig.is_driven:
         x, v = smooth_motion(next(iter(trace.inputs.values())), trace.dt)
-        return _Motion(x, v, trace.residual("reidentified", response), bench.noise[response])
+        return _Motion(x, v, trace.residual("reidentified", response), context.noise[response])
     measured = trace.measured[response]
-    filtered = _low_pass(measured - np.mean(measured), trace.dt, bench.noise[response])
+    filtered = _low_pass(measured - np.mean(measured), trace.dt, context.noise[response])
     x = measured if filtered is None else _filtered(filtered, measured)
     residual = trace.residual("reidentified", response)
-    own = _low_pass(residual, trace.dt, bench.noise[response])
+    own = _low_pass(residual, trace.dt, context.noise[response])
     if own is None:
         force, noise = np.full(residual.size, NOTHING), NOTHING
     else:
@@ -177,7 +177,7 @@ def _motion(bench: Workbench, values: Mapping[str, float], trace: Trace) -> _Mot
         omega = omega / trace.dt
         # Forward and backward filtering squares the gain.
         operator = np.abs(gain) ** 2 * np.abs(k - m * omega**2 + 1j * d * omega)
-        noise = bench.noise[response] * rms(operator)
+        noise = context.noise[response] * rms(operator)
     return _Motion(x, np.gradient(x, trace.dt), force, noise)
 
 

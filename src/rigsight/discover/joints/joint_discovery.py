@@ -56,7 +56,7 @@ class _Polished:
     terms: tuple[LawTerm, ...]
     fit: FitResult
     residuals: tuple[Floats, ...]
-    excess: float
+    error_over_noise: float
 
 
 def discover_at_joints(
@@ -101,7 +101,7 @@ def discover_at_joints(
             start = {**known, **force.parameters}
             found.append(polisher.polished(force.law.terms, start))
             say(", ".join(term.effect.name for term in force.law.terms))
-    found += _shorter(polisher, min(found, key=lambda one: one.excess), say)
+    found += _shorter(polisher, min(found, key=lambda one: one.error_over_noise), say)
     return _assembled(task, polisher, found, joints)
 
 
@@ -113,10 +113,10 @@ def _shorter(polisher: _Polisher, best: _Polished, say: Callable[[str], None]) -
         tried = [polisher.polished(terms, values) for terms in _simpler(best) if terms]
         found += tried
         say("fewer terms")
-        good = [one for one in tried if one.excess <= _NO_WORSE * best.excess]
+        good = [one for one in tried if one.error_over_noise <= _NO_WORSE * best.error_over_noise]
         if not good:
             break
-        best = min(good, key=lambda one: one.excess)
+        best = min(good, key=lambda one: one.error_over_noise)
     return found
 
 
@@ -171,23 +171,23 @@ class _Polisher:
         score = GreyBoxFit(structure, self.held_out, self._scales, self.noise, threads=self._threads).fit(
             fit.values, []
         )
-        excess = score.weighted_rms if score.residuals else float("inf")
-        return _Polished(tuple(terms), fit, score.residuals, excess)
+        error_over_noise = score.weighted_rms if score.residuals else float("inf")
+        return _Polished(tuple(terms), fit, score.residuals, error_over_noise)
 
 
 def _assembled(
     task: Task, polisher: _Polisher, found: Sequence[_Polished], joints: tuple[JointForce, ...]
 ) -> Discovery:
     rig, held_out = task.rig, polisher.held_out
-    finest = min(found, key=lambda one: one.excess)
-    if not math.isfinite(finest.excess):
+    finest = min(found, key=lambda one: one.error_over_noise)
+    if not math.isfinite(finest.error_over_noise):
         raise SimulationError("The polished equations cannot be simulated on the held-out records.")
     independent = _independent(rig, finest)
 
     def criterion(one: _Polished) -> float:
-        if not math.isfinite(one.excess):
+        if not math.isfinite(one.error_over_noise):
             return float("inf")
-        return information_criterion(one.excess**2, len(one.fit.free), independent)
+        return information_criterion(one.error_over_noise**2, len(one.fit.free), independent)
 
     ordered = sorted(found, key=criterion)
     close = [one for one in ordered if criterion(one) <= criterion(ordered[0]) + STRONG]
@@ -220,7 +220,7 @@ def _assembled(
             Alternative(
                 tuple(term.effect.name for term in one.terms),
                 len(one.fit.free),
-                one.excess,
+                one.error_over_noise,
                 criterion(one) - len(one.fit.free) * (math.log(independent) - 2.0),
                 criterion(one),
             )
@@ -228,7 +228,7 @@ def _assembled(
         ),
         force_equation={},
         held_out=tuple(record.name for record in held_out),
-        held_out_error=chosen.excess,
+        held_out_error=chosen.error_over_noise,
         held_out_nrmse=nrmse,
         noise_floor=floor,
         independent=independent,
@@ -329,13 +329,17 @@ def _warnings(
             f"No force at {' or '.join(ruled_out)} alone explains what all sensors show; at {first.joint} one does, "
             f"but for {first.error_over_noise:.2g} noise floors."
         )
-    rivals = [one for one in ordered if one is not chosen and one.excess <= chosen.excess and one.terms]
+    rivals = [
+        one
+        for one in ordered
+        if one is not chosen and one.error_over_noise <= chosen.error_over_noise and one.terms
+    ]
     if rivals:
         listed = "; ".join(", ".join(term.effect.name for term in one.terms) for one in rivals)
         found.append(f"With {listed} the held-out error is no larger, but not smaller by more than chance.")
-    if chosen.excess > _FLOOR:
+    if chosen.error_over_noise > _FLOOR:
         found.append(
-            f"The equations leave {chosen.excess:.1f} times the noise floor in free run on the held-out records: "
+            f"The equations leave {chosen.error_over_noise:.1f} times the noise floor in free run on the held-out records: "
             "something is still missing, or disturbances are larger than the floor says."
         )
     unknown = [name for name, c in coefficients.items() if not math.isfinite(c.std)]

@@ -41,10 +41,10 @@ def parameter_products(
 
     def products(own: sp.Expr) -> dict[sp.Expr, sp.Expr]:
         if own not in found:
-            found[own] = told_apart(own)
+            found[own] = split_distinguishable(own)
         return found[own]
 
-    def told_apart(own: sp.Expr) -> dict[sp.Expr, sp.Expr]:
+    def split_distinguishable(own: sp.Expr) -> dict[sp.Expr, sp.Expr]:
         if not own.free_symbols & unknown:
             return {sp.S.One: own}
         if own.is_Add:

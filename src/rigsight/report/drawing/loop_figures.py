@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight import plot
-from rigsight.diagnose.result import Diagnosis, Trace
+from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.report.declared import rig_of
 from rigsight.report.drawing.figures import PageFigure, page_figure
 from rigsight.report.quantities import gap_percent

@@ -9,7 +9,8 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import Diagnosis, Stage, Trace
+from rigsight.diagnose.location.trace import Stage, Trace
+from rigsight.diagnose.result import Diagnosis
 from rigsight.frequency import FrequencyResponse
 from rigsight.plot.diagnosis import printed
 from rigsight.plot.drawing import FLOOR, MEASURED, STAGE_STYLES, shown_in

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rigsight.diagnose.result import STAGES, Diagnosis, Stage
+from rigsight.diagnose.location.trace import STAGES, Stage
+from rigsight.diagnose.result import Diagnosis
 from rigsight.frequency import FrequencyResponse
 from rigsight.plot.frequency_responses import TWO_SIDED, decibel, thinned
 from rigsight.report.drawing.charts import Chart, ChartPanel, Curve, chart_data, curve_names

@@ -9,7 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose.windows import cut, window_length
+from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.errors import SimulationError, check_option
 from rigsight.identify import (
     FitResult,

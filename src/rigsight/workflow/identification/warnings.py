@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.diagnose.windows import cut
+from rigsight.diagnose.fitting.windows import cut
 from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.identification import JointIdentification, RecordIdentification

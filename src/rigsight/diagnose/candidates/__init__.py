@@ -1,1 +1,0 @@
-"""Candidates: each effect at each place, alone and in pairs, fitted to the records and scored."""

@@ -1,1 +1,0 @@
-"""Data: can the records be trusted before any effect is blamed?"""

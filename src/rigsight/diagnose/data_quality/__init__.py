@@ -1,0 +1,1 @@
+"""Can the records be trusted, before any effect is blamed?"""

@@ -1,0 +1,210 @@
+"""Does the frequency response change with the amplitude? No leaves linear causes, yes asks for a nonlinear one."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from rigsight.diagnose.data_quality.finding import AmplitudeDependence
+from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.errors import InputError
+from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
+from rigsight.records.plausibility import is_constant
+from rigsight.records.record import Record
+from rigsight.records.reference import instrument_of
+from rigsight.rigs import Rig
+
+_DIFFERENT_AMPLITUDE = 1.2
+_STANDS_OUT = 5.0
+"""Standard errors by which a response must exceed zero to be compared."""
+_LINE_CHANCE = 1e-3
+_LINES_CHANGED = 0.15
+"""Share of independent lines that must differ: variances of sweeps may be too small on some."""
+_MATTERS = 0.02
+"""Relative difference that counts as a change."""
+_FEWEST_LINES = 8
+
+
+def amplitude_dependences(
+    rig: Rig, records: Sequence[Record], faulty: Collection[tuple[str, str]] = ()
+) -> tuple[AmplitudeDependence, ...]:
+    """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path.
+
+    Of a rig with one motion the path from its input to its motion is asked, of any other those from each input to each sensor.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        All records of a campaign; steps do not take part.
+    faulty
+        Record and sensor of each reading at fault: it distorts as an effect would.
+    """
+    if not rig.is_driven:
+        return (
+            AmplitudeDependence("cannot tell", "An element has no frequency response of a driven motion."),
+        )
+    if not rig.inputs or not records:
+        return (AmplitudeDependence("cannot tell", "Without an input there is no frequency response."),)
+    if rig.has_one_motion:
+        responses = [leading_output(rig, records)]
+    else:
+        responses = [signal.name for signal in rig.outputs if any(signal.name in r for r in records)]
+    return tuple(
+        _of_path(rig, [r for r in records if (r.name, response) not in faulty], source.name, response)
+        for source in rig.inputs
+        for response in responses
+    )
+
+
+def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) -> AmplitudeDependence:
+    path = f"{source} -> {response}"
+    records = [record for record in records if response in record and not is_constant(record[source])]
+    if not records:
+        what = "Nothing drives the rig" if len(rig.inputs) == 1 else f"'{source}' does not move"
+        return AmplitudeDependence(
+            "cannot tell",
+            f"{what} in the sound records, so that they have no frequency response {path}.",
+            path=path,
+        )
+    alone = len(rig.inputs) == 1
+    pair = _extremes(records, source, alone)
+    if pair is None:
+        return AmplitudeDependence(
+            "cannot tell",
+            f"The sound records have one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the frequency "
+            f"response {path} changes with it. Record another one.",
+            path=path,
+        )
+    names = (pair[0].name, pair[1].name)
+    try:
+        low, high, by = _responses(pair, source, response, rig)
+    except InputError as error:
+        return AmplitudeDependence(
+            "cannot tell", f"The frequency responses {path} cannot be compared: {error}", names, path
+        )
+    omega, first, second, variance = _common(low, high)
+    if omega.size < _FEWEST_LINES:
+        return AmplitudeDependence(
+            "cannot tell",
+            f"{names[0]} and {names[1]} share too few frequencies at which the response {path} stands out of the noise.",
+            names,
+            path,
+        )
+    size = np.maximum(np.abs(first), np.abs(second))
+    relative = np.abs(second - first) / size
+    freedom = 2.0 * min(low.noise_freedom, high.noise_freedom)
+    chance = f_distribution.sf(np.abs(second - first) ** 2 / variance, 2.0, freedom)
+    changed = (chance < _LINE_CHANCE) & (relative > _MATTERS)
+    unit = next(signal.unit for signal in rig.inputs if signal.name == source)
+    lowest, highest = (_amplitude(record, source, alone) for record in pair)
+    span = f"{lowest:.3g} and {highest:.3g} {'' if unit == 'input' else unit}".rstrip()
+    if np.mean(changed) >= _LINES_CHANGED:
+        worst = int(np.argmax(np.where(changed, relative, 0.0)))
+        return AmplitudeDependence(
+            "yes",
+            f"The frequency response {path} changes with the amplitude{by}: between {span} by up to "
+            f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect takes part.",
+            names,
+            path,
+        )
+    seen = float(np.median(3.0 * np.sqrt(variance) / size))
+    if np.mean(chance < _LINE_CHANCE) < _LINES_CHANGED and seen > 0.1:
+        return AmplitudeDependence(
+            "cannot tell",
+            f"Between {span} the frequency responses {path}{by} agree within their noise, but that hides changes of {seen:.0%}.",
+            names,
+            path,
+        )
+    return AmplitudeDependence(
+        "no",
+        f"The frequency response {path} does not change with the amplitude{by} between {span} "
+        f"(by {float(np.median(relative)):.1%} in the median): a linear cause, or an effect too small to be seen there.",
+        names,
+        path,
+    )
+
+
+def _responses(
+    pair: Sequence[Record], source: str, response: str, rig: Rig
+) -> tuple[FrequencyResponse, FrequencyResponse, str]:
+    """Return both responses, read in one way, and what to say of it: by the reference of a loop where both records have one."""
+    own = [signal.name for signal in (*rig.inputs, *rig.outputs)]
+    instruments = [instrument_of(record, own) for record in pair]
+    if len(rig.inputs) == 1 and all(instruments):
+        with suppress(InputError):
+            low, high = (
+                local_rational_response(r, source, response, hold=r.hold, instrument=name)
+                for r, name in zip(pair, instruments, strict=True)
+            )
+            return low, high, f" (with the {instruments[0]} as instrument)"
+    low, high = (_response(r, source, response, rig) for r in pair)
+    return low, high, ""
+
+
+def _response(record: Record, source: str, response: str, rig: Rig) -> FrequencyResponse:
+    """Return the response to one input, beside the others that move in the same record."""
+    prescribing = [str(c.prescribed_by) for c in rig.mechanism.prescribed]
+    moving = [signal.name for signal in rig.inputs if not is_constant(record[signal.name])]
+    if len(moving) == 1:
+        # A measured motion is smooth between its samples.
+        hold = "band_limited" if source in prescribing else record.hold
+        return local_rational_response(record, source, response, hold=hold)
+    told = responses_of_inputs([record], moving, [response], smooth=prescribing)
+    if (source, response) not in told.found:
+        raise InputError(f"{record.name}: {told.problems[source, response]}")
+    return told.found[source, response]
+
+
+def _extremes(records: Sequence[Record], source: str, alone: bool) -> tuple[Record, Record] | None:
+    """Return the records of lowest and highest amplitude, of the kind whose amplitudes differ most."""
+    best: tuple[float, Record, Record] | None = None
+    for kind in dict.fromkeys(record.kind for record in records if record.kind != "step"):
+        own = sorted((r for r in records if r.kind == kind), key=lambda r: _amplitude(r, source, alone))
+        smallest = _amplitude(own[0], source, alone)
+        ratio = _amplitude(own[-1], source, alone) / smallest if smallest > 0.0 else 1.0
+        if ratio >= _DIFFERENT_AMPLITUDE and (best is None or ratio > best[0]):
+            best = (ratio, own[0], own[-1])
+    return None if best is None else (best[1], best[2])
+
+
+def _amplitude(record: Record, source: str, alone: bool) -> float:
+    """Return the amplitude as given for the only input, else that of a sine with the same RMS."""
+    return (alone and record.amplitude) or float(np.sqrt(2.0) * np.std(record[source]))
+
+
+def _common(
+    low: FrequencyResponse, high: FrequencyResponse
+) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128], NDArray[np.float64]]:
+    """Return frequencies far enough apart to be independent, both responses there, and the variance of their difference."""
+    omega = low.omega[(low.omega >= high.omega[0]) & (low.omega <= high.omega[-1])]
+    parts = []
+    for response in (low, high):
+        assert response.variance is not None
+        values = np.interp(omega, response.omega, response.values.real) + 1j * np.interp(
+            omega, response.omega, response.values.imag
+        )
+        parts.append((values, np.interp(omega, response.omega, response.variance)))
+    (first, first_variance), (second, second_variance) = parts
+    clear = (np.abs(first) > _STANDS_OUT * np.sqrt(first_variance)) & (
+        np.abs(second) > _STANDS_OUT * np.sqrt(second_variance)
+    )
+    # A local model spans as many lines as its degrees of freedom and unknowns; neighbors share data.
+    width = 1 if low.noise_lines is None else low.noise_lines.shape[1]
+    kept = np.flatnonzero(clear)[::width]
+    kept = _apart(kept, omega, max(low.shared_width, high.shared_width))
+    return omega[kept], first[kept], second[kept], (first_variance + second_variance)[kept]
+
+
+def _apart(indices: NDArray[np.intp], omega: NDArray[np.float64], width: float) -> NDArray[np.intp]:
+    """Return those indices, from the first on, whose frequencies lie at least a width apart."""
+    kept: list[int] = []
+    for index in indices:
+        if not kept or omega[index] - omega[kept[-1]] >= width:
+            kept.append(int(index))
+    return np.array(kept, dtype=np.intp)

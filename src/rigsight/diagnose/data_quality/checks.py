@@ -1,0 +1,91 @@
+"""Can the records be trusted, or would a fault of the data explain the gap before any effect does?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
+from rigsight.diagnose.data_quality.finding import DataQuality, Finding
+from rigsight.diagnose.data_quality.input_timing import input_timing
+from rigsight.diagnose.data_quality.offsets_by_record import levels_apart, means_of
+from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.identify import OFFSETS_MEND
+from rigsight.records.record import Record
+
+
+def data_quality(context: FitContext, records: Sequence[Record], reidentified: Scored) -> DataQuality:
+    """Look at the records before an effect is tried.
+
+    Parameters
+    ----------
+    bench
+        Records as they are fitted, scales and noise.
+    records
+        All records of the campaign, whole.
+    linear
+        The re-identified equations.
+
+    Notes
+    -----
+    A wrong hold that a strong effect hides shows only with that effect in the model, see `with_best_model`.
+    """
+    timing = input_timing(context, (), reidentified.fit)
+    faults = [finding for record in records for finding in sensor_faults(context.rig, record)]
+    return DataQuality(
+        findings=(
+            *levels_apart(context, records),
+            *(timing.findings() if timing is not None else ()),
+            *faults,
+        ),
+        amplitudes=amplitude_dependences(
+            context.rig, records, {(f.record or "", f.signal or "") for f in faults}
+        ),
+    )
+
+
+def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
+    """Ask whether what the best model leaves has another mean in each record, as offsets that differ make it.
+
+    Parameters
+    ----------
+    quality
+        What was found before.
+    bench
+        Records as they were fitted and scored.
+    model
+        The best model.
+    """
+    units = {signal.name: signal.unit for signal in context.rig.outputs}
+    known = {finding.signal for finding in quality.findings if finding.kind == "offset"}
+    found = [
+        Finding("offset", told.sentence(units[told.output]), OFFSETS_MEND, serious=False, signal=told.output)
+        for told in means_of(context, model)
+        if told.output not in known
+    ]
+    return replace(quality, findings=(*found, *quality.findings)) if found else quality
+
+
+def with_best_model(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
+    """Ask about the hold of the input once more, with the effects in the model that hid its part of the gap.
+
+    Parameters
+    ----------
+    quality
+        What was found before.
+    bench
+        Records as they are fitted, scales and noise.
+    model
+        The best model; nothing is asked where it has no effect.
+    """
+    if not model.effects or any(finding.kind in ("hold", "time_shift") for finding in quality.findings):
+        return quality
+    timing = input_timing(context, model.effects, model.fit, with_shift=False)
+    if timing is None or not timing.findings():
+        return quality
+    # A delay may explain as much; it is worth its fit only now.
+    timing = input_timing(context, model.effects, model.fit) or timing
+    named = " and ".join(model.names)
+    found = [replace(f, sentence=f"With {named} in the model: {f.sentence}") for f in timing.findings()]
+    return replace(quality, findings=(*found, *quality.findings))

@@ -1,0 +1,212 @@
+"""Would another hold of the input, or a constant shift of the time base, explain what a model leaves?
+
+The model is fitted again to the liveliest stretches of the records under each hypothesis. A shift is a delay whose zero is moved:
+the outputs are paired with inputs some samples earlier, so that a fitted delay shorter than that is a lead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import get_args
+
+import numpy as np
+
+from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.effects import Effect, effect_named
+from rigsight.identify import FitResult
+from rigsight.records.record import Hold, Record
+
+_EVALUATIONS = 10
+_TOLERANCE = 1e-3
+_MOST_LEAD = 10
+"""Samples by which outputs may come too early and still be told, where a search for a delay reaches that far."""
+_GAP = 1.1
+"""RMS in units of the noise floor above which there is something to explain."""
+_GOOD_PART = 0.5
+"""Share of the gap, as power, that a hold must explain to be told; an assumption."""
+_NEARLY_ALL = 0.8
+"""The same for a shift: where hysteresis delays the answer, a shift was seen to explain half."""
+_ALIKE = 1.1
+"""Ratio of what two hypotheses leave at which the records do not tell them apart; a hold is then preferred to a shift."""
+_LEAST_SHIFT = 0.2
+"""Shift in sample times below which it is taken for none."""
+_DELAYS = ("input_delay", "sensor_delay")
+
+
+@dataclass(frozen=True)
+class InputTiming:
+    """What a model leaves on the liveliest stretches under each hypothesis.
+
+    Attributes
+    ----------
+    given
+        Hold as declared.
+    as_given
+        RMS of the residuals in units of the noise floor, with that hold.
+    with_hold
+        The same with every other hold.
+    with_shift
+        The same with the declared hold and a free shift; None where it was not tried.
+    shift
+        Fitted shift [s], positive where the outputs come late; None as above.
+    dt
+        Longest sample time of the records [s].
+    """
+
+    given: Hold
+    as_given: float
+    with_hold: Mapping[Hold, float]
+    with_shift: float | None
+    shift: float | None
+    dt: float
+
+    def explained(self, error_over_noise: float) -> float:
+        """Return the share of the gap above the floor, as power, that goes where only `excess` is left."""
+        gap = self.as_given**2 - 1.0
+        return 0.0 if gap <= 0.0 else float(np.clip((self.as_given**2 - error_over_noise**2) / gap, 0.0, 1.0))
+
+    def findings(self) -> list[Finding]:
+        """Return the hypotheses that explain a good part of what the model leaves."""
+        if not self.as_given > _GAP:
+            return []
+        least = min(self.with_hold.values())
+        alike = [
+            hold for hold, error_over_noise in self.with_hold.items() if error_over_noise <= _ALIKE * least
+        ]
+        shifted = math.inf if self.with_shift is None else self.with_shift
+        by_hold, by_shift = self.explained(least), self.explained(shifted)
+        if by_hold >= _GOOD_PART and least <= _ALIKE * shifted:
+            return [self._hold_finding(alike, least, shifted)]
+        if by_shift >= _NEARLY_ALL and self.shift is not None and abs(self.shift) > _LEAST_SHIFT * self.dt:
+            return [self._shift_finding(self.shift, by_shift)]
+        return []
+
+    def _hold_finding(self, holds: Sequence[Hold], least: float, shifted: float) -> Finding:
+        told = " or ".join(f'"{hold}"' for hold in holds)
+        rival = ""
+        if self.shift is not None and shifted <= _ALIKE * least:
+            rival = f" So would a shift of the time base by {1e3 * self.shift:.3g} ms"
+            rival += ", or a delay in the rig." if self.shift > 0.0 else "."
+        return Finding(
+            "hold",
+            f'Between its samples the input runs as hold = {told} rather than "{self.given}": that alone explains '
+            f"{self.explained(least):.0%} of the gap ({self.as_given:.3g} -> {least:.3g} times the noise floor).{rival}",
+            f"Set hold = {told} for the records in campaign.toml, if that is how the drive works.",
+            serious=not (rival and self.shift is not None and self.shift > 0.0),
+            explained=self.explained(least),
+        )
+
+    def _shift_finding(self, shift: float, by_shift: float) -> Finding:
+        if shift < 0.0:
+            return Finding(
+                "time_shift",
+                f"The outputs come {-1e3 * shift:.3g} ms before the input that causes them: a shift of the time base explains "
+                f"{by_shift:.0%} of the gap ({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor).",
+                "Align the channels: no rig answers before it is asked.",
+                explained=by_shift,
+            )
+        return Finding(
+            "time_shift",
+            f"The outputs come {1e3 * shift:.3g} ms late: a shift of the time base would explain {by_shift:.0%} of the gap "
+            f"({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor). So would a delay or a short lag in the rig.",
+            "Make sure that input and outputs share one clock before an effect is blamed.",
+            serious=False,
+            explained=by_shift,
+        )
+
+
+def input_timing(
+    context: FitContext, effects: tuple[Effect, ...], base: FitResult, with_shift: bool = True
+) -> InputTiming | None:
+    """Fit a model to the liveliest stretches with every hold, and with a shift of the time base.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects
+        Effects of the model beside those that the simulation has.
+    base
+        Fit of the model to the records with the hold as declared.
+    with_shift
+        False to try the holds alone.
+
+    Returns
+    -------
+    None where the motion is prescribed, no input moves, the records' holds differ, or the model cannot be fitted to the
+    stretches.
+    """
+    given = {record.hold for record in context.look}
+    if not context.rig.is_driven or not context.driven or len(given) != 1:
+        return None
+    (declared,) = given
+    as_given = _excess(context, base, context.look)
+    if not np.isfinite(as_given):
+        return None
+    others: tuple[Hold, ...] = tuple(hold for hold in get_args(Hold) if hold != declared)
+    shift, shifted = _shifted(context, effects, base) if with_shift else (None, None)
+    return InputTiming(
+        given=declared,
+        as_given=as_given,
+        with_hold={
+            hold: _excess(context, base, [replace(record, hold=hold) for record in context.look])
+            for hold in others
+        },
+        with_shift=shifted,
+        shift=shift,
+        dt=max(record.dt for record in context.look),
+    )
+
+
+def _excess(context: FitContext, base: FitResult, records: Sequence[Record]) -> float:
+    return _refitted(context, base, base.values, base.free, records).weighted_rms
+
+
+def _refitted(
+    context: FitContext,
+    base: FitResult,
+    start: Mapping[str, float],
+    free: Sequence[str],
+    records: Sequence[Record],
+) -> FitResult:
+    fit = context.problem(base.structure, records)
+    return fit.fit(start, free, max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
+
+
+def _shifted(
+    context: FitContext, effects: tuple[Effect, ...], base: FitResult
+) -> tuple[float | None, float | None]:
+    """Return the fitted shift and what is left with it."""
+    if not context.rig.has_one_motion:
+        return None, None  # with control loops and several drives a shift is no delay of one input
+    names = {effect.name for effect in (*context.modelled, *effects)}
+    dt = context.look[0].dt
+    if names & set(_DELAYS) or any(not math.isclose(record.dt, dt, rel_tol=1e-6) for record in context.look):
+        return None, None
+    delay = effect_named("input_delay")
+    # The start, a shift of zero, lies in the middle of what the search for a delay explores.
+    reach = 0.5 * delay.parameters[0].search[1] * context.scales["time"]
+    n_lead = int(np.clip(reach / dt, 1, _MOST_LEAD))
+    structure = context.composed((*effects, delay), dict(base.structure.fixed))
+    name = structure.parameter_name(delay, delay.parameters[0].name)
+    outputs = [signal.name for signal in context.rig.outputs]
+    paired = [_outputs_later(record, outputs, n_lead) for record in context.look]
+    lead = n_lead * dt
+    result = _refitted(
+        context, replace(base, structure=structure), {**base.values, name: lead}, (*base.free, name), paired
+    )
+    if not np.isfinite(result.cost):
+        return None, None
+    return result.values[name] - lead, result.weighted_rms
+
+
+def _outputs_later(record: Record, outputs: Sequence[str], count: int) -> Record:
+    """Return the record with its outputs moved to later times by `count` samples."""
+    signals = {
+        name: samples[:-count] if name in outputs else samples[count:]
+        for name, samples in record.signals.items()
+    }
+    return replace(record, signals=signals)

@@ -1,0 +1,181 @@
+"""Do the records ask for an offset of each sensor in each record? Asked before any second effect is believed.
+
+A sensor that was zeroed anew shifts a whole record. A memory that begins each record where it likes does nearly the same, and a
+second effect with a memory takes the credit. So models without a memory are asked first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.diagnose.fitting.drift import can_drift
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.task import Task
+from rigsight.diagnose.fitting.windows import WINDOW
+from rigsight.effects import Effect, Place
+from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+_LARGER_PART = 0.5
+"""Share of what a model leaves above the floor, as power, that must go with the offsets: else something else is the cause."""
+_EVALUATIONS = 40
+_TOLERANCE = 1e-5
+_KEPT = 'Write offsets = "per_record" at the top of campaign.toml to have it so in every command.'
+
+
+def asked_offsets(
+    context: FitContext, reidentified: Scored, singles: Sequence[Scored], allowed: float
+) -> Finding | None:
+    """Return what speaks for an offset in each record, None where nothing does.
+
+    With offsets free a model must explain the records: an effect that pulls to one side, the more the larger the motion, shifts
+    records as well, and leaves more than shifts.
+
+    Parameters
+    ----------
+    bench
+        Records as they were fitted, without free offsets.
+    linear, singles
+        The re-identified equations, and every effect by itself.
+    allowed
+        What a named cause may leave, in units of the noise floor.
+    """
+    models = [reidentified, *(m for m in singles if m.fit.residuals and np.isfinite(m.error_over_noise))]
+    forgetful = [m for m in models if not _remembers(m.effects)]
+    # With the means gone they come nearest.
+    nearest = [min(some, key=lambda m: _cost_without_means(context, m)) for some in (forgetful, models)]
+    for model in nearest[:1] if nearest[0] is nearest[1] else nearest:
+        told = means_of(context, model)
+        if not told:
+            continue
+        freed = _with_free_offsets(context, model)
+        gained = model.error_over_noise**2 - freed.error_over_noise**2
+        if freed.error_over_noise <= allowed and gained > _LARGER_PART * (model.error_over_noise**2 - 1.0):
+            worst = max(told, key=lambda one: one.share)
+            unit = next(signal.unit for signal in context.rig.outputs if signal.name == worst.output)
+            return Finding(
+                "offset",
+                f"{worst.sentence(unit)} With an offset of each sensor in each record the nearest model leaves "
+                f"{freed.error_over_noise:.3g} times the noise floor instead of {model.error_over_noise:.3g}: "
+                "such offsets are estimated here, and no part of the model.",
+                _KEPT,
+                signal=worst.output,
+            )
+    return None
+
+
+def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding]:
+    """Return the sensors whose level differs between records by more than they move in any: no fit begins well from there.
+
+    Springs bring a rig back to one place where its inputs and constants are the same; nothing is said where they are not, or of a
+    rig that can rest anywhere.
+
+    Parameters
+    ----------
+    bench
+        The rig and what is known of it.
+    records
+        All records of the campaign, whole.
+    """
+    rig = context.rig
+    if not _comes_back(context, records) or any(
+        _apart(records, signal.name)[0] > 1.0 for signal in rig.inputs
+    ):
+        return []
+    found = []
+    for signal in rig.outputs:
+        holding = [r for r in records if signal.name in r and signal.name not in r.free_offsets]
+        moves, lowest, highest = _apart(holding, signal.name)
+        if moves > 1.0:
+            found.append(
+                Finding(
+                    "offset",
+                    f"{signal.name} lies {moves:.3g} times as far apart in '{lowest}' and '{highest}' as it moves in any record.",
+                    OFFSETS_MEND,
+                    signal=signal.name,
+                )
+            )
+    return found
+
+
+def _comes_back(context: FitContext, records: Sequence[Record]) -> bool:
+    """Return True if springs bring the rig to one place, the same in all records."""
+    rig = context.rig
+    if rig.has_one_motion:
+        return context.has_stiffness
+    if not rig.mechanism.free or any(record.constants != records[0].constants for record in records):
+        return False
+    constants = {p.name: context.start[p.name] for p in rig.constants if p.name in context.start}
+    return not can_drift(rig, {**constants, **context.given})
+
+
+def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
+    """Return how far apart the levels of a signal lie in units of its largest motion, and the records between which they do."""
+    levels = {record.name: float(np.mean(record[name])) for record in records}
+    if len(levels) < 2:
+        return 0.0, "", ""
+    lowest, highest = (choose(levels, key=levels.__getitem__) for choose in (min, max))
+    apart, motion = levels[highest] - levels[lowest], max(float(np.ptp(record[name])) for record in records)
+    return apart / motion if motion > 0.0 else float("inf") if apart > 0.0 else 0.0, lowest, highest
+
+
+def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
+    """Return the outputs of which a model leaves other means in each record.
+
+    Parameters
+    ----------
+    bench
+        Records as they were fitted and scored.
+    model
+        The model.
+    """
+    records, residuals = list(context.estimation), list(model.fit.residuals)
+    if context.scoring != context.estimation:
+        records, residuals = [*records, *context.scoring], [*residuals, *model.residuals]
+    if not (model.residuals and model.fit.residuals):
+        return []
+    names = [record.name.split(WINDOW)[0] for record in records]
+    return differing_means(names, records, residuals, [signal.name for signal in context.rig.outputs])
+
+
+def with_offsets_free(task: Task) -> Task:
+    """Return a task in which each sensor has an offset of its own in each record."""
+    return replace(task, records=_freed(task.rig, task.records))
+
+
+def _remembers(effects: Iterable[Effect]) -> bool:
+    """Return True for effects of the motion with states of their own."""
+    return any(effect.states and effect.place is Place.DYNAMICS for effect in effects)
+
+
+def _cost_without_means(context: FitContext, model: Scored) -> float:
+    """Return the sum of squared weighted residuals about their mean in each record."""
+    noise = np.array([context.noise.get(signal.name, np.inf) for signal in context.rig.outputs])
+    parts = [residual / noise for residual in model.fit.residuals]
+    return float(sum(np.nansum((part - np.mean(part, axis=0)) ** 2) for part in parts))
+
+
+def _freed(rig: Rig, records: Iterable[Record]) -> tuple[Record, ...]:
+    outputs = [signal.name for signal in rig.outputs]
+    return tuple(record.with_free_offsets(outputs) for record in records)
+
+
+def _with_free_offsets(context: FitContext, model: Scored) -> Scored:
+    """Fit and score a model with free offsets, from where it ended without them."""
+    own = replace(
+        context,
+        estimation=_freed(context.rig, context.estimation),
+        scoring=_freed(context.rig, context.scoring),
+    )
+    structure, values = model.fit.structure, model.fit.values
+    swallowed = swallowed_by_offsets(
+        structure, own.estimation, context.scales, context.noise, values, model.fit.free
+    )
+    free = [name for name in model.fit.free if name not in swallowed]
+    fit = own.problem(structure, own.estimation).fit(values, free, None, _EVALUATIONS, _TOLERANCE)
+    return own.score(model.effects, fit) if fit.residuals else replace(model, error_over_noise=float("inf"))

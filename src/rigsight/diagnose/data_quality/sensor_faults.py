@@ -1,0 +1,170 @@
+"""Is a recorded channel cut off at its extremes, stuck, coarsely quantized, or does it jump?"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.records.plausibility import clipping
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import compose
+
+_SHORTEST_STUCK = 20
+_LONGEST_SHARE_STILL = 0.5
+"""A channel that stands still for longer than this in other places too is a rig at rest, not a stuck sensor."""
+_ABRUPT = 0.5
+"""Step into or out of standing still, in root mean square steps, that no mass makes."""
+_ONE_STEP = 1.5
+"""Least steps of a channel up to which a change is one of them."""
+_FEWEST_LEVELS = 200
+_JUMP_SIZE = 0.05
+"""Least size of a jump, in standard deviations of the channel."""
+_JUMP_CONTRAST = 8.0
+_NEIGHBORHOOD = 201
+_FIRST_TOLD = 3
+
+
+def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
+    """Return what is wrong with the channels of one record."""
+    found = []
+    signals = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
+    outputs = [signal.name for signal in rig.outputs if signal.name in record]
+    smooth = _of_displacement(rig) if rig.is_driven else frozenset()
+    for name, unit in signals.items():
+        found += _clipped(record, name, unit)
+    for name in outputs:
+        samples = record[name]
+        if np.ptp(samples) == 0.0:
+            continue
+        coarse = _quantized(record, name, signals[name])
+        found += coarse
+        # A coarse channel stands still and jumps by itself; a force may do both, and a pressure or a speed when an input steps.
+        if not coarse and name in smooth:
+            # A stuck channel jumps where it comes loose.
+            found += _stuck(record, name) or _jumping(record, name, signals[name])
+    return found
+
+
+def _of_displacement(rig: Rig) -> frozenset[str]:
+    """Return the sensors whose rate of change no input can set at once: those that read coordinates, or what follows them."""
+    structure = compose(rig)
+    tree = structure.tree
+    following = {*tree.motion.coordinates, *structure.parameter_symbols}
+    moving = {*following, *tree.motion.velocities, *(state.symbol for state in tree.states)}
+    following |= {state.symbol for state in tree.states if tree.flattened(state.rate).free_symbols <= moving}
+    return frozenset(
+        sensor.name
+        for sensor, reading in zip(rig.mechanism.sensors, structure.outputs, strict=True)
+        if reading.free_symbols <= following
+    )
+
+
+def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
+    return [
+        Finding(
+            "clipping",
+            f"Record {record.name}: {name} is cut off at {level:.4g} {unit} ({count} samples).",
+            "Record again with a wider range, or leave the record out.",
+            record=record.name,
+            signal=name,
+        )
+        for level, count in clipping(record[name])
+    ]
+
+
+def _quantized(record: Record, name: str, unit: str) -> list[Finding]:
+    """Find a channel whose values lie on so few levels that rounding is a good part of its noise."""
+    levels = np.unique(record[name])
+    span = float(levels[-1] - levels[0])
+    if levels.size > _FEWEST_LEVELS:
+        return []
+    gaps = np.diff(levels)
+    step = float(np.min(gaps))
+    # Levels of a converter are multiples of one step; few samples, or a rig that mostly rests, are not.
+    if step < span / _FEWEST_LEVELS or np.max(np.abs(gaps / step - np.round(gaps / step))) > 0.05:
+        return []
+    return [
+        Finding(
+            "quantization",
+            f"Record {record.name}: {name} moves in steps of {step:.3g} {unit} ({levels.size} levels); rounding alone is a noise "
+            f"of {step / np.sqrt(12.0):.2g} {unit}.",
+            "Record with a finer resolution, or expect nothing below that.",
+            serious=False,
+            record=record.name,
+            signal=name,
+        )
+    ]
+
+
+def _stuck(record: Record, name: str) -> list[Finding]:
+    """Find stretches in which a channel that moves elsewhere stands exactly still, entered or left abruptly."""
+    steps = np.diff(record[name])
+    still = steps == 0.0
+    edges = np.diff(still.astype(np.int8), prepend=0, append=0)
+    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    long = stops - starts >= _SHORTEST_STUCK
+    if not long.any() or np.mean(still) > _LONGEST_SHARE_STILL:
+        return []
+    typical = float(np.sqrt(np.mean(steps[~still] ** 2)))
+    before = np.abs(steps[np.maximum(starts - 1, 0)]) * (starts > 0)
+    after = np.abs(steps[np.minimum(stops, steps.size - 1)]) * (stops < steps.size)
+    # An encoder leaves its rest by a whole step however gently the mass does.
+    broken_off = max(_ABRUPT * typical, _ONE_STEP * float(np.min(np.abs(steps[~still]))))
+    stuck = np.flatnonzero(long & (np.maximum(before, after) > broken_off))
+    if stuck.size == 0:
+        return []
+    told = [
+        f"{record.t[starts[i]]:.4g} to {record.t[min(stops[i], record.n_samples - 1)]:.4g} s"
+        for i in stuck[:_FIRST_TOLD]
+    ]
+    return [
+        Finding(
+            "stuck",
+            f"Record {record.name}: {name} stands exactly still from {', '.join(told)}{_more(stuck.size)} and breaks off there.",
+            "Look at the sensor and its transmission; cut these stretches out.",
+            record=record.name,
+            signal=name,
+        )
+    ]
+
+
+def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
+    """Find samples at which the displacement of a mass jumps, alone (a spike) or for good (lost counts)."""
+    samples = record[name]
+    third = np.diff(samples, 3)
+    if third.size < _NEIGHBORHOOD:
+        return []
+    # The largest of the four third differences that a spike of size h leaves is 3 h, of a lasting jump 2 h.
+    size = np.abs(third) / 2.0
+    power = uniform_filter1d(size**2, _NEIGHBORHOOD, mode="nearest") * _NEIGHBORHOOD
+    near = uniform_filter1d(size**2, 9, mode="nearest") * 9
+    around = np.sqrt(np.maximum(power - near, 0.0) / (_NEIGHBORHOOD - 9))
+    large = np.flatnonzero((size > _JUMP_SIZE * np.std(samples)) & (size > _JUMP_CONTRAST * around))
+    if large.size == 0:
+        return []
+    places = [
+        group[np.argmax(size[group])] for group in np.split(large, np.flatnonzero(np.diff(large) > 4) + 1)
+    ]
+    # A third difference reaches over four samples; the jump lies at the largest step among them.
+    steps = [np.abs(np.diff(samples[place : place + 4])) for place in places]
+    told = ", ".join(
+        f"{record.t[place + 1 + np.argmax(step)]:.4g} s"
+        for place, step in zip(places[:_FIRST_TOLD], steps, strict=False)
+    )
+    largest = max(float(np.max(step)) for step in steps)
+    return [
+        Finding(
+            "jump",
+            f"Record {record.name}: {name} jumps by about {largest:.3g} {unit} at {told}"
+            f"{_more(len(places))}; no mass does that.",
+            "Look for interference or lost counts; repair the samples or leave the record out.",
+            record=record.name,
+            signal=name,
+        )
+    ]
+
+
+def _more(count: int) -> str:
+    return f" and {count - _FIRST_TOLD} times more" if count > _FIRST_TOLD else ""

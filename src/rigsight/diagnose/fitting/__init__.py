@@ -1,0 +1,1 @@
+"""With what is every model fitted: which records, over which stretch, with which numbers free?"""

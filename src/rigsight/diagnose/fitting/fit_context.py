@@ -1,0 +1,314 @@
+"""What every candidate is fitted and scored with: records, scales, noise, and which parameters a fit moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.constant_force import known_constant_forces
+from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.diagnose.fitting.windows import cut, shown_by
+from rigsight.effects import Effect, Place
+from rigsight.effects import symbols as canonical
+from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
+from rigsight.records.plausibility import is_constant
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, compose, special_values
+
+_PIECE = 4.0
+"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
+
+An assumption: half to two periods did worse on play of a few widths, nothing else was tried.
+"""
+_MOST_PIECES = 40
+"""In all, for each degree of freedom: every piece has initial states of its own, and the fit's equations grow with them."""
+_DIED_AWAY = 0.99
+"""Share of the squared steps of an output after which a free motion is smaller than a tenth of what it was."""
+_FEWEST_IN_MOTION = 100
+_ROUGH_ACCURACY = 1e-3
+_ROUGH_EVALUATIONS = 8
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A fitted model with its residuals on the records that score it.
+
+    Attributes
+    ----------
+    effects
+        The effects added.
+    fit
+        The fit to the estimation records.
+    held_out
+        The same numbers on the scoring records, only initial states fitted; without residuals where they cannot be simulated.
+    error_over_noise
+        RMS of the residuals in units of the noise floor.
+    """
+
+    effects: tuple[Effect, ...]
+    fit: FitResult
+    held_out: FitResult
+    error_over_noise: float
+
+    @property
+    def residuals(self) -> tuple[NDArray[np.float64], ...]:
+        """Per scoring record, shape (n_samples, n_outputs), NaN where an output was not measured."""
+        return self.held_out.residuals
+
+    @property
+    def initial_states(self) -> tuple[NDArray[np.float64], ...]:
+        """Of the equations, per scoring record."""
+        return self.held_out.rig_states
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(effect.name for effect in self.effects)
+
+    def not_simulated(self) -> Scored:
+        """Return the same as a model that cannot be simulated on the scoring records."""
+        return replace(self, held_out=replace(self.held_out, residuals=()), error_over_noise=float("inf"))
+
+    @property
+    def n_free(self) -> int:
+        """Number of fitted parameters."""
+        return len(self.fit.free)
+
+
+@dataclass(frozen=True)
+class FitContext:
+    """What every candidate is fitted and scored with.
+
+    Attributes
+    ----------
+    rig
+        The rig.
+    estimation, scoring
+        Records to fit and records to score, already cut into windows where that is needed.
+    look
+        The liveliest stretch of each estimation record, for a first look at each start.
+    scales
+        Size of each base quantity.
+    noise
+        Noise floor of each output.
+    held
+        Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
+    given
+        Numbers of the rig that the simulation in question came with.
+    start
+        Values before any fit, of the given simulation or a regression: fits without the effect may bend them beyond use.
+    modelled
+        Effects that the simulation in question has already; every candidate is added to them.
+    memory
+        Where the outcomes of fits are kept.
+    threads
+        Who helps with the records of a fit.
+    """
+
+    rig: Rig
+    estimation: tuple[Record, ...]
+    scoring: tuple[Record, ...]
+    look: tuple[Record, ...]
+    scales: Mapping[str, float]
+    noise: Mapping[str, float]
+    held: frozenset[str]
+    start: Mapping[str, float] = field(default_factory=dict)
+    given: Mapping[str, float] = field(default_factory=dict)
+    modelled: tuple[Effect, ...] = ()
+    memory: FitMemory | None = None
+    threads: IdleThreads = field(default_factory=IdleThreads)
+
+    @cached_property
+    def records(self) -> tuple[Record, ...]:
+        """All records, each once."""
+        return self.estimation if self.scoring == self.estimation else (*self.estimation, *self.scoring)
+
+    @cached_property
+    def driven(self) -> tuple[Record, ...]:
+        """The records to fit in which an input moves; in the others the rig moves freely."""
+        names = [signal.name for signal in self.rig.inputs]
+        return tuple(r for r in self.estimation if any(not is_constant(r[name]) for name in names))
+
+    @property
+    def period(self) -> float:
+        """Natural period of the rig, or the typical one of its motion [s]."""
+        return float(2.0 * np.pi * self.scales["time"])
+
+    @cached_property
+    def look_in_pieces(self) -> tuple[tuple[Record, ...], ...]:
+        """Pieces of each of the liveliest stretches: a model that is far off stays in step with the motion in them."""
+        return tuple(self.cut_in_pieces([record], _PIECE) for record in self.look)
+
+    def cut_in_pieces(self, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
+        """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
+        duration = sum(record.n_samples * record.dt for record in records)
+        most = _MOST_PIECES / max(1, len(self.rig.mechanism.free))
+        return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
+
+    def problem(
+        self, structure: Structure, records: Sequence[Record], accuracy: float = DEFAULT_ACCURACY
+    ) -> GreyBoxFit:
+        """Return the fit of a structure to records, with the bench's scales and noise."""
+        return GreyBoxFit(structure, records, self.scales, self.noise, accuracy, self.memory, self.threads)
+
+    def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
+        """Return the equations of the simulation in question with effects added."""
+        return compose(self.rig, (*self.modelled, *effects), fixed)
+
+    def simplest(self, effects: Sequence[Effect]) -> Structure:
+        """Return the same with parameters of these effects at the values that make the equations shorter."""
+        return self.composed(effects, special_values(self.rig, effects, self.modelled))
+
+    def free_parameters(self, structure: Structure) -> list[str]:
+        """Return what a fit of this structure moves from the start."""
+        names = {p.name for p in self.rig.parameters} - self.held
+        if self.rig.has_one_motion and self.rig.is_driven:
+            rest = {symbol.name for symbol in self.rig.motion.rest.free_symbols}
+            if not self.has_stiffness and not any(_sees_position(e) for e in structure.effects):
+                names -= rest
+            elif rest:
+                # A linear spring cannot tell a constant force from a shifted rest position.
+                names -= self._bias
+        fixed = dict(structure.fixed)
+        for effect in structure.effects:
+            for parameter in effect.parameters:
+                name = structure.parameter_name(effect, parameter.name)
+                if parameter.fitted and name not in fixed:
+                    names.add(name)
+        names -= self.constant_forces_beside(structure.effects).keys()
+        return [name for name in structure.names if name in names]
+
+    def constant_forces_beside(self, effects: Iterable[Effect]) -> dict[str, float]:
+        """Return the values at which constant forces are held beside effects with a mean force of their own."""
+        held: dict[str, float] = {}
+        for effect in effects:
+            held |= self._known_constant_forces(effect) or {}
+        return held
+
+    def _known_constant_forces(self, effect: Effect) -> dict[str, float] | None:
+        has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
+        return known_constant_forces(self.rig, effect, self.given, has_spring)
+
+    def leaves_numbers_open(self, fit: FitResult) -> bool:
+        """Return True if a fit leaves a mass, a stiffness or a damping undetermined: a missing effect may have bent it."""
+        positive = {p.name for p in self.rig.parameters if p.lower >= 0.0}
+        return any(
+            name in positive and not fit.standard_errors[name] < abs(fit.values[name]) for name in fit.free
+        )
+
+    def releasable_parameters(self, structure: Structure) -> list[str]:
+        """Return what a fit may move once it has settled: a constant force that a bent spring tells from its rest position.
+
+        An even spring cannot: shifting it changes its slope, and that is free already.
+        """
+        bent = any(_sees_position(e) and not e.signature.even_harmonics for e in structure.effects)
+        even = any(_sees_position(e) and e.signature.even_harmonics for e in structure.effects)
+        if not (self.rig.has_one_motion and self.rig.is_driven and self.has_stiffness and bent and not even):
+            return []
+        return sorted(self._bias - self.held)
+
+    @property
+    def _bias(self) -> set[str]:
+        return {symbol.name for symbol in self.rig.motion.bias.free_symbols}
+
+    @property
+    def has_stiffness(self) -> bool:
+        """True where a spring holds a rig of one motion."""
+        return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
+
+    def offered(self, effects: Iterable[Effect]) -> list[Effect]:
+        """Return the effects that make sense on this rig and in these records, each at each place.
+
+        Without a spring that is none that changes it; where an input rests none at a drive that is told nothing else; beside a
+        constant force that nobody knows none with a mean force.
+        """
+        offered = [
+            effect
+            for effect in candidates_on(self.rig, effects, self.modelled)
+            if self._can_show(effect) and self._known_constant_forces(effect) is not None
+        ]
+        if not self.rig.has_one_motion:
+            return offered
+        return [
+            effect
+            for effect in offered
+            if effect not in self.modelled
+            and (effect.lateral is None or not self.rig.downstream_parameters <= self.held)
+            and (self.has_stiffness or (effect.spring is None and effect.deflection is None))
+        ]
+
+    def _can_show(self, effect: Effect) -> bool:
+        if effect.place is not Place.ACTUATOR or not self.rig.inputs:
+            return True
+        place = self.rig.acts_at(effect)
+        drive = next(drive for drive in self.rig.mechanism.drives if drive.name == place)
+        told = {str(symbol) for symbol in drive.signal.free_symbols}
+        if not told <= {signal.name for signal in self.rig.inputs}:
+            return True
+        records = (*self.estimation, *self.scoring)
+        return any(not is_constant(record[name]) for record in records for name in told)
+
+    def score(self, effects: tuple[Effect, ...], fit: FitResult, roughly: bool = False) -> Scored:
+        """Simulate the scoring records with a fitted model; only their initial states are estimated.
+
+        `roughly` is enough to place a model that is far from the best.
+        """
+        if roughly:
+            rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
+            result = rough.fit(fit.values, [], max_evaluations=_ROUGH_EVALUATIONS, tolerance=_ROUGH_ACCURACY)
+        else:
+            result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
+        error_over_noise = result.weighted_rms if result.residuals else float("inf")
+        return Scored(effects, fit, result, error_over_noise)
+
+    def on_all_records(self, model: Scored) -> FitResult:
+        """Return what a model leaves of `records`, with the initial states that suit it in each; nothing is fitted anew."""
+        if self.scoring == self.estimation:
+            return model.held_out
+        parts = (model.fit, model.held_out)
+        return replace(
+            model.fit,
+            residuals=tuple(r for part in parts for r in part.residuals),
+            initial_states=tuple(s for part in parts for s in part.initial_states),
+            substeps=tuple(n for part in parts for n in part.substeps),
+        )
+
+
+def _sees_position(effect: Effect) -> bool:
+    expressions = [e for e in (effect.torque, effect.deflection) if e is not None]
+    return any(canonical.x in expression.free_symbols for expression in expressions)
+
+
+def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
+    """Return the records, those of a free motion only until it has died away.
+
+    Where friction catches a mass its place jumps with the numbers of a model: a fit that begins with the rest that follows, which
+    may be long, stays where it begins.
+    """
+    cut_off = []
+    for record, output in zip(records, shown_by(rig, records), strict=True):
+        stop = record.n_samples
+        if all(is_constant(record[signal.name]) for signal in rig.inputs):
+            energy = np.cumsum(np.diff(record[output]) ** 2)
+            stop = max(_FEWEST_IN_MOTION, int(np.searchsorted(energy, _DIED_AWAY * energy[-1])) + 1)
+        cut_off.append(record.slice(0, min(stop, record.n_samples)))
+    return tuple(cut_off)
+
+
+def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = 8000) -> tuple[Record, ...]:
+    """Return the stretch of each record in which its output moves most, together about `n_samples` long."""
+    share = max(500, n_samples // max(1, len(records)))
+    stretches = []
+    for record, output in zip(records, shown_by(rig, records), strict=True):
+        if record.n_samples <= share:
+            stretches.append(record)
+            continue
+        energy = np.cumsum((record[output] - np.mean(record[output])) ** 2)
+        start = int(np.argmax(energy[share:] - energy[:-share]))
+        stretches.append(record.slice(start, start + share))
+    return tuple(stretches)

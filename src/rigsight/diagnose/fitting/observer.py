@@ -1,0 +1,80 @@
+"""How are models of a rig that drifts compared with records? By an observer: each softly follows the measured motion.
+
+Without a spring of its own a rig integrates every error of force twice: a free run soon shows where it has drifted to, and no
+more. An observer is pulled towards the measured motion. What a model lacks still shows within a time of the order of the
+reciprocal of its bandwidth; what it drifts in longer times does not. Memories of effects go on as they would.
+
+References
+----------
+D. G. Luenberger, IEEE Trans. Automatic Control 16 (1971) 596, for observers. L. Ljung, *System Identification* (Prentice Hall
+1999), sections 4.3 and 7.4, for predictors of disturbed systems and for fits of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from rigsight.diagnose.fitting.task import Task
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, compose, structure_of_fit
+
+
+@dataclass(frozen=True)
+class Observer:
+    """What a model follows while it is compared with records.
+
+    Attributes
+    ----------
+    sensors
+        Names of those that show nothing but the motion.
+    bandwidth
+        Angular frequency up to which the motion is followed [rad/s].
+    """
+
+    sensors: tuple[str, ...]
+    bandwidth: float
+
+    def following(self, records: Sequence[Record]) -> tuple[Record, ...]:
+        """Return records that models follow while they are fitted to them."""
+        return tuple(
+            replace(record, observed={name: self.bandwidth for name in self.sensors if name in record})
+            for record in records
+        )
+
+
+def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
+    """Return the sensors that models follow while they are fitted to records."""
+    return frozenset(sensor for record in records for sensor in record.observed)
+
+
+def followed_sensors(task: Task) -> tuple[str, ...]:
+    """Return the sensors that models of a task can follow: those that show nothing but the motion.
+
+    Parameters
+    ----------
+    task
+        Records and the simulation in question.
+    """
+    shown = {name for record in task.records for name in record.signals}
+    return tuple(name for name in sensors_of_motion(task.rig) if name in shown)
+
+
+def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Structure]:
+    """Return structures as they are simulated in fits to the records of a task: with free offsets and with an observer."""
+    any_bandwidth = Observer(followed_sensors(task) if task.drifts else (), 0.0)
+    records = any_bandwidth.following(task.records)
+    return [structure_of_fit(structure, records) for structure in structures]
+
+
+def sensors_of_motion(rig: Rig) -> tuple[str, ...]:
+    """Return the sensors of a rig that show nothing but its motion: coordinates and their rates."""
+    structure = compose(rig)
+    motion = structure.tree.motion
+    moving = {*motion.coordinates, *motion.velocities}
+    return tuple(
+        sensor.name
+        for sensor, reading in zip(rig.mechanism.sensors, structure.outputs, strict=True)
+        if reading.free_symbols & moving and reading.free_symbols <= {*moving, *structure.parameter_symbols}
+    )

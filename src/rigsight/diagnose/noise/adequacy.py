@@ -1,0 +1,306 @@
+"""Is what a model leaves noise and disturbance, or does it still go with motion, drive, reading, time or record?
+
+What is left is compared with the answers of the model's own readings to small pushes that go with one of these: a force that
+depends on a joint's velocity or position, a drive that is another function of its signal, a number that changes with time or
+from record to record. Noise and disturbance agree with such an answer in one stretch of a record as often as they contradict it
+in the next, so that the signs of what is left may be turned stretch by stretch: how often chance agrees as well is the p-value.
+What is compared is what is new at each sample (`innovations.py`), as a disturbance hangs together for as long as a rig swings,
+and pushes go with the motion that the equations have, as the measured one goes with the disturbance itself. No floor of the
+noise is needed, and noise may be colored and of changing size. Whether that size goes with the motion can be asked beside it: an
+effect that no push resembles, such as a pulsating stiffness, leaves more where there is more motion; a sensor's noise does not.
+
+References
+----------
+E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for turning signs (the wild bootstrap with Rademacher weights).
+R. De Santis, J. J. Goeman, J. Hemerik, S. Davenport and L. Finos, J. Am. Stat. Assoc. (2025), doi 10.1080/01621459.2025.2491775,
+for turned signs beside fitted numbers.
+P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the smallest of several p-values.
+T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for what the size of a remainder goes with; here by ranks.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import spearmanr
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.noise.innovations import Innovations
+from rigsight.diagnose.pushes.alternatives import alternatives, slopes
+from rigsight.diagnose.pushes.answers import Answers, Followed, orthonormal
+from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
+
+Floats = NDArray[np.float64]
+
+SIGNIFICANCE = 0.01
+"""p-value below which a model is not adequate: one adequate model of a hundred is refused."""
+AGAINST_A_FLOOR = 0.1
+"""The same for a model that leaves more than a measured floor allows: that floor speaks against it already."""
+_TURNS = 9999
+_PORTIONS = 10
+"""Turns are counted a tenth at a time, so that they need no more than some ten megabytes."""
+_SINGULAR = 1e-9
+"""Keeps a turn that parameters could follow whole from a division by zero."""
+_STRETCHES = 64
+"""Stretches of all records together whose signs are turned: so many that a number which differs in one record shows, and so few
+that what a disturbance does to a sliding or sticking mass hardly reaches from one into the next (`experiments/adequacy`)."""
+_LONG_STRETCHES = 32
+"""Stretches over which a remainder must be spread: noise alone is of about the same size in each."""
+_LEAST_SPREAD = 0.25
+"""Share of the stretches over which a remainder must be spread, as their number that would hold its power evenly. Noise is spread
+over nearly all; what stands in a few of them agrees with anything there by one turn in two, so that no p-value can tell."""
+_TOO_FAST = "motion that is too fast for the sample time"
+"""What a model is blamed for whose steps between samples cannot be as short as its motion needs: nothing can be compared."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How what a model leaves goes with one thing.
+
+    Attributes
+    ----------
+    what
+        In words, such as ``"velocity of load_bearing"``.
+    place
+        Joint, drive or sensor; empty for what has no place.
+    p_value
+        Probability of such an agreement by chance, this one thing looked at alone.
+    share
+        Share of the squared remainder that goes with it beyond chance.
+    """
+
+    what: str
+    place: str
+    p_value: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """Is what a model leaves noise and disturbance?
+
+    Attributes
+    ----------
+    p_value
+        Probability that noise and disturbance alone agree as well with anything that was looked at.
+    agreements
+        With what it goes: what chance hardly makes first, of that the largest share.
+    is_spread
+        False where it stands in a few stretches of the records, as noise does not.
+    significance
+        p-value below which it is not adequate.
+    """
+
+    p_value: float
+    agreements: tuple[Agreement, ...]
+    is_spread: bool = True
+    significance: float = SIGNIFICANCE
+
+    @property
+    def adequate(self) -> bool:
+        """True where nothing contradicts that noise and disturbance are all that is left."""
+        return self.is_spread and self.p_value >= self.significance
+
+    @property
+    def goes_with(self) -> str:
+        """With what the largest part of it goes; empty where it is adequate."""
+        if self.adequate:
+            return ""
+        if self.p_value >= self.significance:
+            return "a few stretches of the records"
+        return self.agreements[0].what
+
+    @property
+    def place(self) -> str:
+        """Joint, drive or sensor of what it goes with; empty where that has none."""
+        return "" if self.p_value >= self.significance else self.agreements[0].place
+
+
+def adequacy(
+    context: FitContext,
+    model: Scored,
+    rng: np.random.Generator,
+    significance: float = SIGNIFICANCE,
+    of_steady_size: bool = False,
+) -> Adequacy:
+    """Say whether what a model leaves of all records goes with anything.
+
+    Those that were fitted too: their other amplitudes show a law that has not quite the right form. Numbers that the fit bent to
+    hide it move with the answers, so that they hide nothing here.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    model
+        Fitted and scored.
+    rng
+        Source of the turned signs.
+    significance
+        p-value below which it is not adequate.
+    of_steady_size
+        Whether noise and disturbance are to be as large where nothing moves.
+    """
+    records = context.records
+    answers = Answers(context, records, context.on_all_records(model), model.effects, model.fit.free)
+    if not answers.can_be_compared:
+        return Adequacy(0.0, (Agreement(_TOO_FAST, "", 0.0, 1.0),), significance=significance)
+    innovations = Innovations(answers)
+    seen_left, new = answers.seen_left, innovations.without_free(innovations.of(answers.seen_left))
+    stretches = _stretches(answers, _STRETCHES)
+    signs = rng.choice([-1.0, 1.0], size=(_TURNS, len(stretches)))
+    found: list[tuple[Agreement, _Turned]] = []
+    for what, place, columns in alternatives(answers):
+        fresh = innovations.without_free(innovations.of(columns))
+        told = _turned(fresh, new, stretches, signs, innovations.followed)
+        if told is None:
+            continue
+        # How large it is counts in the readings themselves; what is new in them says only whether it is there.
+        seen = _turned(answers.without_free(columns), seen_left, stretches, signs)
+        share = (
+            0.0 if seen is None else max(0.0, seen.reached - seen.mean) / float(answers.left @ answers.left)
+        )
+        found.append((Agreement(what, place, told.p_value, share), told))
+    grown = _growth(answers, stretches) if of_steady_size else None
+    agreements = [agreement for agreement, _ in found] + ([grown] if grown is not None else [])
+    p_values = [_smallest([told for _, told in found])] if found else [1.0]
+    p_values += [grown.p_value] if grown is not None else []
+    ordered = tuple(sorted(agreements, key=lambda a: (a.p_value >= significance, -a.share)))
+    return Adequacy(min(p_values), ordered, _is_spread(answers), significance)
+
+
+class Checks:
+    """Whether what each model leaves is noise and disturbance, asked once of each.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    rng
+        Source of the turned signs.
+    at_floor
+        What counts as the floor itself, in units of it: equations without an effect that leave more are asked for growth.
+    allowed
+        What a model may leave before the floor speaks against it, in the same units.
+    """
+
+    def __init__(
+        self, context: FitContext, rng: np.random.Generator, at_floor: float, allowed: float
+    ) -> None:
+        self._context = context
+        self._at_floor = at_floor
+        self._allowed = allowed
+        self._rng = rng
+        self._known: dict[tuple[str, ...], Adequacy] = {}
+
+    def of(self, model: Scored) -> Adequacy:
+        """Return what a model's remainder goes with."""
+        if model.names not in self._known:
+            significance = SIGNIFICANCE if model.error_over_noise <= self._allowed else AGAINST_A_FLOOR
+            # Noise that only motion makes is no reason to say that nothing is missing.
+            steady = not model.effects and model.error_over_noise > self._at_floor
+            self._known[model.names] = adequacy(self._context, model, self._rng, significance, steady)
+        return self._known[model.names]
+
+    def is_adequate(self, model: Scored) -> bool:
+        """Return True where nothing contradicts that it is noise and disturbance."""
+        return self.of(model).adequate
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """How much of what is left goes with some columns, and how much where the signs of its stretches are turned."""
+
+    reached: float
+    by_chance: Floats
+
+    @property
+    def mean(self) -> float:
+        return float(np.mean(self.by_chance))
+
+    @property
+    def p_value(self) -> float:
+        return float((1.0 + np.sum(self.by_chance >= self.reached)) / (1.0 + self.by_chance.size))
+
+
+def _turned(
+    columns: Floats, left: Floats, stretches: Sequence[slice], signs: Floats, followed: Followed | None = None
+) -> _Turned | None:
+    """Return how much goes with columns that no parameter follows; None if there are none.
+
+    What parameters and initial states took of what is left is missing from it once signs are turned, so that chance would seem
+    smaller than it is: with `followed` each turn counts in units of what it then expects.
+    """
+    basis = orthonormal(columns)
+    if basis.shape[1] == 0:
+        return None
+    # Their sum is that of what no parameter follows; each alone is whole, as chance would have it.
+    along = np.array([left[part] @ basis[part] for part in stretches])
+    turned = signs @ along
+    sizes = np.sum(turned**2, axis=1)
+    if followed is not None:
+        shared = followed.along(basis, stretches)
+        for some in np.array_split(np.arange(len(signs)), _PORTIONS):
+            taken = np.tensordot(signs[some], shared, axes=1)
+            expected = (1.0 + _SINGULAR) * np.eye(basis.shape[1]) - taken @ taken.transpose(0, 2, 1)
+            whole = np.linalg.solve(expected, turned[some, :, None])[:, :, 0]
+            sizes[some] = np.einsum("ij,ij->i", turned[some], whole)
+    return _Turned(float(np.sum(np.sum(along, axis=0) ** 2)), sizes)
+
+
+def _smallest(found: Sequence[_Turned]) -> float:
+    """Return the probability that chance makes any of several p-values as small as the smallest one here."""
+    table = np.array([told.by_chance for told in found])
+    ranks = (table.shape[1] - np.argsort(np.argsort(table, axis=1), axis=1)) / (1.0 + table.shape[1])
+    seen = min(told.p_value for told in found)
+    by_chance = np.min(ranks, axis=0)
+    return float((1.0 + np.sum(by_chance <= seen)) / (1.0 + by_chance.size))
+
+
+def _is_spread(answers: Answers) -> bool:
+    stretches = _stretches(answers, _LONG_STRETCHES)
+    powers = np.array([float(np.mean(answers.seen_left[part] ** 2)) for part in stretches])
+    return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= _LEAST_SPREAD * len(stretches)
+
+
+def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
+    """Return how the size of what is left goes with how much moves: with what of several chance explains least."""
+    left = [float(np.mean(answers.seen_left[part] ** 2)) for part in stretches]
+    rig = answers.context.rig
+    moving: list[tuple[str, str, Sequence[Floats]]] = []
+    for joint in motion_columns(rig):
+        moving.append((f"how far {joint} moves", joint, answers.simulated(joint)))
+        moving.append((f"how fast {joint} moves", joint, slopes(answers, joint)))
+    for drive in signal_columns(rig):
+        moving.append((f"how much {drive} drives", drive, answers.simulated(drive)))
+    told = [
+        (float(spearmanr(left, powers, alternative="greater").pvalue), what, place)
+        for what, place, signals in moving
+        if np.ptp(powers := _powers(answers, signals, stretches)) > 0.0
+    ]
+    if not told:
+        return None
+    p_value, what, place = min(told)
+    return Agreement(what, place, min(1.0, len(told) * p_value), 1.0)
+
+
+def _powers(answers: Answers, signals: Sequence[Floats], stretches: Sequence[slice]) -> list[float]:
+    """Return the mean square of a signal, counted from its median, in each stretch of the stacked readings."""
+    n_outputs, middle = len(answers.context.rig.outputs), float(np.median(np.concatenate(signals)))
+    stacked = np.concatenate([np.repeat((signal - middle) ** 2, n_outputs) for signal in signals])
+    return [float(np.mean(stacked[part])) for part in stretches]
+
+
+def _stretches(answers: Answers, most: int) -> list[slice]:
+    """Return stretches of about equal length that cover all records, none of which reaches from one record into the next."""
+    length = max(1.0, answers.spans[-1].stop / most)
+    found = []
+    for part in answers.spans:
+        count = max(1, round((part.stop - part.start) / length))
+        edges = np.linspace(part.start, part.stop, count + 1).astype(int)
+        found += [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+    return found

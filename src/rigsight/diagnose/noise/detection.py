@@ -1,0 +1,250 @@
+"""Is there a gap? The noise floor of each output, from the records themselves.
+
+Three ways, the first that the records allow wins: repeated periods of one input (noise and disturbance alike), stretches in
+which the input rests (sensor noise and the disturbance that passes through the rig), and the top of the spectrum, where no rig
+responds (white sensor noise only: a lower bound).
+
+An element's input is itself measured, and its noise reaches the force only while the element moves: what a force shows at rest is
+a lower bound as well: an assumption that the dampers on a bench suggested, whose forces no effect explains to that floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.noise.block_means import block_means
+from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
+from rigsight.records.periods import differ_by_noise, repeated_period, roughness
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+_QUIET_INPUT = 1e-3
+_QUIET_NOISE = 0.01
+"""Largest noise of an input at rest, relative to its span."""
+_WITHIN = 5.0
+"""Standard deviations of its noise within which the steps of a resting input stay."""
+_MIN_QUIET = 100
+_TOP_OF_SPECTRUM = 0.85
+_FREE_MODES = 6
+_MAX_HANKEL_ROWS = 200
+_SMALLEST = 1e-9
+AT_REST = "stretches in which the input rests"
+_WHITE_ONLY = "top of the spectrum (white noise only)"
+
+
+def noise_floors(
+    rig: Rig, records: Sequence[Record], drifts: bool = False, at_rest: bool = True
+) -> tuple[NoiseFloor, ...]:
+    """Return the noise floor of every output that the records hold.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        All records of a campaign: they share their sensors.
+    drifts
+        True for an axis without a spring: where it has drifted to from one period to the next is not noise.
+    at_rest
+        False for a rig whose motion while the input rests is known to be no noise.
+    """
+    floors = []
+    for signal in rig.outputs:
+        holding = [record for record in records if signal.name in record]
+        if holding:
+            std, method, stretches = _noise_floor(rig, signal.name, holding, drifts, at_rest)
+            lower_bound = method == _WHITE_ONLY or (not rig.is_driven and method == AT_REST)
+            spread = max(float(np.std(record[signal.name])) for record in holding)
+            size = spread or max(float(np.max(np.abs(record[signal.name]))) for record in holding) or 1.0
+            floors.append(
+                NoiseFloor(
+                    signal.name,
+                    signal.unit,
+                    max(std, _SMALLEST * size),
+                    method,
+                    lower_bound=lower_bound,
+                    interval=_interval(std, stretches, lower_bound),
+                    stretches=stretches,
+                )
+            )
+    return tuple(floors)
+
+
+def _interval(std: float, stretches: Stretches, lower_bound: bool) -> tuple[float, float]:
+    """Return 95 % limits of a standard deviation: those of blocks of the pieces of noise that it was estimated from."""
+    if lower_bound or not stretches:
+        return std, np.inf
+    squares = block_means([samples**2 for samples, _ in stretches])
+    degrees, mean = squares.size, float(np.mean(squares))
+    if mean == 0.0:
+        return std, np.inf
+    spread = float(np.std(squares)) / mean / np.sqrt(degrees) if degrees > 1 else np.inf
+    low, high = np.maximum(1.0 - 1.96 * spread, 0.0), 1.0 + 1.96 * spread
+    return float(std * np.sqrt(low)), float(std * np.sqrt(high))
+
+
+def _noise_floor(
+    rig: Rig, output: str, records: Sequence[Record], drifts: bool, at_rest: bool
+) -> tuple[float, str, Stretches]:
+    sources = [signal.name for signal in rig.inputs]
+    repeated = _repeated(sources, output, records)
+    if drifts:
+        repeated = [(_without_drift(group), dt) for group, dt in repeated]
+    if any(output in record.free_offsets for record in records):
+        repeated = [(group - np.mean(group, axis=1, keepdims=True), dt) for group, dt in repeated]
+    if repeated:
+        squares = [np.var(group, axis=0, ddof=1) for group, _ in repeated]
+        left = [(row - np.mean(group, axis=0), dt) for group, dt in repeated for row in group]
+        scatter = float(np.sqrt(np.mean([float(np.mean(square)) for square in squares])))
+        return scatter, "repeated periods of the input", tuple(left)
+    top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
+    if not rig.is_driven:
+        # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
+        top = min(top, float(np.median([roughness(record[output]) for record in records])))
+    quiet = [q for record in records if at_rest for q in _quiet_stretches(record, sources, output)]
+    if quiet:
+        deviations = [float(np.std(stretch)) for stretch, _ in quiet]
+        return max(float(np.median(deviations)), top), AT_REST, tuple(quiet)
+    return top, _WHITE_ONLY, ()
+
+
+def _repeated(
+    sources: Sequence[str], output: str, records: Sequence[Record]
+) -> list[tuple[NDArray[np.float64], float]]:
+    """Return groups of answers to the same input, shape (n_repetitions, n_samples), within records and from one to the next."""
+    segments = []
+    for record in records:
+        driven = inputs_of(record, sources)
+        if not np.any(np.ptp(driven, axis=0)):
+            continue  # of a rig left alone each motion is another
+        period = _common_period(driven)
+        if period is None:
+            segments.append((driven, record[output], False, record.dt))
+            continue
+        count = record.n_samples // period
+        # The first period still holds the transient.
+        for i in range(1 if count > 1 else 0, count):
+            part = slice(i * period, (i + 1) * period)
+            segments.append((driven[part], record[output][part], count > 1, record.dt))
+    groups: list[tuple[NDArray[np.float64], float]] = []
+    used: set[int] = set()
+    for i, (first_input, first_output, first_settled, dt) in enumerate(segments):
+        if i in used:
+            continue
+        size = np.std(first_input, axis=0)
+        size[size == 0.0] = 1.0
+        group, settled = [first_output], first_settled
+        for j in range(i + 1, len(segments)):
+            other_input, other_output, other_settled, _ = segments[j]
+            if other_input.shape != first_input.shape or j in used:
+                continue
+            if all(map(differ_by_noise, other_input.T, first_input.T, size)):
+                group.append(other_output)
+                settled = settled and other_settled
+                used.add(j)
+        if len(group) > 1:
+            # Whole records may start in different motion; by their second half they have forgotten it.
+            start = 0 if settled else first_input.size // 2
+            groups.append((np.array(group)[:, start:], dt))
+    return groups
+
+
+def inputs_of(record: Record, sources: Sequence[str]) -> NDArray[np.float64]:
+    """Return the inputs of a record side by side, shape (n_samples, n_inputs); one it lacks rests."""
+    rest = np.zeros(record.n_samples)
+    return np.column_stack([record.signals.get(name, rest) for name in sources] or [rest])
+
+
+def _common_period(driven: NDArray[np.float64]) -> int | None:
+    """Return after how many samples all inputs repeat themselves that do not rest; None if they do not."""
+    periods = {repeated_period(column) for column in driven.T if np.ptp(column) > 0.0}
+    return periods.pop() if len(periods) == 1 else None
+
+
+def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return answers to one input without the parabolas by which they differ: a constant force moves a free mass on one."""
+    t = np.linspace(-1.0, 1.0, group.shape[1])
+    mean = np.mean(group, axis=0)
+    drift = np.polynomial.polynomial.polyfit(t, (group - mean).T, 2)
+    return np.asarray(group - np.polynomial.polynomial.polyval(t, drift))
+
+
+def _quiet_stretches(
+    record: Record, sources: Sequence[str], output: str
+) -> list[tuple[NDArray[np.float64], float]]:
+    """Return the settled part of the output in long stretches of constant input, about its mean, with the sample time."""
+    samples = inputs_of(record, sources)
+    span = np.ptp(samples, axis=0)
+    if not np.any(span):
+        return []  # what swings by itself is no noise, however little drives it
+    # A measured input is never quite still: its own noise is no motion, as long as it is small.
+    noise = np.array(
+        [min(roughness(column), _QUIET_NOISE * s) for column, s in zip(samples.T, span, strict=True)]
+    )
+    allowed = np.maximum(_QUIET_INPUT * span, _WITHIN * noise)
+    still = np.all(np.abs(np.diff(samples, axis=0)) <= allowed, axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
+    found = []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        moved = np.maximum(_QUIET_INPUT * span, 2.0 * _WITHIN * noise)
+        start, stop = (begin + place for place in _held(samples[begin : end + 1], moved))
+        if stop - start < _MIN_QUIET:
+            continue
+        settled = record[output][start + (stop - start) // 2 if start > 0 else start : stop]
+        if settled.size < _MIN_QUIET // 2:
+            continue
+        first, second = np.array_split(settled, 2)
+        trend = abs(float(np.mean(second) - np.mean(first)))
+        scatter = float(np.std(np.diff(settled))) / np.sqrt(2.0)
+        deviation = float(np.std(settled))
+        # A drift or a decaying oscillation is not noise. What is as rough as white noise is no oscillation.
+        steady = trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300
+        if steady and (deviation <= 3.0 * scatter or not _is_free_motion(settled)):
+            found.append((settled - np.mean(settled), record.dt))
+    return found
+
+
+def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int, int]:
+    """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much.
+
+    Slow motion has small steps as well: a rest from which an input moves off gently ends where it has moved.
+    """
+
+    def length(ordered: NDArray[np.float64]) -> int:
+        spanned = np.maximum.accumulate(ordered, axis=0) - np.minimum.accumulate(ordered, axis=0)
+        beyond = np.flatnonzero(np.any(spanned > moved, axis=1))
+        return int(beyond[0]) if beyond.size else ordered.shape[0]
+
+    n, ahead, behind = samples.shape[0], length(samples), length(samples[::-1])
+    return (0, ahead - 1) if ahead >= behind else (n - behind, n - 1)
+
+
+def _is_free_motion(samples: NDArray[np.float64]) -> bool:
+    """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch.
+
+    Ringing that a disturbance keeps up changes phase and amplitude with every period or so; no exponential follows it for long.
+
+    References
+    ----------
+    R. Roy and T. Kailath, IEEE Trans. ASSP 37 (1989) 984, for poles from the shift invariance of the signal subspace.
+    """
+    rows = min(samples.size // 3, _MAX_HANKEL_ROWS)
+    hankel = np.lib.stride_tricks.sliding_window_view(samples - np.mean(samples), samples.size - rows + 1)
+    subspace = np.linalg.eigh(hankel @ hankel.T)[1][:, -_FREE_MODES:]
+    poles = np.linalg.eigvals(np.linalg.lstsq(subspace[:-1], subspace[1:], rcond=None)[0])
+    poles = poles / np.maximum(np.abs(poles), 1.0)
+    modes = poles[None, :] ** np.arange(samples.size)[:, None]
+    centered = samples - np.mean(samples)
+    explained = np.real(modes @ np.linalg.lstsq(modes, centered.astype(complex), rcond=1e-10)[0])
+    return float(np.std(centered - explained)) < 0.5 * float(np.std(centered))
+
+
+def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
+    """Return the standard deviation of white noise with the median power of the highest lines."""
+    window = np.hanning(samples.size)
+    power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2
+    top = power[int(_TOP_OF_SPECTRUM * power.size) :]
+    return float(np.sqrt(np.median(top) / np.log(2.0) / np.sum(window**2)))

@@ -1,0 +1,1 @@
+"""How do the readings of fitted equations answer to a small push at a place?"""

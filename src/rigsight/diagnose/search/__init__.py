@@ -1,0 +1,1 @@
+"""Which effects, alone and together, explain what the equations leave? Screened by place, then fitted."""

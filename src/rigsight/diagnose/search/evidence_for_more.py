@@ -1,0 +1,124 @@
+"""Has one more effect evidence of its own, or does it only soak up what the inexact form of those before it leaves?
+
+No form is exact on a measured rig: a sign is rounded, a spring bends a little. What that leaves goes with the same signal as the
+effect itself, and many a second effect takes it up as well as a truer form of the first would. So what a pair gains is held
+against what any other law of the first effect's own signal, at the first effect's place, would gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.noise.evidence import Evidence
+from rigsight.diagnose.pushes.alternatives import law_columns
+from rigsight.diagnose.pushes.answers import Answers, orthonormal
+from rigsight.diagnose.search.one_law import are_one_law, is_one_law
+from rigsight.effects import Effect
+
+_OTHER_FORM = 0.5
+"""Share of a gain that another form of the first effect may take: from a half on, it explains more than the second effect."""
+
+
+class OtherForms:
+    """What other forms of single effects would explain of what these leave, asked once of each.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    lower_bound
+        True if the noise floor is only a lower bound, so that nothing of a remainder can be put down to noise beforehand.
+    """
+
+    def __init__(self, context: FitContext, lower_bound: bool) -> None:
+        self._context = context
+        self._noise = 0.0 if lower_bound else 1.0
+        self._known: dict[tuple[str, ...], float] = {}
+
+    def gain(self, model: Scored) -> float:
+        """Return by how much a model's mean square error, in units of the noise floor, falls with another form of one effect."""
+        if model.names not in self._known:
+            answers = Answers(
+                self._context, self._context.scoring, model.held_out, model.effects, model.fit.free
+            )
+            forms = [orthonormal(answers.without_free(law_columns(answers, e))) for e in model.effects]
+            gains = [float(np.sum((form.T @ answers.left) ** 2)) for form in forms]
+            self._known[model.names] = max(gains) / answers.n_measured
+        return self._known[model.names]
+
+    def share(self, model: Scored) -> float:
+        """Return the share of what a model leaves above the noise, of squares, that another form of one effect takes."""
+        above_noise = max(model.error_over_noise**2 - self._noise, 0.0)
+        return min(1.0, self.gain(model) / above_noise) if above_noise > 0.0 else 1.0
+
+    def partners(self, single: Scored, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the effects that are worth trying beside a single one.
+
+        Where another form of it would take most of what it leaves, only those are that make one law with it.
+        """
+        if self.share(single) < _OTHER_FORM:
+            return list(effects)
+        return [e for e in effects if are_one_law((*single.effects, e), self._context.rig)]
+
+    def with_own_evidence(self, singles: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
+        """Return the models without pairs whose second effect explains less than another form of the first would.
+
+        A third effect has been held against other forms of the first two before it was tried.
+
+        Parameters
+        ----------
+        singles
+            Every effect alone, fitted and scored.
+        larger
+            Of several effects, fitted and scored, with the effect first that explains more by itself.
+        """
+        alone = {
+            model.names[0]: model
+            for model in singles
+            if model.residuals and np.isfinite(model.error_over_noise)
+        }
+
+        def stands(model: Scored) -> bool:
+            single = alone.get(model.names[0])
+            # Two effects that are one law are another form of each other; they are told apart by other means.
+            if len(model.effects) > 2 or single is None or not model.residuals or is_one_law(model):
+                return True
+            return self.gain(single) < _OTHER_FORM * (single.error_over_noise**2 - model.error_over_noise**2)
+
+        return [model for model in larger if stands(model)]
+
+
+def beyond_disturbance(
+    evidence: Evidence, singles: Sequence[Scored], larger: Sequence[Scored]
+) -> list[Scored]:
+    """Return the models that explain more than any single effect does beside a disturbance, and make nothing worse.
+
+    A disturbance swings a rig at its resonances, and a second effect with a motion of its own follows that in each record. Where
+    the form of the first is not quite right, a second that shakes the rig may soak up a slow error and leaves a fast one instead.
+
+    Parameters
+    ----------
+    evidence
+        Of models of these records.
+    singles, larger
+        Of one effect and of several, fitted and scored.
+    """
+    alone = [model for model in singles if model.residuals]
+    if not larger or not alone:
+        return list(larger)
+    least = min(evidence.criterion(model) for model in alone)
+
+    def stands(model: Scored) -> bool:
+        parts = [part for part in (*alone, *larger) if part.residuals and set(part.names) < set(model.names)]
+        return evidence.criterion(model) < least and all(evidence.gain(model, part) > 0.0 for part in parts)
+
+    return [model for model in larger if not model.residuals or stands(model)]
+
+
+def with_parts(chosen: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
+    """Return the chosen models and the others of several effects that are parts of them: they tell the share of each effect."""
+    names = [set(model.names) for model in chosen]
+    return [model for model in larger if any(set(model.names) <= own for own in names)]

@@ -1,0 +1,269 @@
+"""From where is a candidate worth fitting to all records with care? First looks from all its starts.
+
+From every start a candidate is fitted to the liveliest stretches of the records: in short pieces with initial states of their
+own, which keeps a model that is far off in step with the motion, then in one piece. Only there starts are compared: in pieces
+the right one may be the worst, as sliders that let go at a wrong sample hold a fit at a place that the next rounding moves.
+From where the best of these ended the candidate is fitted roughly to the whole records.
+
+References
+----------
+H. G. Bock, in *Modelling of Chemical Reaction Systems* (Springer 1981) 102, for fits in pieces (multiple shooting, here without
+the condition that pieces join).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.search.starts import start_values, with_own_values
+from rigsight.effects import Effect
+from rigsight.identify import FitResult
+from rigsight.simulate import Structure
+
+_LOOK_EVALUATIONS = 25
+_GLIMPSE_EVALUATIONS = 8
+_MOST_STARTS = 4
+"""Starts that are all fitted at length."""
+_LENGTHY = 2
+"""Of more starts, those that are fitted at length in pieces, best after a glimpse first; from the others the fit in one piece
+begins after the glimpse. Of hysteresis by sliders with five draws of noise mostly two to five of nine glimpses led on to the
+right place, of four fits at length in pieces one; these are for a model that is too far off for a fit in one piece.
+"""
+_WIDE_EVALUATIONS = 12
+_LOOK_TOLERANCE = 1e-3
+LOOK_ACCURACY = 1e-3
+_NEAR = 25.0
+"""A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
+_ALIKE = 1.05
+"""Starts whose first looks end within this factor of the best cost are all followed."""
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """First fits of a candidate to part of the records or roughly to all, best first, those that ended at the same place once.
+
+    Attributes
+    ----------
+    effects, structure, free
+        What was fitted.
+    fits
+        What was reached.
+    nearest
+        Mean squared error that was reached in their liveliest stretches.
+    """
+
+    effects: tuple[Effect, ...]
+    structure: Structure
+    free: tuple[str, ...]
+    fits: tuple[FitResult, ...]
+    nearest: float
+
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last."""
+        return self.effects[-1].name
+
+    @property
+    def cost(self) -> float:
+        """Lowest cost that was reached."""
+        return self.fits[0].cost
+
+
+def look_at(
+    context: FitContext,
+    effects: tuple[Effect, ...],
+    base: FitResult,
+    parents: Mapping[str, FitResult],
+    further: Sequence[Mapping[str, float]] = (),
+    hold: frozenset[str] = frozenset(),
+    substeps: Sequence[int] | None = None,
+) -> FirstLook:
+    """Fit a set of effects to the liveliest stretches of the records, from all starts of the last effect.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects
+        All effects of the model; the last is new.
+    base
+        Fit without the last.
+    parents
+        Fits with a simpler effect in place of the last, by name of that effect.
+    further
+        Own values of the last effect from which it is worth trying beside its declared starts.
+    hold
+        Rig parameters to keep at their base value.
+    substeps
+        Integration steps per sample of each record; None chooses them, which needs the accurate integrator.
+    """
+    structure = context.simplest(effects)
+    known = context.constant_forces_beside(structure.effects)
+    moved = {*context.free_parameters(structure), *base.free} - {*hold, *known}
+    free = tuple(name for name in structure.names if name in moved)
+    starts = list(start_values(context, structure, effects[-1], base, parents))
+    if context.given and context.leaves_numbers_open(base):
+        from_given = replace(base, values={**base.values, **context.given})
+        starts += start_values(context, structure, effects[-1], from_given, {})
+    starts += [{**starts[0], **with_own_values(structure, effects[-1], base, own)} for own in further]
+    starts = [{**start, **known} for start in starts]
+    nearest = _looked(context, structure, free, starts, substeps)
+    if not np.isfinite(nearest[0].cost) and context.start:
+        unbent = replace(base, values={**base.values, **context.start})
+        starts = [{**start, **known} for start in start_values(context, structure, effects[-1], unbent, {})]
+        nearest = _looked(context, structure, free, starts, substeps)
+    return FirstLook(effects, structure, free, nearest, mean_square(nearest[0]))
+
+
+def looked_from(
+    context: FitContext,
+    effects: tuple[Effect, ...],
+    structure: Structure,
+    starts: Sequence[Mapping[str, float]],
+) -> FirstLook:
+    """Fit a set of effects to the liveliest stretches of the records from given starts.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    effects, structure
+        The model.
+    starts
+        Values of all parameters.
+    """
+    free = tuple(context.free_parameters(structure))
+    fits = _looked(context, structure, free, starts)
+    return FirstLook(effects, structure, free, fits, mean_square(fits[0]))
+
+
+def _looked(
+    context: FitContext,
+    structure: Structure,
+    free: tuple[str, ...],
+    starts: Sequence[Mapping[str, float]],
+    substeps: Sequence[int] | None = None,
+) -> tuple[FitResult, ...]:
+    """Fit to the liveliest stretches: in pieces from every start, from the best places in one."""
+    fit = context.problem(structure, context.look, LOOK_ACCURACY)
+    stretches = context.look_in_pieces
+    in_pieces = context.problem(structure, [piece for parts in stretches for piece in parts], LOOK_ACCURACY)
+    of_pieces = None
+    if substeps is not None:
+        of_pieces = [n for n, parts in zip(substeps, stretches, strict=True) for _ in parts]
+
+    def tried(
+        start: Mapping[str, float], states: Sequence[NDArray[np.float64]] | None, most: int
+    ) -> FitResult:
+        return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
+
+    if len(starts) > _MOST_STARTS:
+        glimpses = sorted(
+            (tried(start, None, _GLIMPSE_EVALUATIONS) for start in starts), key=lambda f: f.cost
+        )
+        at_length = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_LENGTHY]]
+        first = [*at_length, *glimpses[_LENGTHY:]]
+    else:
+        first = [tried(start, None, _LOOK_EVALUATIONS) for start in starts]
+    near = [
+        fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+        for found in _apart(first)
+    ]
+    return _distinct(near)
+
+
+def widened(
+    context: FitContext,
+    looks: Sequence[FirstLook],
+    substeps: Sequence[int] | None = None,
+    lowest: float = float("inf"),
+) -> list[FirstLook]:
+    """Fit those looks roughly to the whole records that came near the best one in the liveliest stretches; drop the others.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    looks
+        First looks.
+    substeps
+        Integration steps per sample of each record; None chooses them.
+    lowest
+        Mean squared error in the liveliest stretches that a look beside these has reached.
+    """
+    lowest = min([lowest, *(look.nearest for look in looks)])
+
+    def one(look: FirstLook) -> FirstLook:
+        return replace(look, fits=_on_whole_records(context, look.structure, look.free, look.fits, substeps))
+
+    near = [look for look in looks if look.nearest <= _NEAR * lowest]
+    return list(context.threads.side_by_side(one, near))
+
+
+def looked_again(
+    context: FitContext, settled: FitResult, starts: Sequence[Mapping[str, float]]
+) -> tuple[FitResult, ...]:
+    """Fit from other starts than those of a candidate: to the liveliest stretches, from the best places roughly to all records.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    settled
+        Gives the equations and the free parameters.
+    starts
+        Values of all parameters.
+    """
+    near = context.problem(settled.structure, context.look, LOOK_ACCURACY)
+    looks = [
+        near.fit(start, settled.free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False) for start in starts
+    ]
+    best = sorted(looks, key=lambda fit: fit.cost)[:_MOST_STARTS]
+    return _on_whole_records(context, settled.structure, settled.free, best)
+
+
+def _on_whole_records(
+    context: FitContext,
+    structure: Structure,
+    free: tuple[str, ...],
+    fits: Sequence[FitResult],
+    substeps: Sequence[int] | None = None,
+) -> tuple[FitResult, ...]:
+    whole = context.problem(structure, context.estimation, LOOK_ACCURACY)
+
+    def one(near: FitResult, steps: Sequence[int] | None) -> FitResult:
+        found = whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, steps)
+        # Steps that served another model may be too long for a lag of a fraction of a sample.
+        return found if steps is None or np.isfinite(found.cost) else one(near, None)
+
+    return _distinct([one(near, substeps) for near in fits])
+
+
+def mean_square(fit: FitResult) -> float:
+    """Return the mean squared residual of a fit, in units of the noise floor squared."""
+    return fit.cost / fit.n_samples
+
+
+def _apart(fits: Sequence[FitResult]) -> list[FitResult]:
+    """Return the fits, best first, those that ended at the same place once."""
+    kept: list[FitResult] = []
+    for fit in sorted(fits, key=lambda result: result.cost):
+        if not any(_at_one_place(fit, other) for other in kept):
+            kept.append(fit)
+    return kept
+
+
+def _distinct(fits: Sequence[FitResult]) -> tuple[FitResult, ...]:
+    """Return the best fit, and the next one that ended elsewhere if its cost is nearly that of the best."""
+    best, *others = _apart(fits)
+    return (best, *[other for other in others if other.cost <= _ALIKE * best.cost][:1])
+
+
+def _at_one_place(one: FitResult, other: FitResult) -> bool:
+    ours, theirs = (np.array([fit.values[name] for name in fit.free]) for fit in (one, other))
+    return bool(np.allclose(ours, theirs, rtol=0.05, atol=1e-12))

@@ -1,0 +1,137 @@
+"""For how long must a model predict before it is compared with records? As long as the gap needs to show, where a rig drifts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fitting.observer import Observer, followed_sensors
+from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fitting.task import Task
+from rigsight.diagnose.fitting.windows import Windowing, typical_period, window_length
+from rigsight.diagnose.search.one_more_effect import Prepare
+from rigsight.diagnose.search.single_effects import reidentify
+from rigsight.errors import SimulationError
+from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads
+from rigsight.records.record import Record
+from rigsight.rigs import evaluated
+from rigsight.simulate import parameter_vector, simulate_outputs, structure_of_fit
+
+_CLOSE, _LOOSE = 6.0, 0.1
+"""Bandwidths of the closest and the loosest observer, in units of the typical frequency of the velocity.
+
+At six the harmonics of friction that turns with the velocity still show; at a tenth errors add up for ten periods, as long as
+drift stays small against motion.
+"""
+_LOOSER = 2.0
+_OF_SAMPLING = 0.2
+"""Largest bandwidth times sample time: an observer that is closer follows the noise of single samples."""
+_AMPLIFIED = 1.1
+"""Most that a true model may leave of a sensor's noise, in units of that noise, as it follows the noise of others.
+
+A pressure or a speed is moved by the noise of the position that is followed. With a tenth more a true model still counts as one
+that reaches the floor, see `AT_FLOOR`.
+"""
+_CLEAR = 10.0
+"""Gap, in units of the noise floor, that shows its cause: benches of the catalogue are judged from ten floors on."""
+
+
+def brings_back(task: Task) -> bool:
+    """Return True if a spring brings one mass back before the loosest observer would: weaker ones let errors of force add up."""
+    if not (task.rig.has_one_motion and task.rig.is_driven):
+        return True
+    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
+    motion, values = task.rig.motion, start_values_of(task)
+    numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
+    return bool(np.min(np.abs(np.roots(numbers))) >= _LOOSE * typical)
+
+
+def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[Windowing, dict[str, float]]:
+    """Return how records of a rig that drifts are compared with models: by an observer.
+
+    The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
+    it, but not so close that the noise that it follows shows in what a true model leaves. Where no sensor shows the motion by
+    itself, records are cut into windows.
+
+    Parameters
+    ----------
+    task
+        Records and the simulation in question.
+    noise
+        Noise floor of each output.
+    n_jobs
+        Threads that help with the records of a fit.
+
+    Returns
+    -------
+    windowing
+        How they are compared.
+    amplified
+        What a true model then leaves of each output's noise, in units of it; at least 1.
+    """
+    sensors = followed_sensors(task)
+    if not sensors:
+        return Windowing(window_length(task.rig, task.estimation)), dict.fromkeys(noise, 1.0)
+    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
+    bandwidth = min(_CLOSE * typical, _OF_SAMPLING / max(record.dt for record in task.records))
+    values: Mapping[str, float] | None = None
+    while True:
+        windowing = Windowing(observer=Observer(sensors, bandwidth))
+        context = fit_context_of(task, noise, windowing, None, IdleThreads(n_jobs))
+        reidentified = reidentify(context, values or context.start)
+        amplified = noise_of_following(context, reidentified.fit)
+        shows = reidentified.error_over_noise >= _CLEAR and max(amplified.values()) <= _AMPLIFIED
+        if shows or bandwidth <= _LOOSE * typical:
+            return windowing, {name: max(1.0, factor) for name, factor in amplified.items()}
+        values = reidentified.fit.values if reidentified.residuals else None
+        bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
+
+
+def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
+    """Return what a true model that follows noisy sensors leaves of the noise of each, in units of it.
+
+    The true numbers are unknown: the larger of two, with those that were given and with the fitted ones.
+
+    Parameters
+    ----------
+    bench
+        Records with what models follow, noise of each sensor.
+    fit
+        The equations without an effect, fitted to the records.
+    """
+    record, rng = context.estimation[0], np.random.default_rng(0)
+    sensors = [signal.name for signal in context.rig.outputs]
+    added = {
+        name: rng.normal(scale=context.noise[name], size=record.n_samples)
+        for name in sensors
+        if name in record
+    }
+    noisy = record.with_signals(**{name: record[name] + noise for name, noise in added.items()})
+    data = context.problem(fit.structure, [record, noisy], DEFAULT_ACCURACY).data
+
+    def left(values: Mapping[str, float]) -> dict[str, float]:
+        p = parameter_vector(data.structure, values)
+        state = fit.initial_states[0]
+        try:
+            quiet, moved = (
+                simulate_outputs(
+                    data.structure, d.held, d.parameters(p), state, record.n_samples, DEFAULT_ACCURACY
+                )
+                for d in data.records
+            )
+        except SimulationError:
+            return dict.fromkeys(added, 0.0)
+        shown = dict(zip(sensors, (moved - quiet).T, strict=True))
+        return {name: float(np.std(own - shown[name])) / context.noise[name] for name, own in added.items()}
+
+    fitted, given = left(fit.values), left({**fit.values, **context.given})
+    return {name: max(fitted[name], given[name]) for name in added}
+
+
+def preparing(prepare: Prepare | None, records: Sequence[Record]) -> Prepare | None:
+    """Return how structures are compiled that are fitted to records: with their free offsets and observers."""
+    if prepare is None:
+        return None
+    return lambda structures: prepare([structure_of_fit(structure, records) for structure in structures])

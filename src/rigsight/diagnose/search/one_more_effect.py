@@ -1,0 +1,135 @@
+"""Which effects, added to a model, explain what it leaves? Every effect gets a first look, the promising are fitted.
+
+A look goes two ways: from the model with the new effect added, and from the new effect alone with those of the model added. A
+strong memory hides behind the effect that was found first.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
+from rigsight.diagnose.search.places import Search, search_places
+from rigsight.diagnose.search.screening import structures_of_lineup
+from rigsight.diagnose.search.single_effects import followed
+from rigsight.effects import Effect
+from rigsight.simulate import Structure
+
+_WORTH_FOLLOWING = 0.85
+"""Factor by which an effect must lower the cost at a first look to be fitted with care."""
+_MOST_FOLLOWED = 6
+_NEAR_THE_BEST = 2.0
+"""Models that cost at most this many times the best at a first look are fitted with care."""
+_BOTH_WAYS = 6
+"""Most promising pairs that are looked at from the fit of the second effect as well."""
+_MOST_STEPS = 4
+"""Substeps of a first look beyond its parent's: enough for a lag of a fifth of a sample."""
+
+Prepare = Callable[[Sequence[Structure]], None]
+
+
+def with_one_more(
+    context: FitContext,
+    parent: Scored,
+    effects: Sequence[Effect],
+    known: Sequence[Scored],
+    singles: Sequence[Scored],
+    prepare: Prepare | None = None,
+    least_share: float = 0.0,
+) -> list[Scored]:
+    """Return a model with each effect added that lowers its cost clearly, fitted and scored.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    parent
+        The model that leaves something.
+    effects
+        Candidates to add.
+    known
+        Models with as many effects that need not be tried again.
+    singles
+        Every effect alone, fitted and scored.
+    prepare
+        Called with the structures that are about to be looked at, to compile them side by side.
+    least_share
+        Share of the squared remainder that pushes like those of one of the effects must take away for any of them to be tried.
+    """
+    open_ones = [
+        effect
+        for effect in context.offered(effects)
+        if effect not in parent.effects and not is_among(known, {*parent.names, effect.name})
+    ]
+    if prepare is not None:
+        prepare(structures_of_lineup(context.rig, open_ones, (*context.modelled, *parent.effects)))
+    search = search_places(context, parent, open_ones)
+    if search.most < least_share:
+        return []
+    return _fitted_beside(context, parent, search, singles, prepare)
+
+
+def is_among(models: Sequence[Scored], names: AbstractSet[str]) -> bool:
+    """Return True if one of the models has just these effects."""
+    return any(set(model.names) == names for model in models)
+
+
+def _fitted_beside(
+    context: FitContext,
+    parent: Scored,
+    search: Search,
+    singles: Sequence[Scored],
+    prepare: Prepare | None,
+) -> list[Scored]:
+    base = parent.fit
+    if prepare is not None:
+        prepare([context.simplest((*parent.effects, effect)) for effect in search.effects])
+
+    alone = {model.names[0]: model.fit for model in singles}
+
+    def steps(effect: Effect) -> tuple[int, ...]:
+        """Return substeps that serve both: a lag needs finer ones than its parent."""
+        own = alone.get(effect.name)
+        if own is None:
+            return base.substeps
+        return tuple(max(n, min(m, _MOST_STEPS)) for n, m in zip(base.substeps, own.substeps, strict=True))
+
+    def one(effect: Effect) -> FirstLook:
+        pushed = [search.starts[effect.name]] if effect.name in search.starts else []
+        return look_at(context, (*parent.effects, effect), base, {}, pushed, substeps=steps(effect))
+
+    looks = list(context.threads.side_by_side(one, search.effects))
+    near = min((look.nearest for look in looks), default=float("inf"))
+
+    def wide(look: FirstLook) -> list[FirstLook]:
+        return widened(context, [look], substeps=steps(look.effects[-1]), lowest=near)
+
+    found = list(context.threads.side_by_side(wide, looks))
+    looks = sorted(itertools.chain.from_iterable(found), key=_cost)[:_BOTH_WAYS]
+
+    def other_way(found: FirstLook) -> FirstLook:
+        second = found.effects[-1]
+        if second.name not in alone or len(parent.effects) > 1:
+            return found
+        substeps = steps(second)
+        turned = look_at(context, (second, *parent.effects), alone[second.name], {}, substeps=substeps)
+        (wider,) = widened(context, [turned], substeps=substeps)
+        return min(found, replace(wider, effects=found.effects), key=_cost)
+
+    looks = list(context.threads.side_by_side(other_way, looks))
+    lowest = min((found.cost for found in looks), default=float("inf"))
+    worth = min(_WORTH_FOLLOWING * base.cost, _NEAR_THE_BEST * lowest)
+    promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
+
+    def follow(found: FirstLook) -> Scored:
+        return followed(context, found, promising=True, finish=False)
+
+    return list(context.threads.side_by_side(follow, promising[:_MOST_FOLLOWED]))
+
+
+def _cost(found: FirstLook) -> float:
+    return found.cost

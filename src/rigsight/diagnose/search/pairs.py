@@ -1,0 +1,246 @@
+"""Do several effects explain what the best one leaves? Greedy growth from the best, judged by held-out records.
+
+Each part of the best pairs is fitted alone from there. What the growth cannot do without is found by the ranking: a model
+competes with its own parts.
+
+References
+----------
+S. A. Billings, *Nonlinear System Identification* (Wiley 2013), for greedy forward selection of terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
+from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
+from rigsight.diagnose.search.single_effects import finished, followed, refine
+from rigsight.diagnose.search.third_effect import IN_ITS_PLACE, with_a_third, with_relatives
+from rigsight.effects import Effect
+from rigsight.simulate import carried_over
+
+_BEAM = 1.3
+"""Singles are grown if their held-out error is within this factor of the best: the simplest, and the best that is unlike it."""
+_TIE = 1.01
+_MOST_FINISHED = 2
+_MOST_PRUNED = 2
+_MOST_SWAPS = 2
+"""Times that a more general effect is put into the best pair: once for each of its two."""
+_FINEST_STEPS = 4
+"""Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
+and each of its partners would take as fine steps. An assumption, made for the time that it saves."""
+_NOTHING_LEFT = 1.03
+"""Held-out error in units of the noise floor above which more is tried: another parent, effects that contain one of the pair's.
+
+An assumption: floors are known to a few percent.
+"""
+_HALF = 0.5
+"""Share of what is left above the floor that one more effect must close, as the first must of the whole gap.
+
+An assumption: where the form of the first is not quite that of the rig, many a second one takes a little off the rest.
+Of three effects of one size the second closes less, and the third all that is left.
+"""
+
+
+def grown(
+    context: FitContext,
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    at_floor: float,
+    worthwhile: float,
+    forms: OtherForms,
+    prepare: Prepare | None = None,
+) -> list[Scored]:
+    """Return models of two and three effects that close half or more of what the best with one less leaves, fitted and scored.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    singles
+        Every effect alone, fitted and scored.
+    effects
+        Candidates for the second place.
+    at_floor
+        Held-out error in units of the noise floor at which nothing is left to explain.
+    worthwhile
+        Held-out error up to which an effect is believed to explain anything.
+    forms
+        Says which effects are worth trying beside another.
+    prepare
+        Called with the structures that are about to be looked at, to compile them side by side.
+
+    Returns
+    -------
+    Each with the effect first that explains more by itself.
+    """
+    usable = sorted(
+        (m for m in singles if m.residuals and np.isfinite(m.error_over_noise)),
+        key=lambda m: m.error_over_noise,
+    )
+    if not usable or usable[0].error_over_noise <= at_floor:
+        return []
+    # Beside an effect that explains nothing a second one does what it does alone.
+    explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
+    close = [model for model in explaining if model.error_over_noise <= _BEAM * usable[0].error_over_noise]
+    # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
+    # many, the one that the catalogue has first is the plainer.
+    best = min(close, key=lambda model: (model.n_free, model.error_over_noise))
+    first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
+    others = [model for model in close if model is not first and not _alike(first, model)]
+    others = [model for model in others if max(model.fit.substeps) <= _FINEST_STEPS]
+    allowed = _half_closed(usable[0].error_over_noise)
+    # An effect that was left out of the singles, as another says the same, may still be half of a pair.
+    alone = {effect.name: np.inf for effect in effects} | {
+        model.names[0]: model.error_over_noise for model in singles
+    }
+    pairs: list[Scored] = []
+    parents = [(first, _NOTHING_LEFT)]
+    if others:
+        parents.append((_plainest(others, others[0], effects), _NOTHING_LEFT))
+        # Fitted by itself, an effect may stand far off for what a second one does to it: one more where no pair competes.
+        parents.append((min(others, key=lambda model: (model.n_free, model.error_over_noise)), allowed))
+    tried: list[Scored] = []
+    for parent, enough in parents:
+        if parent not in tried and min((pair.error_over_noise for pair in pairs), default=np.inf) > enough:
+            tried.append(parent)
+            pairs += with_one_more(context, parent, forms.partners(parent, effects), pairs, usable, prepare)
+    best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+    if best_pair is not None and best_pair.error_over_noise <= allowed:
+        # What came second may be right and the first only its relative: another as good alone may do better in its place.
+        for second in (model for model in usable if model not in tried):
+            if second.effects[0] in best_pair.effects:
+                (name,) = set(best_pair.names) - set(second.names)
+                instead = [e for e in effects if alone[e.name] <= IN_ITS_PLACE * alone[name]]
+                pairs += with_one_more(
+                    context, second, forms.partners(second, instead), pairs, usable, prepare
+                )
+    for _ in range(_MOST_SWAPS):
+        best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+        if best_pair is None or not _NOTHING_LEFT < best_pair.error_over_noise <= allowed:
+            break
+        pairs += _more_general(context, best_pair, usable, effects, pairs, prepare)
+    pairs.sort(key=lambda pair: pair.error_over_noise)
+    # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
+    last = pairs[:_MOST_FINISHED][-1].error_over_noise if pairs else 0.0
+    n_finished = sum(pair.error_over_noise <= _TIE * last for pair in pairs)
+    pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
+    pairs = refine(context, pairs)
+    triples = with_a_third(context, usable, pairs, effects, at_floor, forms, prepare)
+    nearest = min((pair.error_over_noise for pair in pairs), default=np.inf)
+    triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
+    if triples:
+        triples, pairs = with_relatives(context, triples, pairs, usable, effects, prepare)
+    of_triples = [set(triple.names) for triple in triples]
+    pairs = [
+        pair
+        for pair in pairs
+        if pair.error_over_noise <= allowed or any(set(pair.names) < own for own in of_triples)
+    ]
+    return [
+        replace(model, effects=tuple(sorted(model.effects, key=lambda effect: alone[effect.name])))
+        for model in (*pairs, *triples)
+    ]
+
+
+def _half_closed(left: float) -> float:
+    """Return what one more effect may leave of what is left, in units of the noise floor."""
+    return left - _HALF * (left - 1.0)
+
+
+def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect]) -> Scored:
+    """Return of the models that explain as much as one of them that with the fewest numbers, the first in the catalogue."""
+    order = {effect.name: place for place, effect in enumerate(effects)}
+    tied = [model for model in models if model.error_over_noise <= _TIE * like.error_over_noise]
+    return min(tied, key=lambda model: (model.n_free, order[model.names[0]]))
+
+
+def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
+    """Return the singles, refitted where they do better from where they stand in a pair than from where they were found.
+
+    A second effect may do no more than lift a fit of the first over a ridge; without it the first then explains as much.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    singles
+        Every effect alone, fitted and scored.
+    pairs
+        From `grown`.
+    """
+    better = {model.names: model for model in singles}
+    for pair in sorted(pairs, key=lambda pair: pair.error_over_noise)[:_MOST_PRUNED]:
+        for effect in pair.effects:
+            known = better.get((effect.name,))
+            if known is not None and known.error_over_noise <= _TIE * pair.error_over_noise:
+                continue
+            structure = context.simplest((effect,)) if known is None else known.fit.structure
+            free = tuple(context.free_parameters(structure)) if known is None else known.fit.free
+            values = {
+                **(known or pair).fit.values,
+                **dict(structure.fixed),
+                **carried_over(pair.fit.values, pair.fit.structure, structure),
+            }
+            start = replace((known or pair).fit, values={name: values[name] for name in structure.names})
+            alone = followed(
+                context, FirstLook((effect,), structure, free, (start,), float("inf")), promising=True
+            )
+            # One that was left out of the singles, as another said the same, comes back only where it is all that is needed.
+            if alone.error_over_noise <= (
+                _TIE * pair.error_over_noise if known is None else known.error_over_noise / _TIE
+            ):
+                better[alone.names] = alone
+    return list(better.values())
+
+
+def _more_general(
+    context: FitContext,
+    pair: Scored,
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    known: Sequence[Scored],
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return the pairs in which an effect that contains one of the pair's stands in its place, fitted from there.
+
+    Beside another effect a simpler relative may lead at a first look, as it has fewer numbers to find.
+    """
+    alone = {model.names[0]: model for model in singles}
+    swaps = []
+    for member, other in (pair.effects, pair.effects[::-1]):
+        if other.name in alone:
+            swaps += [
+                (other, child, member)
+                for child in context.offered(effects)
+                if member.name in child.parents
+                and child != other
+                and not is_among(known, {*alone[other.name].names, child.name})
+            ]
+    if prepare is not None:
+        prepare([context.simplest((other, child)) for other, child, _ in swaps])
+
+    def one(swap: tuple[Effect, Effect, Effect]) -> Scored:
+        other, child, member = swap
+        look = look_at(
+            context,
+            (other, child),
+            alone[other.name].fit,
+            {member.name: pair.fit},
+            substeps=pair.fit.substeps,
+        )
+        (wide,) = widened(context, [look], substeps=pair.fit.substeps)
+        return followed(context, wide, promising=wide.cost <= pair.fit.cost, finish=False)
+
+    return list(context.threads.side_by_side(one, swaps))
+
+
+def _alike(one: Scored, other: Scored) -> bool:
+    """Return True if one is a special or limiting case of the other: what is missing beside them is the same."""
+    parents = {name for model in (one, other) for effect in model.effects for name in effect.parents}
+    return bool(parents & {*one.names, *other.names})

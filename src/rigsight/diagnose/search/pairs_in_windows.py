@@ -1,0 +1,63 @@
+"""Which two effects together explain a motion in which chance has a part?
+
+Whole records cannot tell: not even the true pair follows one to its end, and a fit to them may stop far from it. So the nearest
+pairs are looked at in short pieces of the liveliest stretches, from the starts of both effects, and fitted in windows of a few
+cycles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.first_look import looked_from
+from rigsight.diagnose.search.sensitive_motion import scored_in_windows
+from rigsight.diagnose.search.starts import start_values
+
+_MOST_FITTED = 3
+"""Pairs that are fitted in windows: those nearest to the whole records, which the true one still is; an assumption."""
+
+
+def pairs_in_windows(
+    context: FitContext, windows: FitContext, reidentified: Scored, pairs: Sequence[Scored]
+) -> list[Scored]:
+    """Return the nearest pairs, fitted and scored in windows.
+
+    Parameters
+    ----------
+    bench
+        Whole records, scales and noise.
+    windows
+        The same cut into windows.
+    linear
+        The re-identified equations on whole records.
+    pairs
+        Fitted to whole records; models of more effects are left out.
+    """
+    of_two = [pair for pair in pairs if len(pair.effects) == 2]
+    nearest = sorted(of_two, key=lambda pair: pair.error_over_noise)[:_MOST_FITTED]
+
+    def one(pair: Scored) -> Scored:
+        return _fitted(context, windows, reidentified, pair)
+
+    return list(context.threads.side_by_side(one, nearest))
+
+
+def _fitted(context: FitContext, windows: FitContext, reidentified: Scored, pair: Scored) -> Scored:
+    structure = pair.fit.structure
+    first, second = pair.effects
+    alone = context.simplest((first,))
+    bases = [
+        replace(reidentified.fit, structure=alone, values=values)
+        for values in start_values(context, alone, first, reidentified.fit, {})
+    ]
+    starts = [start for base in bases for start in start_values(context, structure, second, base, {})]
+    look = looked_from(context, pair.effects, structure, starts)
+    problem = windows.problem(structure, windows.estimation)
+    fits = [problem.fit_windows(fit.values, pair.fit.free) for fit in (pair.fit, *look.fits)]
+    usable = [fit for fit in fits if fit.residuals]
+    if not usable:
+        return pair.not_simulated()
+    best = min(usable, key=lambda fit: fit.cost)
+    return scored_in_windows(windows, replace(pair, fit=best), best.values)

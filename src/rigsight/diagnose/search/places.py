@@ -1,0 +1,109 @@
+"""Which places of a rig, and which effects, are worth the fits? Those whose push takes nearly as much away as the best one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.screening import Lineup, Suspect
+from rigsight.effects import Effect
+
+_WORTH_LOOKING = 0.5
+"""Share of what the best place, or the best effect, takes away from which another one is looked at.
+
+An assumption, made before 80 drive trains were drawn (experiments/places): a push has the form of a start and not of the fit, so
+that the true place of a large gap may come second. The same number serves for effects on rigs with one motion.
+"""
+
+
+@dataclass(frozen=True)
+class SuspectedPlace:
+    """A joint, drive or sensor, and the share of the squared residual that the best push there takes away."""
+
+    name: str
+    share: float
+    looked_at: bool
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where to look, and for which effects.
+
+    Attributes
+    ----------
+    places
+        All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
+    effects
+        Candidates that are looked at.
+    most
+        Largest share of the squared remainder that a push takes away.
+    starts
+        Own values of an effect with which its push takes most away, by its name.
+    others
+        The rest, for a gap that none of these explains.
+    """
+
+    places: tuple[SuspectedPlace, ...]
+    effects: tuple[Effect, ...]
+    most: float
+    starts: Mapping[str, Mapping[str, float]]
+    others: tuple[Effect, ...] = ()
+
+
+def search_places(context: FitContext, model: Scored, effects: Sequence[Effect]) -> Search:
+    """Return the places at which what a model leaves may arise, on a rig with one motion the effects that may make it.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    model
+        The equations that leave something, fitted.
+    effects
+        Candidates at their places.
+    """
+    # What pulsates by itself goes with no motion, so that no push along one tells of it; what comes back with the position has
+    # another form at every wave number.
+    pushing = [effect for effect in effects if not _stands_for_itself(effect)]
+    # One mass shows in seconds what goes with its motion; what tells joints apart may stand in one of the records.
+    suspects = Lineup(context, model, liveliest=context.rig.has_one_motion).suspects(pushing)
+    most = max((suspect.share for suspect in suspects), default=0.0)
+    starts = {suspect.effect.name: suspect.values for suspect in suspects if suspect.values}
+    if context.rig.has_one_motion:
+        promising = _promising(effects, suspects)
+        return Search(
+            (), promising, most, starts, tuple(effect for effect in effects if effect not in promising)
+        )
+    shares = _by_place(context, suspects)
+    places = sorted(
+        (SuspectedPlace(name, share, share >= _WORTH_LOOKING * most) for name, share in shares.items()),
+        key=lambda place: -place.share,
+    )
+    looked_at = {place.name for place in places if place.looked_at}
+    first = [e for e in effects if _stands_for_itself(e) or context.rig.acts_at(e) in looked_at]
+    return Search(
+        tuple(places), tuple(first), most, starts, tuple(effect for effect in effects if effect not in first)
+    )
+
+
+def _promising(effects: Sequence[Effect], suspects: Sequence[Suspect]) -> tuple[Effect, ...]:
+    """Return the effects whose push takes away enough, those that no push tells of, and the simpler ones that they start from."""
+    shares = {suspect.effect.name: suspect.share for suspect in suspects}
+    enough = _WORTH_LOOKING * max(shares.values(), default=0.0)
+    found = [effect for effect in effects if shares.get(effect.name, enough) >= enough]
+    parents = {name for effect in found for name in effect.parents}
+    return tuple(effect for effect in effects if effect in found or effect.name in parents)
+
+
+def _stands_for_itself(effect: Effect) -> bool:
+    """Return True for what pulsates by itself, comes back with the position, or is no push at a joint, a drive or a sensor."""
+    return effect.pulsation is not None or effect.wave_number is not None or effect.lateral is not None
+
+
+def _by_place(context: FitContext, suspects: Sequence[Suspect]) -> dict[str, float]:
+    shares: dict[str, float] = {}
+    for suspect in suspects:
+        place = context.rig.acts_at(suspect.effect)
+        shares[place] = max(shares.get(place, 0.0), suspect.share)
+    return shares

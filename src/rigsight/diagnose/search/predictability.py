@@ -1,0 +1,116 @@
+"""Can the motion be predicted from the input for as long as the records last?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.errors import SimulationError
+from rigsight.records.plausibility import is_constant
+from rigsight.records.record import Record
+from rigsight.simulate import parameter_vector, record_input, record_values, simulate_outputs
+
+PREDICTABLE = 3.0
+"""Growth of a disturbance, beside what it does to the linear rig, up to which free run is a fair test; an assumption."""
+_ACCURACY = 1e-5
+_DRAWS = 4
+
+
+def growth_of_disturbances(
+    context: FitContext, reidentified: Scored, model: Scored, rng: np.random.Generator
+) -> float:
+    """Return what disturbances do to a model that would change the linear equations' motion by the noise floor.
+
+    Play and stops make another motion of a small change now and then; then even the true model leaves much of a whole record,
+    whatever its first state.
+
+    Parameters
+    ----------
+    bench
+        Records and noise.
+    linear
+        The equations without an effect.
+    model
+        The model in question.
+    rng
+        Source of the disturbances, white up to the natural frequency.
+
+    Returns
+    -------
+    The largest RMS change over a scored record, in units of the noise floor; 1 for the linear equations, 0 where a model cannot
+    be simulated. On a rig with one motion that of the leading output counts; on any other each input is disturbed in turn, and
+    the output that changes most counts.
+    """
+    rig = context.rig
+    if not rig.is_driven or not rig.inputs:
+        return 0.0
+    moving = {} if rig.has_one_motion else _sizes_of_inputs(context)
+    sizes = moving or {rig.inputs[0].name: context.scales["input"]}
+    largest = 0.0
+    for index in range(len(context.scoring)):
+        for source in list(sizes) * math.ceil(_DRAWS / len(sizes)):
+            try:
+                grown = _growth(context, reidentified, model, index, source, sizes[source], rng)
+            except SimulationError:
+                return 0.0
+            largest = max(largest, grown)
+    return largest
+
+
+def _sizes_of_inputs(context: FitContext) -> dict[str, float]:
+    """Return the spread of each input that moves."""
+    shown = {s.name: np.concatenate([r[s.name] for r in context.records]) for s in context.rig.inputs}
+    return {name: float(np.std(samples)) for name, samples in shown.items() if not is_constant(samples)}
+
+
+def _growth(
+    context: FitContext,
+    reidentified: Scored,
+    model: Scored,
+    index: int,
+    source: str,
+    size: float,
+    rng: np.random.Generator,
+) -> float:
+    rig, record = context.rig, context.scoring[index]
+    seen = [signal.name for signal in rig.outputs if signal.name in record]
+    if rig.has_one_motion:
+        seen = [leading_output(rig, [record])]
+    floors = np.array([context.noise[s.name] if s.name in seen else np.inf for s in rig.outputs])
+    pole = np.exp(-record.dt / context.scales["time"])
+    disturbance = lfilter([1.0 - pole], [1.0, -pole], rng.standard_normal(record.n_samples))
+    disturbance *= 1e-3 * size / float(np.std(disturbance))
+    through = _change(reidentified, index, record, source, disturbance, floors)
+    if through == 0.0:
+        return 0.0  # an input that this record's sensors do not see
+    return _change(model, index, record, source, disturbance / through, floors)
+
+
+def _change(
+    model: Scored,
+    index: int,
+    record: Record,
+    source: str,
+    disturbance: NDArray[np.float64],
+    floors: NDArray[np.float64],
+) -> float:
+    """Return the largest RMS change, in noise floors of the outputs, that a disturbance beside an input makes."""
+    structure = model.fit.structure
+    p = parameter_vector(structure, record_values(structure, model.fit.values, record))
+    calm, disturbed = (
+        simulate_outputs(
+            structure,
+            record_input(structure, record.with_signals(**{source: record[source] + extra})),
+            p,
+            model.initial_states[index],
+            record.n_samples,
+            _ACCURACY,
+        )
+        for extra in (0.0, disturbance)
+    )
+    return float(np.max(np.sqrt(np.mean((disturbed - calm) ** 2, axis=0)) / floors))

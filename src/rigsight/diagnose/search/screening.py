@@ -1,0 +1,269 @@
+"""Where, before which: how much of what the equations leave would each effect at each place take away?
+
+Each effect is simulated by itself, from each of its declared starts, along the motion that the records show. The force, the drive
+or the reading that comes out is a known push on the re-identified equations at its place. Of these pushes those that go best with
+what the equations leave, to first order, are fitted: their size, the rig's parameters and the initial states move, no more. One
+kernel serves all of them, and nothing of a candidate but its law alone is compiled.
+
+References
+----------
+L. Ljung, *System Identification* (Prentice Hall 1999), section 16.4, for judging extensions of a model by what goes with its
+residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.pushes.answers import Answers
+from rigsight.diagnose.pushes.probes import (
+    PUSH_SIZE,
+    STIFFNESS,
+    alone,
+    load_columns,
+    motion_columns,
+    push,
+    way_columns,
+    with_probes,
+)
+from rigsight.diagnose.search.starts import sized, start_values
+from rigsight.effects import Effect, Place, kind_of, placed_dimension
+from rigsight.effects import symbols as canonical
+from rigsight.identify import FitResult
+from rigsight.records.record import Record
+from rigsight.rigs import Rig, evaluated, joint_of
+from rigsight.simulate import Structure, Substeps, compose, record_input, simulate_sets
+from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.units import characteristic_value
+
+Floats = NDArray[np.float64]
+
+_SMALL = 0.1
+"""Size of a push whose answer is taken to be proportional to it, in units of what the effect itself would be."""
+_WIDER = (1.0 / 3.0, 1.0, 3.0)
+"""Factors on an effect's inner numbers beside its declared starts: a fit would move on from these, a push cannot."""
+_FEW = 4
+"""Declared starts up to which the wider ones are tried: more of them span their range by themselves."""
+_FITTED = 2
+"""Pushes of each effect that are fitted, of all its starts."""
+_EVALUATIONS = 6
+_TOLERANCE = 1e-3
+_SUBSTEPS = 4
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect at a place, and the share of the squared residual that a push of its form takes away.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    share
+        What the best of its pushes takes away.
+    values
+        Values of its own parameters that make a push of that form and size; empty where there are none.
+    """
+
+    effect: Effect
+    share: float
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+class Lineup:
+    """The re-identified equations along the records, and what pushes at every place do to them.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    model
+        The equations that leave something, fitted.
+    liveliest
+        Look along the liveliest stretches of the records alone.
+    """
+
+    def __init__(self, context: FitContext, model: Scored, liveliest: bool = False) -> None:
+        records, fit = context.estimation, model.fit
+        if liveliest:
+            in_stretches = context.problem(fit.structure, context.look).fit(fit.values, [])
+            if in_stretches.residuals:
+                records, fit = context.look, in_stretches
+        self._free = model.fit.free
+        self._answers = Answers(context, records, fit, model.effects, self._free)
+        self._context = replace(self._answers.context, scales=self._answers.scales)
+        self._fit = fit
+        self._cost = fit.cost
+        if liveliest:
+            # Numbers that suit all records need not suit stretches of them: what other numbers take away no push may claim.
+            self._cost = min(self._cost, self._pushed(self._answers.records, self._free, 0.0).cost)
+        # Known before threads ask for them side by side.
+        _ = self._answers.left, self._answers.motions
+
+    def suspects(self, effects: Sequence[Effect]) -> list[Suspect]:
+        """Return what each effect takes away, in their order."""
+        return list(self._context.threads.side_by_side(self._suspect, list(effects)))
+
+    def _suspect(self, effect: Effect) -> Suspect:
+        place = self._context.rig.acts_at(effect)
+        formed = self._signals(effect)
+        pushes = [[self._signed(place, signal) for signal in signals] for _, signals in formed]
+        answers = [self._answers.to_push(place, signals, _SMALL) for signals in pushes]
+        columns = self._answers.without_free(np.column_stack(answers)) if answers else np.zeros((1, 0))
+        size = np.einsum("ij,ij->j", columns, columns)
+        usable = np.flatnonzero(np.isfinite(size) & (size > 0.0))
+        along = {int(i): float(columns[:, i] @ self._answers.left) for i in usable}
+        best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[:_FITTED]
+        found = [(*self._fitted_share(place, pushes[i], along[i] / size[i]), formed[i][0]) for i in best]
+        share, factor, own = max(found, key=lambda one: one[0], default=(0.0, 0.0, {}))
+        return Suspect(effect, share, _sized(effect, own, factor))
+
+    def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> tuple[float, float]:
+        """Return the share of the cost that goes when a push of this form, the parameters and the initial states are fitted.
+
+        With it the size of the push.
+        """
+        records = [
+            record.with_signals(**{push(place): signal})
+            for record, signal in zip(self._answers.records, signals, strict=True)
+        ]
+        fit = self._pushed(records, [*self._free, PUSH_SIZE], push_size)
+        share = max(0.0, 1.0 - fit.cost / self._cost) if np.isfinite(fit.cost) else 0.0
+        return share, fit.values[PUSH_SIZE]
+
+    def _pushed(self, records: Sequence[Record], free: Sequence[str], push_size: float) -> FitResult:
+        return self._context.problem(self._answers.structure, records).fit(
+            {**self._answers.values, PUSH_SIZE: push_size},
+            free,
+            self._answers.fitted_states,
+            _EVALUATIONS,
+            _TOLERANCE,
+            False,
+            self._fit.substeps,
+        )
+
+    def _signals(self, effect: Effect) -> list[tuple[dict[str, float], list[Floats]]]:
+        """Return what an effect by itself adds along each record, from each of its starts, with its own values there."""
+        place = self._context.rig.acts_at(effect)
+        if _is_late(effect):
+            (delay,) = effect.parameters
+            return [({delay.name: time}, self._late(place, time)) for time in self._times(effect)]
+        structure, column = alone(effect)
+        of_joint = STIFFNESS in structure.names
+        starts = self._starts(effect)
+        p = np.array([[start[name] for name in structure.names] for start in starts]).T
+        x0 = np.zeros((max(1, len(structure.states)), p.shape[1]))
+        found: list[list[Floats]] = [[] for _ in starts]
+        for i, (record, seen) in enumerate(
+            zip(self._answers.records, self._answers.seen(place), strict=True)
+        ):
+            signals = (seen, *self._beside(place, effect, i))
+            named = dict(zip((source.name for source in structure.rig.inputs), signals, strict=True))
+            moved = Record(record.name, record.dt, named, {}, hold=record.hold)
+            held = record_input(structure, moved)
+            with np.errstate(all="ignore"):
+                out = simulate_sets(structure, held, p, x0, record.n_samples, Substeps(_SUBSTEPS))[:, column]
+            without = (
+                smooth_motion(seen, record.dt)[0][:, None] * p[structure.names.index(STIFFNESS)]
+                if of_joint
+                else seen[:, None]
+            )
+            for own, added in zip(found, (out - without).T, strict=True):
+                own.append(added)
+        return [
+            (own, signals)
+            for own, signals in zip(starts, found, strict=True)
+            if all(np.all(np.isfinite(added)) for added in signals)
+        ]
+
+    def _beside(self, place: str, effect: Effect, index: int) -> list[Floats]:
+        """Return what else an effect sees: the load of its joint, the way along which its drive pushes."""
+        rig, out = self._context.rig, self._answers.calm_outputs[index]
+        if effect.place is Place.ACTUATOR and effect.reads(canonical.v):
+            return [out[:, way_columns(rig)[place]]]
+        return [out[:, load_columns(rig)[place]]] if effect.reads(canonical.load) else []
+
+    def _starts(self, effect: Effect) -> list[dict[str, float]]:
+        """Return values of the effect's own parameters from which it is worth trying, with the stiffness of its joint."""
+        context = self._context
+        composed = context.simplest((effect,))
+        declared = [
+            composed.values_of(effect, start)
+            for start in start_values(context, composed, effect, self._fit, {})
+        ]
+        stiffness = evaluated(joint_of(context.rig, effect).stiffness, self._answers.values)
+        inner = [p.name for p in effect.parameters if p.fitted and p.null is None]
+        return [
+            {
+                **own,
+                **effect.special_cases,
+                **{n: factor * own[n] for n in inner if n in own},
+                STIFFNESS: stiffness,
+            }
+            for own in declared
+            for factor in (_WIDER if inner and len(declared) <= _FEW else (1.0,))
+        ]
+
+    def _times(self, effect: Effect) -> list[float]:
+        (delay,) = effect.parameters
+        size = characteristic_value(placed_dimension(effect, delay.dimension), self._context.scales)
+        return [size * start for start in delay.starts]
+
+    def _late(self, place: str, time: float) -> list[Floats]:
+        found = []
+        for record, seen in zip(self._answers.records, self._answers.seen(place), strict=True):
+            t = record.dt * np.arange(record.n_samples)
+            found.append(np.interp(t - time, t, seen) - seen)
+        return found
+
+    def _signed(self, place: str, signal: Floats) -> Floats:
+        """Return a signal as a push: what an effect adds at a joint resists the motion."""
+        return -signal if place in motion_columns(self._context.rig) else signal
+
+
+def _sized(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
+    """Return own values of an effect that makes so many times the push; as they are where that is no size it could have.
+
+    Where an effect is absent at a value of a parameter, its force grows with the distance from there.
+    """
+    values = {p.name: own[p.name] for p in effect.parameters if p.fitted and p.name in own}
+    if not factor > 0.0:
+        return values
+    nulls = effect.null_values()
+    return {
+        name: sized(value, nulls[name], factor) if name in nulls else value for name, value in values.items()
+    }
+
+
+def structures_of_lineup(
+    rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
+) -> list[Structure]:
+    """Return what is simulated to find the place of an effect, each once.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    effects
+        Candidates at their places.
+    modelled
+        Effects that the simulation has already.
+    """
+    by_themselves = {
+        kind_of(effect.name): alone(effect)[0]
+        for effect in effects
+        if effect.pulsation is None
+        and effect.wave_number is None
+        and effect.lateral is None
+        and not _is_late(effect)
+    }
+    return [compose(with_probes(rig), modelled), *by_themselves.values()]
+
+
+def _is_late(effect: Effect) -> bool:
+    return effect.delay is not None or effect.measured_late is not None

@@ -1,0 +1,147 @@
+"""Which effect explains a motion in which chance has a part, looked at a few cycles at a time?
+
+Where a disturbance no larger than the noise makes another motion in the end, not even the true model follows a whole record.
+In windows of a few cycles, each with its own initial state, it does, and a wrong one does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.search.starts import start_values
+
+_AS_NEAR = 1.5
+_MOST_ASKED = 4
+"""Models that are asked how predictable the motion is: so many, with held-out errors within this factor of the best.
+
+An assumption, like the numbers below: two drawn rigs with play are all that was looked at.
+"""
+_MOST_FITTED = 4
+"""Models that are fitted in windows: those nearest to the whole records, which a true one still is."""
+_SMALLER = (1.0, 0.3)
+"""Factors on the declared starts of an effect: too large a play sticks where a small one would not."""
+_GLIMPSED = 3
+"""Every so many windows are read at a first glance."""
+_BY_CHANCE = 0.5
+"""Share of what a model leaves from which chance may be what it lacks: below, something else leaves most of it."""
+_GLIMPSE_EVALUATIONS = 10
+_MOST_STARTS = 2
+
+
+def is_predictable(
+    context: FitContext,
+    reidentified: Scored,
+    models: Sequence[Scored],
+    at_floor: float,
+    rng: np.random.Generator,
+) -> bool:
+    """Return False if no model explains the records and in a near one chance has a part in the motion.
+
+    Parameters
+    ----------
+    bench, linear
+        Whole records, and the re-identified equations on them.
+    models
+        Candidates, fitted and scored.
+    at_floor
+        Held-out error in units of the noise floor at which the records count as explained.
+    rng
+        Source of the disturbances.
+    """
+    usable = _nearest(models)
+    if not usable or usable[0].error_over_noise <= at_floor:
+        return True
+    near = [model for model in usable if model.error_over_noise <= _AS_NEAR * usable[0].error_over_noise][
+        :_MOST_ASKED
+    ]
+    # What chance makes of a disturbance can be no more than a part of what is left, where much more is left.
+    return all(
+        growth_of_disturbances(context, reidentified, model, rng)
+        <= max(PREDICTABLE, _BY_CHANCE * model.error_over_noise)
+        for model in near
+    )
+
+
+def fitted_in_windows(context: FitContext, reidentified: Scored, singles: Sequence[Scored]) -> list[Scored]:
+    """Fit the nearest models in windows; the others are only scored there, with the numbers that they have.
+
+    Parameters
+    ----------
+    bench
+        Records cut into windows, scales and noise.
+    linear
+        The re-identified equations.
+    singles
+        Every effect alone, fitted to whole records.
+    """
+    nearest = {model.names for model in _nearest(singles)[:_MOST_FITTED]}
+
+    def one(model: Scored) -> Scored:
+        if not model.residuals:
+            return model
+        return _fitted(context, reidentified, model) if model.names in nearest else _scored(context, model)
+
+    return list(context.threads.side_by_side(one, singles))
+
+
+def _nearest(singles: Sequence[Scored]) -> list[Scored]:
+    usable = (model for model in singles if model.residuals and np.isfinite(model.error_over_noise))
+    return sorted(usable, key=lambda model: model.error_over_noise)
+
+
+def _fitted(context: FitContext, reidentified: Scored, model: Scored) -> Scored:
+    structure, free = model.fit.structure, model.fit.free
+    (effect,) = model.effects
+    own = [structure.parameter_name(effect, p.name) for p in effect.parameters if p.null == 0.0]
+    declared = list(start_values(context, structure, effect, reidentified.fit, {}))
+    starts = [
+        model.fit.values,
+        *({**s, **{n: f * s[n] for n in own if n in free}} for s in declared for f in _SMALLER),
+    ]
+    few = context.problem(structure, context.estimation[::_GLIMPSED])
+    glimpses = sorted(
+        (few.fit_windows(start, free, _GLIMPSE_EVALUATIONS, most_rounds=1) for start in starts),
+        key=lambda fit: fit.cost,
+    )
+    problem = context.problem(structure, context.estimation)
+    fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[:_MOST_STARTS]]
+    usable = [fit for fit in fits if fit.residuals]
+    if not usable:
+        return model.not_simulated()
+    best = min(usable, key=lambda fit: fit.cost)
+    return scored_in_windows(context, replace(model, fit=best), best.values)
+
+
+def _scored(context: FitContext, model: Scored) -> Scored:
+    structure = model.fit.structure
+    there = context.problem(structure, context.estimation).fit_windows(model.fit.values, ())
+    fit = replace(
+        model.fit,
+        residuals=there.residuals,
+        initial_states=there.initial_states,
+        cost=there.cost,
+        substeps=there.substeps,
+    )
+    return scored_in_windows(context, replace(model, fit=fit), fit.values)
+
+
+def scored_in_windows(context: FitContext, model: Scored, values: Mapping[str, float]) -> Scored:
+    """Return a model scored on the windows that judge, with these numbers and the initial states that suit them.
+
+    Parameters
+    ----------
+    bench
+        Records cut into windows, scales and noise.
+    model
+        Gives the equations.
+    values
+        All parameters.
+    """
+    result = context.problem(model.fit.structure, context.scoring).fit_windows(values, ())
+    error_over_noise = result.weighted_rms if result.residuals else float("inf")
+    return replace(model, held_out=result, error_over_noise=error_over_noise)

@@ -1,0 +1,192 @@
+"""From which values the fit of a candidate is started: its own guesses, and the fits of simpler effects."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+
+import sympy as sp
+
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.diagnose.search.persistent_line import persistent_line
+from rigsight.diagnose.search.waves import wave_starts
+from rigsight.effects import Effect, placed_dimension
+from rigsight.effects import symbols as canonical
+from rigsight.identify import FitResult
+from rigsight.rigs import Rig, evaluated, joint_of
+from rigsight.simulate import Structure, carried_over
+from rigsight.units import characteristic_value
+
+_ENDLESS = 1e100
+"""Null values from here on stand for infinity."""
+
+
+def start_values(
+    context: FitContext,
+    structure: Structure,
+    effect: Effect,
+    base: FitResult,
+    parents: Mapping[str, FitResult],
+) -> Iterator[dict[str, float]]:
+    """Yield values of all parameters from which a fit with `effect` is worth trying.
+
+    Parameters
+    ----------
+    bench
+        Gives the characteristic sizes.
+    structure
+        The equations with `effect`.
+    effect
+        The effect to add.
+    base
+        Fit without it.
+    parents
+        Fits with a simpler effect in its place, by name of that effect.
+    """
+    starts = list(_plain_starts(context, structure, effect, base, parents))
+    if effect.wave_number is not None:
+        waves = [with_own_values(structure, effect, base, own) for own in wave_starts(context, effect, base)]
+        yield from waves or starts
+        return
+    yield from starts
+    line = _line(context, base) if effect.pulsation is not None else None
+    if line is not None:
+        yield {**starts[0], structure.parameter_name(effect, str(effect.pulsation)): line}
+
+
+def _line(context: FitContext, base: FitResult) -> float | None:
+    if len(base.residuals) != len(context.estimation):
+        return None
+    output = leading_output(context.rig, context.estimation)
+    column = [signal.name for signal in context.rig.outputs].index(output)
+    seen = [
+        (residual[:, column], record.dt)
+        for residual, record in zip(base.residuals, context.estimation, strict=True)
+        if output in record
+    ]
+    return persistent_line([residual for residual, _ in seen], [dt for _, dt in seen])
+
+
+def _plain_starts(
+    context: FitContext,
+    structure: Structure,
+    effect: Effect,
+    base: FitResult,
+    parents: Mapping[str, FitResult],
+) -> Iterator[dict[str, float]]:
+    fitted = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
+    rest = {p.name: p.default for p in effect.parameters if p not in fitted and p.default is not None}
+    rest |= {
+        p.name: p.held_at(characteristic_value(placed_dimension(effect, p.dimension), context.scales))
+        for p in effect.parameters
+        if not p.fitted
+    }
+    if effect.starts:
+        for start in effect.starts:
+            origin = base if start.parent is None else parents.get(start.parent)
+            if origin is not None and start.parent != effect.name:
+                own = _evaluated(context, effect, start.values, _known(origin, start.parent))
+                yield with_own_values(structure, effect, origin, {**rest, **own})
+        return
+    sizes = [characteristic_value(placed_dimension(effect, p.dimension), context.scales) for p in fitted]
+    for combination in itertools.product(*(p.starts for p in fitted)):
+        own = {p.name: c * size for p, c, size in zip(fitted, combination, sizes, strict=True)}
+        yield with_own_values(structure, effect, base, {**rest, **own})
+
+
+def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iterator[dict[str, float]]:
+    """Yield values from which a fit with `effect` is worth trying once more, where it may have stopped beside the best one.
+
+    Parameters
+    ----------
+    structure
+        Equations of the fit.
+    effect
+        One of its effects.
+    fit
+        Where it stopped.
+    """
+    own = structure.values_of(effect, fit.values)
+    for start in effect.starts:
+        if start.parent == effect.name:
+            moved = {name: evaluated(formula, own) for name, formula in start.values.items()}
+            yield with_own_values(structure, effect, fit, moved)
+
+
+def with_own_values(
+    structure: Structure, effect: Effect, origin: FitResult, own: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the values of a fit for a structure with an effect more, with own values of that effect and of the rig."""
+    names = {p.name: structure.parameter_name(effect, p.name) for p in effect.parameters}
+    return {
+        **carried_over(origin.values, origin.structure, structure),
+        **{names.get(name, name): value for name, value in own.items()},
+    }
+
+
+def sized(value: float, null: float, factor: float) -> float:
+    """Return a value of a parameter that makes its effect so many times as large as another one.
+
+    Parameters
+    ----------
+    value
+        The other one.
+    null
+        Where the effect is absent.
+    factor
+        Positive.
+    """
+    return null + factor * (value - null) if abs(null) < _ENDLESS else value / factor
+
+
+def _known(origin: FitResult, parent: str | None) -> dict[str, float]:
+    """Return the values that a start's formulas may use: the rig's, and the parent effect's by their own names."""
+    values = dict(origin.values)
+    for effect in origin.structure.effects:
+        if effect.name == parent:
+            values |= origin.structure.values_of(effect, origin.values)
+    return values
+
+
+def _evaluated(
+    context: FitContext, effect: Effect, formulas: Mapping[str, sp.Expr], values: Mapping[str, float]
+) -> dict[str, float]:
+    joint = joint_of(context.rig, effect)
+    sizes = {
+        base: characteristic_value(placed_dimension(effect, base), context.scales)
+        for base in ("drive", "input", "x", "time")
+    }
+    numbers = {
+        canonical.k: evaluated(joint.stiffness, values),
+        canonical.drive_size: sizes["drive"],
+        canonical.input_size: sizes["input"],
+        canonical.x_size: sizes["x"],
+        canonical.v_size: sizes["x"] / sizes["time"],
+        canonical.time_size: sizes["time"],
+    }
+    mechanism = context.rig.mechanism
+    # Of an inertia that changes with the motion its size will do: that where all coordinates are zero.
+    at_zero = {**dict.fromkeys(_moving(context.rig), 0.0), **values}
+    if joint.inertia is None and not mechanism.has_short_inverse:
+        moved = mechanism.inertia_at(joint.motion, at_zero)
+        if moved is not None:
+            numbers[canonical.m] = moved
+    else:
+        inertia = joint.inertia if joint.inertia is not None else mechanism.inertia_along(joint.motion)
+        if inertia is not None:
+            numbers[canonical.m] = evaluated(inertia, at_zero)
+    result = {}
+    for name, formula in formulas.items():
+        own = {s: values[s.name] for s in formula.free_symbols if s not in numbers}
+        value = float(formula.subs({**numbers, **own}))
+        if name != "k":
+            result[name] = value
+        elif isinstance(joint.stiffness, sp.Symbol):
+            # A stiffness that several parameters make keeps the values that they have.
+            result[str(joint.stiffness.name)] = value
+    return result
+
+
+def _moving(rig: Rig) -> list[str]:
+    return [coordinate.name for coordinate in rig.mechanism.coordinates]

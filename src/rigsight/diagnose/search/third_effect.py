@@ -1,0 +1,142 @@
+"""Does a third effect explain what the best two leave?
+
+Only where some push takes the larger part of that away, and more than another form of one of the two would.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.first_look import FirstLook
+from rigsight.diagnose.search.one_law import are_one_law
+from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
+from rigsight.diagnose.search.single_effects import finished, followed, refine
+from rigsight.diagnose.verdict.judgement import WORTHWHILE
+from rigsight.diagnose.verdict.main_cause import LARGER_PART
+from rigsight.effects import Effect
+from rigsight.simulate import carried_over
+
+IN_ITS_PLACE = 1.5
+"""Effects whose held-out error alone is within this factor of that of another one are tried in its place."""
+_MOST_FINISHED = 2
+
+
+def with_a_third(
+    context: FitContext,
+    singles: Sequence[Scored],
+    pairs: Sequence[Scored],
+    effects: Sequence[Effect],
+    at_floor: float,
+    forms: OtherForms,
+    prepare: Prepare | None = None,
+) -> list[Scored]:
+    """Return models of three effects, grown from the best pair, fitted and scored.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    singles, pairs
+        Fitted and scored.
+    effects
+        Candidates for the third place.
+    at_floor
+        Held-out error in units of the noise floor at which nothing is left to explain.
+    forms
+        Says what other forms of the two would explain.
+    prepare
+        Called with the structures that are about to be looked at, to compile them side by side.
+    """
+    best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
+    alone = min((model.error_over_noise for model in singles), default=np.inf)
+    if best is None or best.error_over_noise <= at_floor or not best.error_over_noise * WORTHWHILE < alone:
+        return []
+    least = max(LARGER_PART, forms.share(best))
+    found = with_one_more(context, best, effects, [], singles, prepare, least_share=least)
+    return _finished(context, found)
+
+
+def with_relatives(
+    context: FitContext,
+    triples: Sequence[Scored],
+    pairs: Sequence[Scored],
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    prepare: Prepare | None = None,
+) -> tuple[list[Scored], list[Scored]]:
+    """Return the triples with those in which a relative stands for an effect of the best one, and the pairs with their parts.
+
+    Found beside an incomplete model, an effect may be only a relative of the right one, or more general than what is needed.
+
+    Parameters
+    ----------
+    bench
+        Records, scales and noise.
+    triples
+        Fitted and scored.
+    pairs
+        Fitted and scored; parts of the best triples that are missing are fitted too, so that each effect's share can be told.
+    singles
+        Every effect alone, fitted and scored.
+    effects
+        Candidates; those are tried that explain about as much by themselves as the one in whose place they come, and act where it
+        does or are one law with it.
+    prepare
+        Called with the structures that are about to be looked at, to compile them side by side.
+    """
+    alone = {model.names[0]: model.error_over_noise for model in singles}
+
+    def as_good(replaced: Effect, other: Effect) -> bool:
+        near = alone.get(other.name, np.inf) <= IN_ITS_PLACE * alone.get(replaced.name, 0.0)
+        at_its_place = context.rig.acts_at(other) == context.rig.acts_at(replaced)
+        related = at_its_place or are_one_law((replaced, other), context.rig)
+        return near and related and other.name not in replaced.parents
+
+    def plainer(replaced: Effect, other: Effect) -> bool:
+        return other.name in replaced.parents
+
+    found, known = list(triples), list(pairs)
+    for is_tried in (as_good, plainer, as_good):
+        best = min(found, key=lambda model: model.error_over_noise)
+        known += _parts_of(context, best, known)
+        new: list[Scored] = []
+        for replaced in best.effects:
+            pair = next(p for p in known if set(p.names) == set(best.names) - {replaced.name})
+            instead = [effect for effect in effects if is_tried(replaced, effect)]
+            if instead and pair.residuals:
+                new += with_one_more(context, pair, instead, [*found, *new], singles, prepare)
+        found += _finished(context, new)
+    known += _parts_of(context, min(found, key=lambda model: model.error_over_noise), known)
+    return found, known
+
+
+def _finished(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
+    ordered = sorted(models, key=lambda model: model.error_over_noise)
+    best = [finished(context, model) for model in ordered[:_MOST_FINISHED]]
+    return refine(context, [*best, *ordered[_MOST_FINISHED:]])
+
+
+def _parts_of(context: FitContext, triple: Scored, known: Sequence[Scored]) -> list[Scored]:
+    """Return the pairs of effects of a triple that have not been fitted so far, fitted from where they stand in it."""
+
+    def one(effects: tuple[Effect, ...]) -> Scored:
+        structure = context.simplest(effects)
+        values = {**carried_over(triple.fit.values, triple.fit.structure, structure), **dict(structure.fixed)}
+        start = replace(triple.fit, values=values)
+        look = FirstLook(
+            effects, structure, tuple(context.free_parameters(structure)), (start,), float("inf")
+        )
+        return followed(context, look, promising=True, finish=False)
+
+    missing = [
+        two
+        for two in itertools.combinations(triple.effects, 2)
+        if not is_among(known, {effect.name for effect in two})
+    ]
+    return list(context.threads.side_by_side(one, missing))

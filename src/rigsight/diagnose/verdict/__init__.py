@@ -1,0 +1,1 @@
+"""Which model is the cause, how surely, and what does it still leave?"""

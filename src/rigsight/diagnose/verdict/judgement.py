@@ -1,0 +1,142 @@
+"""From scored models to a verdict: none, parameters, effect or unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.verdict.main_cause import MainCause
+
+Verdict = Literal["effect", "parameters", "none", "unknown"]
+
+AT_FLOOR = 1.1
+"""RMS in units of the noise floor that counts as the floor itself: floors are known to a few percent."""
+AT_LOWER_BOUND = 3.0
+"""The same where the floor is only a lower bound: an assumption, white noise is taken to be at least a third of all."""
+WORTHWHILE = 1.1
+"""Factor by which a model must lower the held-out error to be believed to explain anything; an assumption."""
+LEAST_LEFT, MOST_LEFT, _LEFT_OF_GAP = 1.15, 1.6, 0.025
+"""What a named cause may leave of a measured noise floor: a share of the gap, within these RMS in units of the floor.
+
+Assumptions, between what true causes left on 141 blind rigs (up to 1.08 of gaps below 5, 1.14 of larger ones; where a disturbance
+moves a rig with memory more than the resting rig shows, up to 1.44 of a gap of 50) and what relatives of unknown ones left (from
+1.2 of gaps below 5, from 4 of larger ones). A relative of an unknown cause may close 99 % of a large gap and still leaves more.
+"""
+_HALF = 0.5
+"""Share of the re-identified gap that an effect must close to be named where it leaves more than the floor; an assumption."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A verdict with the model that stands for it and the reason in words."""
+
+    verdict: Verdict
+    model: Scored
+    reason: str
+
+
+def most_left(gap: float) -> float:
+    """Return what a named cause may leave, in units of a measured noise floor, of a gap in the same units."""
+    return min(max(LEAST_LEFT, 1.0 + _LEFT_OF_GAP * (gap - 1.0)), MOST_LEFT)
+
+
+def judge(
+    error_before: float,
+    reidentified: Scored,
+    best: Scored,
+    is_adequate: Callable[[Scored], bool],
+    cause: Callable[[], MainCause],
+    lower_bound: bool = False,
+) -> Judgement:
+    """Return the verdict on the held-out errors, all in units of the noise floor.
+
+    Parameters
+    ----------
+    before_excess
+        RMS that the given simulation leaves.
+    linear
+        The re-identified equations.
+    best
+        The best model with an effect.
+    is_adequate
+        Says whether what a model leaves goes with nothing, see `adequacy`.
+    cause
+        Says how much of the gap the best model takes, and what contradicts it.
+    lower_bound
+        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
+        may stand well above it, so that a modest rest which no model lowers is taken for noise.
+    """
+    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
+    helps = best.error_over_noise * WORTHWHILE < reidentified.error_over_noise
+    retuned = reidentified.error_over_noise * WORTHWHILE < error_before
+    needs_effect = helps and reidentified.error_over_noise > AT_FLOOR
+    # Numbers that were fitted to a record like the held-out ones suit them by chance where no numbers suit all records.
+    if not needs_effect and (error_before <= AT_FLOOR or (error_before <= at_floor and not retuned)):
+        return Judgement(
+            "none", reidentified, "The simulation in question leaves no more than the noise floor."
+        )
+    if not needs_effect and reidentified.error_over_noise <= at_floor:
+        if retuned:
+            return Judgement(
+                "parameters", reidentified, "Better numbers for the same equations reach the noise floor."
+            )
+        return Judgement(
+            "none", reidentified, "The gap is too small against the noise floor to have a cause."
+        )
+    if not helps:
+        if not is_adequate(reidentified):
+            return Judgement("unknown", reidentified, "No effect of the catalogue lowers the held-out error.")
+        noisy = (
+            f"What the equations leave, {reidentified.error_over_noise:.3g} times the noise floor, goes with nothing: "
+            "the floor is too low."
+        )
+        if retuned:
+            return Judgement(
+                "parameters", reidentified, f"{noisy} Better numbers explain the rest of the gap."
+            )
+        return Judgement("none", reidentified, noisy)
+    closed = (reidentified.error_over_noise - best.error_over_noise) / (reidentified.error_over_noise - 1.0)
+    floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
+    allowed = AT_LOWER_BOUND if lower_bound else most_left(reidentified.error_over_noise)
+    nearest = f"{', '.join(best.names)} closes {closed:.0%} of the re-identified gap"
+    if best.error_over_noise <= AT_FLOOR:
+        return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
+    if best.error_over_noise <= allowed and closed >= _HALF:
+        return Judgement("effect", best, f"{nearest} and leaves {best.error_over_noise:.3g} times {floor}.")
+    if is_adequate(best):
+        return Judgement(
+            "effect",
+            best,
+            f"{nearest}; the {best.error_over_noise:.3g} times {floor} that it leaves go with nothing, "
+            "so that they count as noise and disturbance.",
+        )
+    taken = cause()
+    if taken.clear:
+        place = " at that place"
+        if taken.equalled_by:
+            place = f". Effects at other places explain the same part of it ({_listed(taken.equalled_by)})"
+        return Judgement(
+            "effect",
+            best,
+            f"{nearest}: the main cause, or its nearest relative{place}. It leaves {best.error_over_noise:.3g} times {floor}, "
+            "which still goes with something.",
+        )
+    if taken.contradicted_by:
+        return Judgement(
+            "unknown",
+            best,
+            f"{nearest}, but effects at other places close as much and explain another part of it "
+            f"({_listed(taken.contradicted_by)}): they contradict each other.",
+        )
+    return Judgement(
+        "unknown",
+        best,
+        f"The best candidate, {', '.join(best.names)}, takes {taken.share:.0%} of the squared gap (at least "
+        f"{taken.at_least:.0%}, 95 %): a main cause must take the larger part.",
+    )
+
+
+def _listed(models: Sequence[Scored]) -> str:
+    return "; ".join(", ".join(model.names) for model in models[:3])

@@ -1,0 +1,106 @@
+"""Does one model surely take the larger part of the gap, and does no other that is as good take another part of it?
+
+Models that act elsewhere contradict each other where they explain different parts of the gap. Where they explain the same part,
+such as a late drive and a late sensor, the cause is known but for its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
+from rigsight.rigs import Rig
+
+LARGER_PART = 0.5
+"""Share of the squared gap above the noise floor: what takes more of it than all else together is the main cause.
+
+It also says whether two models take the same part: the one explains the larger part of what the other does.
+"""
+_SURELY = 0.05
+"""Quantile, over resampled stretches of the records, at which it must still be the larger part."""
+
+
+@dataclass(frozen=True)
+class MainCause:
+    """How much of the re-identified gap a model takes.
+
+    Attributes
+    ----------
+    share
+        Of the squared gap above the noise floor.
+    at_least
+        What it is in all but one of twenty resamplings of the records' stretches.
+    contradicted_by
+        Models that are as good, act at other places and take another part of the gap.
+    equalled_by
+        Models that are as good and act at other places, but take the same part.
+    """
+
+    share: float
+    at_least: float
+    contradicted_by: tuple[Scored, ...] = ()
+    equalled_by: tuple[Scored, ...] = ()
+
+    @property
+    def clear(self) -> bool:
+        """True where the model surely takes the larger part and nothing that is as good contradicts it."""
+        return self.at_least > LARGER_PART and not self.contradicted_by
+
+
+def main_cause(
+    rig: Rig,
+    reidentified: Scored,
+    best: Scored,
+    tied: Sequence[Scored],
+    noise: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> MainCause:
+    """Say how much of what the equations leave a model takes.
+
+    Parameters
+    ----------
+    rig
+        Gives the place of each effect.
+    linear
+        The re-identified equations.
+    best
+        The model with an effect.
+    tied
+        Models whose held-out error cannot be told from that of the best.
+    noise
+        Noise floor of each output, shape (n_outputs,).
+    rng
+        Source of the resampling.
+    """
+    squares = np.column_stack([_blocks(model, noise) for model in (reidentified, best)])
+    draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
+    gap, left = np.moveaxis(np.mean(squares[draws], axis=1), 1, 0)
+    share = _share(*np.mean(squares, axis=0))
+    lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, left, strict=True)], _SURELY))
+    places = {rig.acts_at(effect) for effect in best.effects}
+    elsewhere = [m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects)]
+    same = [m for m in elsewhere if _common_part(reidentified, best, m, noise) > LARGER_PART]
+    other = [m for m in elsewhere if m not in same]
+    return MainCause(share, lowest, tuple(other), tuple(same))
+
+
+def _common_part(reidentified: Scored, one: Scored, other: Scored, noise: NDArray[np.float64]) -> float:
+    """Return the share of what one model explains of the gap that another explains as well, of squares."""
+    explained = differing = 0.0
+    for gap, left, others_left in zip(reidentified.residuals, one.residuals, other.residuals, strict=True):
+        explained += float(np.nansum(((gap - left) / noise) ** 2))
+        differing += float(np.nansum(((others_left - left) / noise) ** 2))
+    return 1.0 - differing / explained if explained > 0.0 else 0.0
+
+
+def _share(gap: float, left: float) -> float:
+    return float((gap - left) / (gap - 1.0)) if gap > 1.0 else 0.0
+
+
+def _blocks(model: Scored, noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    return block_means([np.nanmean((residual / noise) ** 2, axis=1) for residual in model.residuals])

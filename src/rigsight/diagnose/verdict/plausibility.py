@@ -1,0 +1,112 @@
+"""Are the numbers of a fitted model ones that a rig can have, and do the records determine them?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.verdict.ranking import Ranking
+
+_AS_GOOD = 1.5
+"""Held-out error, in units of that of an implausible best model, up to which a plausible one at the same place is preferred.
+
+An assumption: where no form is exact, half as much again is the price of one number more or less.
+"""
+_AT_BOUND = 1e-6
+"""Distance from a bound of the search, relative to it, that counts as standing there."""
+_FAR_OFF = 100.0
+"""Factor by which a number of the rig may change beside an effect before it is told: the effect has then taken its place."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why a number of a fitted model is not believed; `grave` where it counts against the model."""
+
+    text: str
+    grave: bool
+
+
+def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
+    """Return what is implausible about a model's numbers.
+
+    Parameters
+    ----------
+    model
+        Fitted and scored.
+    linear
+        The re-identified equations, whose numbers are those of the rig without an effect.
+    """
+    fit = model.fit
+    parameters = {p.name: p for p in fit.structure.parameters}
+    own = {fit.structure.parameter_name(e, p.name) for e in model.effects for p in e.parameters}
+    found = []
+    if not fit.success:
+        found.append(Doubt("Its fit did not come to an end.", True))
+    unknown = [name for name in fit.free if name in own and not np.isfinite(fit.standard_errors[name])]
+    if unknown:
+        found.append(Doubt(f"The records do not determine {', '.join(unknown)}.", True))
+    for name in fit.free:
+        value, declared = fit.values[name], parameters[name]
+        for bound in (declared.lower, declared.upper):
+            zero = bound == 0.0 and value == 0.0
+            if (
+                bound is not None
+                and np.isfinite(bound)
+                and (zero or abs(value - bound) < _AT_BOUND * abs(bound))
+            ):
+                found.append(Doubt(f"{name} = {value:.3g} stands at the bound of its search.", False))
+        before = reidentified.fit.values.get(name, 0.0)
+        if name not in own and declared.lower >= 0.0 and before > 0.0 and value > 0.0:
+            ratio = value / before
+            if not 1.0 / _FAR_OFF < ratio < _FAR_OFF:
+                found.append(
+                    Doubt(
+                        f"{name} = {value:.3g} where the equations without the effect have {before:.3g}.",
+                        False,
+                    )
+                )
+        if name not in own and declared.lower == 0.0 and value < 0.0:
+            found.append(Doubt(f"{name} = {value:.3g} is negative.", False))
+    return tuple(found)
+
+
+def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:
+    """Return the ranking with a plausible model in front of an implausible one that is hardly better and at the same place.
+
+    Parameters
+    ----------
+    ranking
+        By held-out error.
+    linear
+        The re-identified equations.
+    places
+        Place of each effect by name.
+    """
+    best = ranking.order[0]
+    if not any(doubt.grave for doubt in doubts(best, reidentified)):
+        return ranking
+    at = {places[name] for name in best.names}
+    for index, model in enumerate(ranking.order[1:], start=1):
+        as_good = bool(model.residuals) and model.error_over_noise <= _AS_GOOD * best.error_over_noise
+        same_place = {places[name] for name in model.names} <= at
+        if as_good and same_place and not any(doubt.grave for doubt in doubts(model, reidentified)):
+            return _with_first(ranking, index)
+    return ranking
+
+
+def _with_first(ranking: Ranking, index: int) -> Ranking:
+    """Return the ranking with one model moved to its front, together with the probability of the one that stood there."""
+    order, shares, grounds = list(ranking.order), list(ranking.probabilities), list(ranking.grounds)
+    shares[0], shares[index] = shares[index], shares[0]
+    chosen, share = order.pop(index), shares.pop(index)
+    rivals: Sequence[Scored] = [m for m in ranking.tied if m is not chosen]
+    return replace(
+        ranking,
+        order=(chosen, *order),
+        probabilities=(share, *shares),
+        grounds=(grounds.pop(index), *grounds),
+        tied=(ranking.order[0], *rivals),
+    )

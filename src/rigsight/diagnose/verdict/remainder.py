@@ -1,0 +1,109 @@
+"""What does a named cause leave, how much of the gap is that, and with what does it still go?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.noise.adequacy import Adequacy
+from rigsight.diagnose.pushes.alternatives import BY_RECORD
+from rigsight.diagnose.verdict.main_cause import LARGER_PART
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the model of the verdict leaves above noise and disturbance.
+
+    Attributes
+    ----------
+    share
+        Of the squared gap of the re-identified equations; 0 where it goes with nothing and so counts as noise and disturbance.
+    where
+        Joint, drive or sensor at which it arises; empty where it goes with nothing, or with no place.
+    goes_with
+        Signal, time or record; empty where it goes with nothing.
+    p_value
+        Probability that noise and disturbance alone would agree as well with anything that was looked at.
+    beside_a_cause
+        True where the verdict names one: then what is left is something beside it.
+    """
+
+    share: float
+    where: tuple[str, ...]
+    goes_with: str
+    p_value: float
+    beside_a_cause: bool = True
+
+    @property
+    def text(self) -> str:
+        """The same in one sentence."""
+        if not self.goes_with:
+            return (
+                "What is left goes with no motion, drive, reading, time or record that was looked at "
+                f"(p = {self.p_value:.2g}): it counts as noise and disturbance."
+            )
+        if self.share == 0.0:
+            return (
+                f"What is left is no more than the noise floor, but it still goes with {_in_words(self.goes_with)} "
+                f"(p = {self.p_value:.2g}): numbers may be off by more than their standard errors."
+            )
+        percent = float(f"{100.0 * self.share:.2g}")
+        left = (
+            f"What is left, {percent:g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
+            f"(p = {self.p_value:.2g})"
+        )
+        if self.share > LARGER_PART:
+            return f"{left}: the larger part of the gap is not explained."
+        if not self.beside_a_cause:
+            return f"{left}."
+        return (
+            f"{left}: something smaller is missing too, or the equation has not quite the form of the rig's."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry ``remainder`` of ``diagnosis.json``."""
+        return {
+            "share": self.share,
+            "where": list(self.where),
+            "goes_with": self.goes_with or None,
+            "p_value": self.p_value,
+            "text": self.text,
+        }
+
+
+def _in_words(goes_with: str) -> str:
+    """Return with what a remainder goes as a part of a sentence."""
+    kind, _, what = goes_with.partition(BY_RECORD)
+    return goes_with if kind else f"the record: {what} differs from one to another"
+
+
+def remainder_of(
+    reidentified: Scored, model: Scored, found: Adequacy, lower_bound: bool, beside_a_cause: bool
+) -> Remainder:
+    """Return what a model leaves.
+
+    Parameters
+    ----------
+    linear
+        The re-identified equations.
+    model
+        The model of the verdict.
+    found
+        Whether what it leaves goes with anything.
+    lower_bound
+        True if the noise floor is only a lower bound: then only what surely goes with something counts as remainder.
+    beside_a_cause
+        True where the verdict names one.
+    """
+    if found.adequate:
+        return Remainder(0.0, (), "", found.p_value, beside_a_cause)
+    share = found.agreements[0].share if found.agreements else 1.0
+    above = share * model.error_over_noise**2 if lower_bound else max(model.error_over_noise**2 - 1.0, 0.0)
+    whole = (
+        reidentified.error_over_noise**2
+        if lower_bound
+        else max(reidentified.error_over_noise**2 - 1.0, 1e-300)
+    )
+    where = (found.place,) if found.place else ()
+    return Remainder(min(1.0, above / whole), where, found.goes_with, found.p_value, beside_a_cause)

@@ -1,0 +1,83 @@
+"""Which force is missing, and at which joint, where no effect explains the gap?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.discover import JointForce, MissingForce, missing_force, missing_forces, not_contradicted
+from rigsight.errors import SimulationError
+from rigsight.identify import without_offsets
+from rigsight.rigs import Rig
+
+_TRACED = 3000
+"""Samples in which forces at joints are traced: they take about ten seconds of processor time per thousand on a drive train."""
+_EXPLAINED = 1.5
+"""Noise floors that a force at a joint may leave of what the sensors showed and still explain it; as for discovery."""
+
+
+def force_of_one_motion(
+    context: FitContext, reidentified: Scored, no_spring: bool, rng: np.random.Generator
+) -> MissingForce | None:
+    """Return the shape of the force that a rig with one motion lacks; None for any other rig.
+
+    There is none beside effects that are modelled already either: the rig's own terms do not stand alone there.
+
+    Parameters
+    ----------
+    bench, linear
+        Records, and the re-identified equations on them.
+    no_spring
+        True for an axis that has none.
+    rng
+        Source of the ensemble.
+    """
+    if context.modelled or not context.rig.has_one_motion:
+        return None
+    noise = context.noise[context.rig.outputs[0].name]
+    return missing_force(
+        context.rig, context.estimation, reidentified.fit.values, context.scales, noise, rng, no_spring
+    )
+
+
+def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointForce, ...]:
+    """Return the force that would have to be missing at each joint, the likeliest first; none of a rig with one motion.
+
+    There are none beside effects that are modelled already either.
+
+    Parameters
+    ----------
+    bench, linear
+        Records, of which the liveliest stretches are looked at, and the re-identified equations on them.
+    """
+    if context.modelled or context.rig.has_one_motion:
+        return ()
+    centered = without_offsets(context.estimation, reidentified.fit)
+    try:
+        return missing_forces(
+            context.rig, liveliest(centered, context.rig, _TRACED), reidentified.fit.values, context.noise
+        )
+    except (SimulationError, np.linalg.LinAlgError):
+        # What is not known of the cause is no reason to have no diagnosis.
+        return ()
+
+
+def traced_to(rig: Rig, forces: Sequence[JointForce]) -> tuple[str, ...]:
+    """Return the places of the only missing force that agrees with all sensors; empty where none or several do.
+
+    Those are a joint, and the drives that act along its very motion.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    forces
+        At each of its joints.
+    """
+    agreeing = not_contradicted(forces)
+    if len(forces) < 2 or len(agreeing) != 1 or agreeing[0].error_over_noise > _EXPLAINED:
+        return ()
+    joint = next(joint for joint in rig.mechanism.joints if joint.name == agreeing[0].joint)
+    return (joint.name, *(drive.name for drive in rig.mechanism.drives if drive.along == joint.motion))
