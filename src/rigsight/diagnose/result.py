@@ -101,6 +101,22 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class LikelyCauses:
+    """The smallest set of causes that holds the true one in nine trials of ten.
+
+    Attributes
+    ----------
+    sets
+        Names of the effects of each; empty names are the equations without an effect.
+    outside
+        True if a cause that is none of the candidates belongs to the set.
+    """
+
+    sets: tuple[tuple[str, ...], ...] = ()
+    outside: bool = False
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """The result of a diagnosis.
 
@@ -148,6 +164,8 @@ class Diagnosis:
         Whether what the diagnosed simulation leaves is noise and disturbance; None where that could not be asked.
     remainder
         What it leaves above them; None as above.
+    likely
+        The causes that the records leave open.
     """
 
     title: str
@@ -176,6 +194,7 @@ class Diagnosis:
     joint_forces: tuple[JointForce, ...] = ()
     adequate: bool | None = None
     remainder: Remainder | None = None
+    likely: LikelyCauses = field(default_factory=LikelyCauses)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -189,6 +208,10 @@ class Diagnosis:
             "adequate": self.adequate,
             "remainder": None if self.remainder is None else self.remainder.to_json(),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
+            "likely_causes": {
+                "effects": [list(effects) for effects in self.likely.sets],
+                "outside": self.likely.outside,
+            },
             "candidates": [_candidate(candidate) for candidate in self.candidates],
             "gap": {
                 output: {
@@ -246,6 +269,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
             for name, e in candidate.parameters.items()
         },
         "n_fitted": len(candidate.parameters),
+        "ranking_share": None if candidate.grounds is None else candidate.grounds.share,
         "held_out_share": None if candidate.grounds is None else candidate.grounds.held_out,
         "log_evidence": None if candidate.grounds is None else candidate.grounds.evidence,
         "success": candidate.success,
