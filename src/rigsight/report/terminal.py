@@ -53,7 +53,7 @@ class Summary:
             yield text(remainder_sentence(diagnosis))
         if missing_force_sentence(diagnosis):
             yield text(missing_force_sentence(diagnosis))
-        if diagnosis.ambiguous_with:
+        if ambiguity_sentence(diagnosis):
             yield text(ambiguity_sentence(diagnosis))
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:
             yield text(sentence)
