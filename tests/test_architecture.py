@@ -18,6 +18,8 @@ NAME_A_RIG = {
     "api/example.py": "the records of the ten lines of the README come from a virtual axis",
     "blind/campaign.py": "designs small and standard draw axes and running gears",
     "blind/draw.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
+    "blind/handwritten/cells.py": "which rig each hidden effect of the handwritten design has",
+    "blind/handwritten/plants.py": "whose equations are written by hand are built-in rigs",
     "blind/laboratory/stands.py": "the stands of the laboratory design are built-in rigs",
     "blind/laboratory/subjects.py": "which stand each hidden effect of the laboratory design has",
     "discover/terms/hysteresis.py": "a loop of hysteresis alone is the built-in element with one spring",

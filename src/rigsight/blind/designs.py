@@ -8,13 +8,15 @@ from rigsight.blind import draw, subjects
 from rigsight.blind.any_rig_subjects import placed_cells
 from rigsight.blind.any_rig_trial import draw_placed_trial
 from rigsight.blind.draw import Trial
+from rigsight.blind.handwritten.cells import handwritten_cells
+from rigsight.blind.handwritten.trial import draw_handwritten_trial
 from rigsight.blind.laboratory.subjects import laboratory_cells
 from rigsight.blind.laboratory.trial import draw_laboratory_trial
 from rigsight.errors import check_option
 
-Design = Literal["small", "standard", "joints", "rigs", "laboratory"]
+Design = Literal["small", "standard", "joints", "rigs", "laboratory", "handwritten"]
 """Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every built-in rig,
-one with records as laboratories take them."""
+one with records as laboratories take them, one with plants whose equations are written by hand."""
 
 
 def n_trials(design: Design) -> int:
@@ -28,6 +30,8 @@ def n_trials(design: Design) -> int:
     check_option("The design", design, get_args(Design))
     if design == "rigs":
         return len(placed_cells())
+    if design == "handwritten":
+        return len(handwritten_cells())
     return len(laboratory_cells()) if design == "laboratory" else subjects.n_trials(design)
 
 
@@ -55,4 +59,6 @@ def draw_trial(design: Design, seed: int, trial: int) -> Trial:
         return draw_placed_trial(seed, trial)
     if design == "laboratory":
         return draw_laboratory_trial(seed, trial)
+    if design == "handwritten":
+        return draw_handwritten_trial(seed, trial)
     return draw.draw_trial(design, seed, trial)

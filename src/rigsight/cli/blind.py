@@ -29,10 +29,11 @@ def blind(
         ),
     ] = None,
     design: Annotated[
-        Literal["small", "standard", "joints", "rigs", "laboratory"],
+        Literal["small", "standard", "joints", "rigs", "laboratory", "handwritten"],
         typer.Option(
             help="Which list of cells is drawn from; joints has the effects of servo and robot joints, rigs every built-in rig "
-            "with effects at all its places, laboratory records as laboratories take them (filters, feedback, stiction, ...)."
+            "with effects at all its places, laboratory records as laboratories take them (filters, feedback, stiction, ...), "
+            "handwritten plants that are composed from no declaration."
         ),
     ] = "standard",
     seed: Seed = 0,

@@ -44,7 +44,8 @@ def run_blind(
         Folder for the bench.
     design
         List of cells to draw from: ``"small"``, ``"standard"``, ``"joints"`` for the effects of servo and robot joints,
-        ``"rigs"`` for effects at all places of every built-in rig, or ``"laboratory"`` for records as laboratories take them.
+        ``"rigs"`` for effects at all places of every built-in rig, ``"laboratory"`` for records as laboratories take them, or
+        ``"handwritten"`` for plants that are composed from no declaration.
     trials
         Number of trials; None for one of every cell.
     seed
