@@ -20,6 +20,7 @@ MOVED = {
     "CHANGELOG.md": "changelog.md",
     "experiments/amplitudes/README.md": "experiments/amplitudes.md",
     "experiments/blind_cheat/README.md": "experiments/blind_cheat.md",
+    "experiments/blind_handwritten/README.md": "experiments/blind_handwritten.md",
     "experiments/blind_laboratory/README.md": "experiments/blind_laboratory.md",
     "experiments/blind_rigs/README.md": "experiments/blind_rigs.md",
     "experiments/blind_small/README.md": "experiments/blind_small.md",
