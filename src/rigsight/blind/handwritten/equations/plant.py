@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import fsolve
+from scipy.optimize import root
 
 from rigsight.blind.handwritten.equations.drives import DriveLaw
 from rigsight.blind.handwritten.equations.held_inputs import Input, Late
@@ -16,6 +16,7 @@ from rigsight.blind.handwritten.equations.laws import DryFriction, FreeMotion, J
 from rigsight.blind.handwritten.equations.march import march
 from rigsight.blind.handwritten.equations.motions import Joint, Motion
 from rigsight.blind.waveforms import Signal
+from rigsight.errors import SimulationError
 
 Floats = NDArray[np.float64]
 
@@ -23,8 +24,8 @@ LOOK = 2.5e-3
 """Longest time [s] between two looks at margins: a mode that ends and comes back in between is not seen."""
 _SAME = 1e-12
 """Distance of two nodes [s] that are one."""
-_AT_REST = 1e-9
-"""Acceleration [SI] below which the state from which a rest is looked for is one."""
+_AT_REST, _BALANCED = 1e-9, 1e-7
+"""Accelerations [SI] below which the state from which a rest is looked for is one, and with which the search may end."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ class Plant:
         Raises
         ------
         SimulationError
-            If the motion has no end, or events pile up.
+            If the motion has no end, events pile up, or there is no rest to begin from.
         """
         late = self.drive_law.dead_time
         self._inputs = [
@@ -177,7 +178,12 @@ class Plant:
 
         first = np.array([y[i] for i in still])
         if np.max(np.abs(unbalanced(first))) > _AT_REST:
-            for i, value in zip(still, fsolve(unbalanced, first, xtol=1e-13), strict=True):
+            found = root(unbalanced, first, tol=1e-13).x
+            if not np.max(np.abs(unbalanced(found))) < _BALANCED:
+                raise SimulationError(
+                    "The plant has no state of rest near that of the rig without an effect."
+                )
+            for i, value in zip(still, found, strict=True):
                 y[i] = float(value)
         y += own
         return [*y, y[self._late_state]] if self._lag else y
