@@ -14,6 +14,7 @@ from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.search.places import SuspectedPlace
+from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.verdict.judgement import Verdict
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import Remainder
@@ -148,6 +149,9 @@ class Diagnosis:
         Whether what the diagnosed simulation leaves is noise and disturbance; None where that could not be asked.
     remainder
         What it leaves above them; None as above.
+    trust
+        Whether the numbers of the verdict's model are the same in every record, at every amplitude and in shorter windows; None
+        where that was not asked.
     """
 
     title: str
@@ -176,6 +180,7 @@ class Diagnosis:
     joint_forces: tuple[JointForce, ...] = ()
     adequate: bool | None = None
     remainder: Remainder | None = None
+    trust: Trust | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -188,6 +193,7 @@ class Diagnosis:
             "where": list(self.where),
             "adequate": self.adequate,
             "remainder": None if self.remainder is None else self.remainder.to_json(),
+            "trust": None if self.trust is None else self.trust.to_json(),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
             "candidates": [_candidate(candidate) for candidate in self.candidates],
             "gap": {
