@@ -14,6 +14,7 @@ from effect_pages import effect_page, index_page
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from policy_page import policy_page
 from reference_pages import PACKAGES, reference_index, reference_page
 from repository_links import MOVED, with_site_links
 
@@ -21,6 +22,7 @@ from rigsight.effects import CATALOGUE
 from rigsight.report.wording import effect_label, sentence_case
 
 ROOT = Path(__file__).parents[2]
+NUMBERS = "verdict_numbers.md"
 STANDARD_BENCH = "blind.md"
 """Written by `make blind`, hours long: not there in every copy of the repository."""
 _SECTION = re.compile(r"<!-- section (?P<file>\S+) (?P<heading>[^>]+?) -->")
@@ -54,7 +56,11 @@ def _filled(entry: Any, sections: dict[str, list[dict[str, str]]]) -> Any:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add what is generated."""
-    pages = {"effects/index.md": index_page(), "reference/index.md": reference_index()}
+    pages = {
+        "effects/index.md": index_page(),
+        "reference/index.md": reference_index(),
+        NUMBERS: policy_page(),
+    }
     pages |= {f"reference/{name}.md": reference_page(name) for name in PACKAGES}
     for effect in CATALOGUE:
         pages[f"effects/{effect.name}.md"] = effect_page(effect)

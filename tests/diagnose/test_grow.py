@@ -10,11 +10,11 @@ import pytest
 
 from rigsight.diagnose import Task, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search import pairs as grow
 from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.pairs import grown, refit_singles
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
-from rigsight.diagnose.verdict.judgement import AT_FLOOR
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step
 from rigsight.identify import characteristic_scales
@@ -104,7 +104,7 @@ def test_half_of_a_pair_may_have_been_left_out_of_the_singles() -> None:
         context,
         singles,
         [spring, lag],
-        AT_FLOOR,
+        VERDICT.at_floor,
         reidentified.error_over_noise,
         OtherForms(context, lower_bound=False),
     )
@@ -128,7 +128,7 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
     monkeypatch.setattr(grow, "with_one_more", tried)
     monkeypatch.setattr(grow, "refine", lambda _, pairs: pairs)
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
-    grow.grown(None, singles, [nothing, spring], AT_FLOOR, 9.0, forms)
+    grow.grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms)
     assert beside == ["power_law_stiffness"]
 
 

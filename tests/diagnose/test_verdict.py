@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.verdict.judgement import AT_FLOOR, Judgement, judge, most_left
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.verdict.judgement import Judgement, judge, most_left
 from rigsight.diagnose.verdict.main_cause import MainCause
 
 ABOVE, BELOW = 1.001, 0.999
@@ -39,8 +40,8 @@ def verdict(scored):
 
 
 def test_none_ends_at_the_floor(verdict) -> None:
-    assert verdict(AT_FLOOR, 1.0, 1.0).verdict == "none"
-    assert verdict(AT_FLOOR * ABOVE, 0.99, 0.99).verdict == "parameters"
+    assert verdict(VERDICT.at_floor, 1.0, 1.0).verdict == "none"
+    assert verdict(VERDICT.at_floor * ABOVE, 0.99, 0.99).verdict == "parameters"
 
 
 def test_a_small_gap_that_new_numbers_close_is_parameters_from_a_tenth_on(verdict) -> None:
@@ -55,7 +56,7 @@ def test_a_simulation_that_suits_the_held_out_records_by_chance_is_not_complete(
 
 
 def test_parameters_when_the_same_equations_reach_the_floor(verdict) -> None:
-    found = verdict(5.0, AT_FLOOR, AT_FLOOR)
+    found = verdict(5.0, VERDICT.at_floor, VERDICT.at_floor)
     assert (found.verdict, found.model.effects) == ("parameters", ())
 
 

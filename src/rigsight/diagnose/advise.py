@@ -15,17 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import NOTES
 from rigsight.errors import SimulationError
 from rigsight.excitation import linear_sweep, step
 from rigsight.records.record import Hold, Record
 from rigsight.simulate import simulate
-
-_AMPLITUDES = (0.3, 1.0, 1.5)
-"""In units of the largest input that was recorded: beyond one and a half of it, a rig may not survive the advice."""
-_PERIODS = 40.0
-"""Length of an experiment in periods of the rig's motion."""
-_SLOW, _FAST = 0.1, 5.0
-"""Band of the menu in units of the rig's angular frequency."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +64,7 @@ def advise(
 
     Parameters
     ----------
-    bench
+    context
         Records and scales.
     chosen
         The named model.
@@ -120,12 +114,21 @@ def _separations(
 def _menu(context: FitContext) -> Iterator[_Experiment]:
     dt = context.estimation[0].dt
     omega = 1.0 / context.scales["time"]
-    n_samples = max(200, min(40_000, round(_PERIODS * 2.0 * math.pi / omega / dt)))
+    n_samples = max(200, min(40_000, round(NOTES.advised_periods * 2.0 * math.pi / omega / dt)))
     t = dt * np.arange(n_samples, dtype=np.float64)
-    fast = min(_FAST * omega, 0.4 * math.pi / dt)
+    slow, fast = (share * omega for share in NOTES.advised_band)
+    fast = min(fast, 0.4 * math.pi / dt)
     drives: tuple[tuple[str, tuple[float, float] | None, Callable[[float], NDArray[np.float64]]], ...] = (
-        ("sweep", (_SLOW * omega, fast), lambda a: linear_sweep(t, a, _SLOW * omega, fast)),
-        ("slow sine", (_SLOW * omega, _SLOW * omega), lambda a: a * np.sin(_SLOW * omega * t)),
+        (
+            "sweep",
+            (slow, fast),
+            lambda a: linear_sweep(t, a, slow, fast),
+        ),
+        (
+            "slow sine",
+            (slow, slow),
+            lambda a: a * np.sin(slow * t),
+        ),
         ("sine at resonance", (omega, omega), lambda a: a * np.sin(omega * t)),
     )
     if context.rig.is_driven:
@@ -138,7 +141,7 @@ def _menu(context: FitContext) -> Iterator[_Experiment]:
     rest = {name: np.full(n_samples, middle) for name, middle in middles.items()}
     for source, samples in recorded.items():
         largest = float(np.max(np.abs(samples - middles[source])))
-        for share in _AMPLITUDES:
+        for share in NOTES.advised_amplitudes:
             for waveform, band, drive in drives:
                 moved = {**rest, source: middles[source] + drive(share * largest)}
                 yield _Experiment(waveform, source, share * largest, band, moved)

@@ -20,9 +20,10 @@ from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.noise.detection import AT_REST
 from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
 from rigsight.diagnose.search.one_more_effect import Prepare
-from rigsight.diagnose.search.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.verdict.catalogue_coverage import probability_in_catalogue
@@ -38,18 +39,10 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
-_REFUTES = 0.7
-"""Held-out error, in units of a noise floor measured at rest, below which what the rig does at rest was no noise.
-
-A loose rig wanders in its play where nothing drives it, and what pulsates goes on. An assumption: true models of blind trials
-left 0.82 and more where neither was so; the relative of a play that did wander 0.52, pulsations 0.44 and 0.53.
-"""
 _REFERENCE_USED = (
     "It serves as instrument where the frequency responses of two amplitudes are compared, if the input answers it in both; the "
     "responses in the report do not use it."
 )
-_MOST = 0.5
-"""Share of the squared gap from which a push takes most of it away."""
 _WITHOUT_EFFECT = 0.95
 """Probability given to the equations without an effect where they reach the noise floor."""
 
@@ -104,7 +97,7 @@ def diagnose(
         notes.append(task.open_factor.sentence)
     rng = np.random.default_rng(seed)
     found = examine(task, effects, rng, n_jobs, say, prepare, memory)
-    if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < _REFUTES:
+    if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         notes.append(
             f"A model leaves {_least_left(found):.2g} of what the rig does while its input rests, so that was motion and no "
             "noise (a loose rig wanders, what pulsates goes on): the noise floor is taken from the top of the spectrum instead."
@@ -123,7 +116,7 @@ def diagnose(
         )
     elif found.judgement.verdict == "unknown":
         growth = growth_of_disturbances(found.context, found.reidentified, found.judgement.model, rng)
-        if growth > PREDICTABLE:
+        if growth > VERDICT.sensitive:
             notes.append(
                 f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
                 "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
@@ -144,7 +137,7 @@ def diagnose(
     if forces:
         say("missing force at each joint")
     # A push that takes most of the gap away says more than a force of any course.
-    pushed = max((place.share for place in found.places), default=0.0) >= _MOST
+    pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
     return replace(
         diagnosis,
         where=diagnosis.where if pushed else traced_to(task.rig, forces) or diagnosis.where,

@@ -19,6 +19,7 @@ from rigsight.diagnose.noise.adequacy import Adequacy, Checks
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms, beyond_disturbance, with_parts
 from rigsight.diagnose.search.horizon import brings_back, preparing, windowing_of
 from rigsight.diagnose.search.one_law import split_distinguishable
@@ -29,10 +30,6 @@ from rigsight.diagnose.search.places import Search, SuspectedPlace, search_place
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate, fit_candidates, reidentify
 from rigsight.diagnose.verdict.judgement import (
-    AT_FLOOR,
-    AT_LOWER_BOUND,
-    MOST_LEFT,
-    WORTHWHILE,
     Judgement,
     judge,
     most_left,
@@ -50,9 +47,6 @@ from rigsight.identify import (
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure
 
-_SIGNIFICANT = 3.0
-"""Standard errors from zero at which a constant force counts as needed."""
-
 
 @dataclass(frozen=True)
 class Examination:
@@ -62,7 +56,7 @@ class Examination:
     ----------
     floors
         Noise floor of each output.
-    bench
+    context
         Records, scales and noise.
     windowing
         How records were cut.
@@ -138,7 +132,7 @@ def examine(
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
-    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
+    at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
     windowing = Windowing()
     if drifts:
         windowing, amplified = windowing_of(task, noise, n_jobs)
@@ -146,7 +140,7 @@ def examine(
         noise = {floor.output: floor.std for floor in floors}
     ready = preparing(prepare, windowing.cut(task.records))
     models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
-    allowed = AT_LOWER_BOUND if lower_bound else most_left(models.reidentified.error_over_noise)
+    allowed = VERDICT.at_lower_bound if lower_bound else most_left(models.reidentified.error_over_noise)
     asked = (
         asked_offsets(models.context, models.reidentified, models.singles, allowed)
         if windowing.whole
@@ -166,7 +160,7 @@ def examine(
         cut = _cut(task, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
-    checks = Checks(models.context, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
+    checks = Checks(models.context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
     if not in_windows:
         pairs = _grown(models, effects, forms, checks if lower_bound else None, ready)
         models = replace(models, singles=refit_singles(models.context, models.singles, pairs))
@@ -174,7 +168,7 @@ def examine(
             cut = cut or _cut(task, noise, models)
             found = pairs_in_windows(models.context, cut.context, models.reidentified, pairs)
             say("pairs in windows")
-            in_windows = _explained(cut, found, AT_FLOOR)
+            in_windows = _explained(cut, found, VERDICT.at_floor)
             pairs = found if in_windows else pairs
     if cut is not None and in_windows:
         models = cut
@@ -185,7 +179,7 @@ def examine(
     )
     evidence = Evidence(context, reidentified, best_single)
     if in_windows:
-        checks = Checks(context, rng, AT_FLOOR, np.inf if lower_bound else MOST_LEFT)
+        checks = Checks(context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
     else:
         stand = beyond_disturbance(evidence, models.singles, forms.with_own_evidence(models.singles, pairs))
         pairs = with_parts(stand, pairs)
@@ -296,7 +290,10 @@ def _singly(
     if prepare is not None:
         prepare([context.simplest((effect,)) for effect in search.effects])
     singles = fit_candidates(context, reidentified, search.effects, say)
-    if search.others and min((model.error_over_noise for model in singles), default=np.inf) > AT_FLOOR:
+    if (
+        search.others
+        and min((model.error_over_noise for model in singles), default=np.inf) > VERDICT.at_floor
+    ):
         # Nothing right may be lost where places or effects were ranked wrongly.
         if prepare is not None:
             prepare([context.simplest((effect,)) for effect in search.others])
@@ -318,12 +315,12 @@ def _grown(
     is_excused = False
     if of_unknown_noise is not None and models.singles:
         best = min(models.singles, key=lambda model: model.error_over_noise)
-        is_excused = best.error_over_noise <= AT_LOWER_BOUND
+        is_excused = best.error_over_noise <= VERDICT.at_lower_bound
         if is_excused and of_unknown_noise.is_adequate(best):
             return []
-    worthwhile = models.reidentified.error_over_noise / WORTHWHILE
-    pairs = grown(models.context, models.singles, effects, AT_FLOOR, worthwhile, forms, prepare)
-    return [pair for pair in pairs if not is_excused or pair.error_over_noise <= AT_FLOOR]
+    worthwhile = models.reidentified.error_over_noise / VERDICT.worthwhile
+    pairs = grown(models.context, models.singles, effects, VERDICT.at_floor, worthwhile, forms, prepare)
+    return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
 
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
@@ -386,7 +383,8 @@ def _with_offset_rivals(
     needed = [
         name
         for name in best.fit.free
-        if name in released and abs(best.fit.values[name]) > _SIGNIFICANT * best.fit.standard_errors[name]
+        if name in released
+        and abs(best.fit.values[name]) > VERDICT.standard_errors * best.fit.standard_errors[name]
     ]
     if not needed:
         return ranking

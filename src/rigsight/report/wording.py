@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from rigsight.diagnose.location.gap_parts import GapPart
 from rigsight.diagnose.location.trace import Stage
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, OutputGap
-from rigsight.diagnose.verdict.judgement import AT_FLOOR, AT_LOWER_BOUND
 from rigsight.discover import not_contradicted
 from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
@@ -167,9 +167,9 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
             f"down to {times_floor(after)}."
         )
     if diagnosis.verdict == "none":
-        if not before > AT_FLOOR:
+        if not before > VERDICT.at_floor:
             return f"There is no gap to explain: {_first(diagnosis)} {times_floor(before)}."
-        if before > AT_LOWER_BOUND:
+        if before > VERDICT.at_lower_bound:
             return (
                 f"No effect is seen to be missing: {_first(diagnosis)} {times_floor(before)}, but that goes with nothing that "
                 "was looked at. The noise floor seems too low; a repeated record would measure it."

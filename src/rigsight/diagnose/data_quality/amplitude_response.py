@@ -11,22 +11,13 @@ from scipy.stats import f as f_distribution
 
 from rigsight.diagnose.data_quality.finding import AmplitudeDependence
 from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.diagnose.policy import NOTES
 from rigsight.errors import InputError
 from rigsight.frequency import FrequencyResponse, local_rational_response, responses_of_inputs
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.records.reference import instrument_of
 from rigsight.rigs import Rig
-
-_DIFFERENT_AMPLITUDE = 1.2
-_STANDS_OUT = 5.0
-"""Standard errors by which a response must exceed zero to be compared."""
-_LINE_CHANCE = 1e-3
-_LINES_CHANGED = 0.15
-"""Share of independent lines that must differ: variances of sweeps may be too small on some."""
-_MATTERS = 0.02
-"""Relative difference that counts as a change."""
-_FEWEST_LINES = 8
 
 
 def amplitude_dependences(
@@ -89,7 +80,7 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
             "cannot tell", f"The frequency responses {path} cannot be compared: {error}", names, path
         )
     omega, first, second, variance = _common(low, high)
-    if omega.size < _FEWEST_LINES:
+    if omega.size < NOTES.fewest_lines:
         return AmplitudeDependence(
             "cannot tell",
             f"{names[0]} and {names[1]} share too few frequencies at which the response {path} stands out of the noise.",
@@ -100,11 +91,11 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
     relative = np.abs(second - first) / size
     freedom = 2.0 * min(low.noise_freedom, high.noise_freedom)
     chance = f_distribution.sf(np.abs(second - first) ** 2 / variance, 2.0, freedom)
-    changed = (chance < _LINE_CHANCE) & (relative > _MATTERS)
+    changed = (chance < NOTES.line_chance) & (relative > NOTES.response_change)
     unit = next(signal.unit for signal in rig.inputs if signal.name == source)
     lowest, highest = (_amplitude(record, source, alone) for record in pair)
     span = f"{lowest:.3g} and {highest:.3g} {'' if unit == 'input' else unit}".rstrip()
-    if np.mean(changed) >= _LINES_CHANGED:
+    if np.mean(changed) >= NOTES.lines_changed:
         worst = int(np.argmax(np.where(changed, relative, 0.0)))
         return AmplitudeDependence(
             "yes",
@@ -114,7 +105,7 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
             path,
         )
     seen = float(np.median(3.0 * np.sqrt(variance) / size))
-    if np.mean(chance < _LINE_CHANCE) < _LINES_CHANGED and seen > 0.1:
+    if np.mean(chance < NOTES.line_chance) < NOTES.lines_changed and seen > 0.1:
         return AmplitudeDependence(
             "cannot tell",
             f"Between {span} the frequency responses {path}{by} agree within their noise, but that hides changes of {seen:.0%}.",
@@ -168,7 +159,7 @@ def _extremes(records: Sequence[Record], source: str, alone: bool) -> tuple[Reco
         own = sorted((r for r in records if r.kind == kind), key=lambda r: _amplitude(r, source, alone))
         smallest = _amplitude(own[0], source, alone)
         ratio = _amplitude(own[-1], source, alone) / smallest if smallest > 0.0 else 1.0
-        if ratio >= _DIFFERENT_AMPLITUDE and (best is None or ratio > best[0]):
+        if ratio >= NOTES.another_amplitude and (best is None or ratio > best[0]):
             best = (ratio, own[0], own[-1])
     return None if best is None else (best[1], best[2])
 
@@ -191,8 +182,8 @@ def _common(
         )
         parts.append((values, np.interp(omega, response.omega, response.variance)))
     (first, first_variance), (second, second_variance) = parts
-    clear = (np.abs(first) > _STANDS_OUT * np.sqrt(first_variance)) & (
-        np.abs(second) > _STANDS_OUT * np.sqrt(second_variance)
+    clear = (np.abs(first) > NOTES.clearly * np.sqrt(first_variance)) & (
+        np.abs(second) > NOTES.clearly * np.sqrt(second_variance)
     )
     # A local model spans as many lines as its degrees of freedom and unknowns; neighbors share data.
     width = 1 if low.noise_lines is None else low.noise_lines.shape[1]

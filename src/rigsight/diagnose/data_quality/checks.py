@@ -20,11 +20,11 @@ def data_quality(context: FitContext, records: Sequence[Record], reidentified: S
 
     Parameters
     ----------
-    bench
+    context
         Records as they are fitted, scales and noise.
     records
         All records of the campaign, whole.
-    linear
+    reidentified
         The re-identified equations.
 
     Notes
@@ -52,7 +52,7 @@ def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) 
     ----------
     quality
         What was found before.
-    bench
+    context
         Records as they were fitted and scored.
     model
         The best model.
@@ -74,7 +74,7 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
     ----------
     quality
         What was found before.
-    bench
+    context
         Records as they are fitted, scales and noise.
     model
         The best model; nothing is asked where it has no effect.

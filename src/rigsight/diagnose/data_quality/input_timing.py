@@ -15,24 +15,12 @@ import numpy as np
 
 from rigsight.diagnose.data_quality.finding import Finding
 from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import FitResult
 from rigsight.records.record import Hold, Record
 
-_EVALUATIONS = 10
 _TOLERANCE = 1e-3
-_MOST_LEAD = 10
-"""Samples by which outputs may come too early and still be told, where a search for a delay reaches that far."""
-_GAP = 1.1
-"""RMS in units of the noise floor above which there is something to explain."""
-_GOOD_PART = 0.5
-"""Share of the gap, as power, that a hold must explain to be told; an assumption."""
-_NEARLY_ALL = 0.8
-"""The same for a shift: where hysteresis delays the answer, a shift was seen to explain half."""
-_ALIKE = 1.1
-"""Ratio of what two hypotheses leave at which the records do not tell them apart; a hold is then preferred to a shift."""
-_LEAST_SHIFT = 0.2
-"""Shift in sample times below which it is taken for none."""
 _DELAYS = ("input_delay", "sensor_delay")
 
 
@@ -70,24 +58,30 @@ class InputTiming:
 
     def findings(self) -> list[Finding]:
         """Return the hypotheses that explain a good part of what the model leaves."""
-        if not self.as_given > _GAP:
+        if not self.as_given > VERDICT.at_floor:
             return []
         least = min(self.with_hold.values())
         alike = [
-            hold for hold, error_over_noise in self.with_hold.items() if error_over_noise <= _ALIKE * least
+            hold
+            for hold, error_over_noise in self.with_hold.items()
+            if error_over_noise <= VERDICT.worthwhile * least
         ]
         shifted = math.inf if self.with_shift is None else self.with_shift
         by_hold, by_shift = self.explained(least), self.explained(shifted)
-        if by_hold >= _GOOD_PART and least <= _ALIKE * shifted:
+        if by_hold >= VERDICT.larger_part and least <= VERDICT.worthwhile * shifted:
             return [self._hold_finding(alike, least, shifted)]
-        if by_shift >= _NEARLY_ALL and self.shift is not None and abs(self.shift) > _LEAST_SHIFT * self.dt:
+        if (
+            by_shift >= NOTES.nearly_all
+            and self.shift is not None
+            and abs(self.shift) > NOTES.least_shift * self.dt
+        ):
             return [self._shift_finding(self.shift, by_shift)]
         return []
 
     def _hold_finding(self, holds: Sequence[Hold], least: float, shifted: float) -> Finding:
         told = " or ".join(f'"{hold}"' for hold in holds)
         rival = ""
-        if self.shift is not None and shifted <= _ALIKE * least:
+        if self.shift is not None and shifted <= VERDICT.worthwhile * least:
             rival = f" So would a shift of the time base by {1e3 * self.shift:.3g} ms"
             rival += ", or a delay in the rig." if self.shift > 0.0 else "."
         return Finding(
@@ -125,7 +119,7 @@ def input_timing(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     effects
         Effects of the model beside those that the simulation has.
@@ -173,7 +167,7 @@ def _refitted(
     records: Sequence[Record],
 ) -> FitResult:
     fit = context.problem(base.structure, records)
-    return fit.fit(start, free, max_evaluations=_EVALUATIONS, tolerance=_TOLERANCE, finish=False)
+    return fit.fit(start, free, max_evaluations=SEARCH.timing_evaluations, tolerance=_TOLERANCE, finish=False)
 
 
 def _shifted(
@@ -189,7 +183,7 @@ def _shifted(
     delay = effect_named("input_delay")
     # The start, a shift of zero, lies in the middle of what the search for a delay explores.
     reach = 0.5 * delay.parameters[0].search[1] * context.scales["time"]
-    n_lead = int(np.clip(reach / dt, 1, _MOST_LEAD))
+    n_lead = int(np.clip(reach / dt, 1, NOTES.most_lead))
     structure = context.composed((*effects, delay), dict(base.structure.fixed))
     name = structure.parameter_name(delay, delay.parameters[0].name)
     outputs = [signal.name for signal in context.rig.outputs]

@@ -16,14 +16,12 @@ from rigsight.diagnose.fitting.drift import can_drift
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import WINDOW
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
-_LARGER_PART = 0.5
-"""Share of what a model leaves above the floor, as power, that must go with the offsets: else something else is the cause."""
-_EVALUATIONS = 40
 _TOLERANCE = 1e-5
 _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to have it so in every command.'
 
@@ -38,7 +36,7 @@ def asked_offsets(
 
     Parameters
     ----------
-    bench
+    context
         Records as they were fitted, without free offsets.
     linear, singles
         The re-identified equations, and every effect by itself.
@@ -55,7 +53,9 @@ def asked_offsets(
             continue
         freed = _with_free_offsets(context, model)
         gained = model.error_over_noise**2 - freed.error_over_noise**2
-        if freed.error_over_noise <= allowed and gained > _LARGER_PART * (model.error_over_noise**2 - 1.0):
+        if freed.error_over_noise <= allowed and gained > VERDICT.larger_part * (
+            model.error_over_noise**2 - 1.0
+        ):
             worst = max(told, key=lambda one: one.share)
             unit = next(signal.unit for signal in context.rig.outputs if signal.name == worst.output)
             return Finding(
@@ -77,7 +77,7 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
 
     Parameters
     ----------
-    bench
+    context
         The rig and what is known of it.
     records
         All records of the campaign, whole.
@@ -129,7 +129,7 @@ def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
 
     Parameters
     ----------
-    bench
+    context
         Records as they were fitted and scored.
     model
         The model.
@@ -177,5 +177,7 @@ def _with_free_offsets(context: FitContext, model: Scored) -> Scored:
         structure, own.estimation, context.scales, context.noise, values, model.fit.free
     )
     free = [name for name in model.fit.free if name not in swallowed]
-    fit = own.problem(structure, own.estimation).fit(values, free, None, _EVALUATIONS, _TOLERANCE)
+    fit = own.problem(structure, own.estimation).fit(
+        values, free, None, SEARCH.offset_evaluations, _TOLERANCE
+    )
     return own.score(model.effects, fit) if fit.residuals else replace(model, error_over_noise=float("inf"))

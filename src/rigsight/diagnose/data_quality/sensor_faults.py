@@ -6,24 +6,11 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigsight.diagnose.data_quality.finding import Finding
+from rigsight.diagnose.policy import NOTES
 from rigsight.records.plausibility import clipping
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import compose
-
-_SHORTEST_STUCK = 20
-_LONGEST_SHARE_STILL = 0.5
-"""A channel that stands still for longer than this in other places too is a rig at rest, not a stuck sensor."""
-_ABRUPT = 0.5
-"""Step into or out of standing still, in root mean square steps, that no mass makes."""
-_ONE_STEP = 1.5
-"""Least steps of a channel up to which a change is one of them."""
-_FEWEST_LEVELS = 200
-_JUMP_SIZE = 0.05
-"""Least size of a jump, in standard deviations of the channel."""
-_JUMP_CONTRAST = 8.0
-_NEIGHBORHOOD = 201
-_FIRST_TOLD = 3
 
 
 def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
@@ -78,12 +65,12 @@ def _quantized(record: Record, name: str, unit: str) -> list[Finding]:
     """Find a channel whose values lie on so few levels that rounding is a good part of its noise."""
     levels = np.unique(record[name])
     span = float(levels[-1] - levels[0])
-    if levels.size > _FEWEST_LEVELS:
+    if levels.size > NOTES.fewest_levels:
         return []
     gaps = np.diff(levels)
     step = float(np.min(gaps))
     # Levels of a converter are multiples of one step; few samples, or a rig that mostly rests, are not.
-    if step < span / _FEWEST_LEVELS or np.max(np.abs(gaps / step - np.round(gaps / step))) > 0.05:
+    if step < span / NOTES.fewest_levels or np.max(np.abs(gaps / step - np.round(gaps / step))) > 0.05:
         return []
     return [
         Finding(
@@ -104,20 +91,20 @@ def _stuck(record: Record, name: str) -> list[Finding]:
     still = steps == 0.0
     edges = np.diff(still.astype(np.int8), prepend=0, append=0)
     starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    long = stops - starts >= _SHORTEST_STUCK
-    if not long.any() or np.mean(still) > _LONGEST_SHARE_STILL:
+    long = stops - starts >= NOTES.shortest_stuck
+    if not long.any() or np.mean(still) > NOTES.longest_share_still:
         return []
     typical = float(np.sqrt(np.mean(steps[~still] ** 2)))
     before = np.abs(steps[np.maximum(starts - 1, 0)]) * (starts > 0)
     after = np.abs(steps[np.minimum(stops, steps.size - 1)]) * (stops < steps.size)
     # An encoder leaves its rest by a whole step however gently the mass does.
-    broken_off = max(_ABRUPT * typical, _ONE_STEP * float(np.min(np.abs(steps[~still]))))
+    broken_off = max(NOTES.abrupt * typical, NOTES.one_step * float(np.min(np.abs(steps[~still]))))
     stuck = np.flatnonzero(long & (np.maximum(before, after) > broken_off))
     if stuck.size == 0:
         return []
     told = [
         f"{record.t[starts[i]]:.4g} to {record.t[min(stops[i], record.n_samples - 1)]:.4g} s"
-        for i in stuck[:_FIRST_TOLD]
+        for i in stuck[: NOTES.first_told]
     ]
     return [
         Finding(
@@ -134,14 +121,14 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     """Find samples at which the displacement of a mass jumps, alone (a spike) or for good (lost counts)."""
     samples = record[name]
     third = np.diff(samples, 3)
-    if third.size < _NEIGHBORHOOD:
+    if third.size < NOTES.jump_neighborhood:
         return []
     # The largest of the four third differences that a spike of size h leaves is 3 h, of a lasting jump 2 h.
     size = np.abs(third) / 2.0
-    power = uniform_filter1d(size**2, _NEIGHBORHOOD, mode="nearest") * _NEIGHBORHOOD
+    power = uniform_filter1d(size**2, NOTES.jump_neighborhood, mode="nearest") * NOTES.jump_neighborhood
     near = uniform_filter1d(size**2, 9, mode="nearest") * 9
-    around = np.sqrt(np.maximum(power - near, 0.0) / (_NEIGHBORHOOD - 9))
-    large = np.flatnonzero((size > _JUMP_SIZE * np.std(samples)) & (size > _JUMP_CONTRAST * around))
+    around = np.sqrt(np.maximum(power - near, 0.0) / (NOTES.jump_neighborhood - 9))
+    large = np.flatnonzero((size > NOTES.jump_size * np.std(samples)) & (size > NOTES.jump_contrast * around))
     if large.size == 0:
         return []
     places = [
@@ -151,7 +138,7 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
     steps = [np.abs(np.diff(samples[place : place + 4])) for place in places]
     told = ", ".join(
         f"{record.t[place + 1 + np.argmax(step)]:.4g} s"
-        for place, step in zip(places[:_FIRST_TOLD], steps, strict=False)
+        for place, step in zip(places[: NOTES.first_told], steps, strict=False)
     )
     largest = max(float(np.max(step)) for step in steps)
     return [
@@ -167,4 +154,4 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
 
 
 def _more(count: int) -> str:
-    return f" and {count - _FIRST_TOLD} times more" if count > _FIRST_TOLD else ""
+    return f" and {count - NOTES.first_told} times more" if count > NOTES.first_told else ""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.constant_force import known_constant_forces
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.windows import cut, shown_by
+from rigsight.diagnose.policy import SEARCH
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
@@ -20,18 +21,7 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, special_values
 
-_PIECE = 4.0
-"""Length of a piece in periods of the rig: a model that is far off stays in step with the motion for about as long.
-
-An assumption: half to two periods did worse on play of a few widths, nothing else was tried.
-"""
-_MOST_PIECES = 40
-"""In all, for each degree of freedom: every piece has initial states of its own, and the fit's equations grow with them."""
-_DIED_AWAY = 0.99
-"""Share of the squared steps of an output after which a free motion is smaller than a tenth of what it was."""
-_FEWEST_IN_MOTION = 100
 _ROUGH_ACCURACY = 1e-3
-_ROUGH_EVALUATIONS = 8
 
 
 @dataclass(frozen=True)
@@ -142,12 +132,12 @@ class FitContext:
     @cached_property
     def look_in_pieces(self) -> tuple[tuple[Record, ...], ...]:
         """Pieces of each of the liveliest stretches: a model that is far off stays in step with the motion in them."""
-        return tuple(self.cut_in_pieces([record], _PIECE) for record in self.look)
+        return tuple(self.cut_in_pieces([record], SEARCH.piece) for record in self.look)
 
     def cut_in_pieces(self, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
         """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
         duration = sum(record.n_samples * record.dt for record in records)
-        most = _MOST_PIECES / max(1, len(self.rig.mechanism.free))
+        most = SEARCH.most_pieces / max(1, len(self.rig.mechanism.free))
         return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
 
     def problem(
@@ -260,7 +250,9 @@ class FitContext:
         """
         if roughly:
             rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
-            result = rough.fit(fit.values, [], max_evaluations=_ROUGH_EVALUATIONS, tolerance=_ROUGH_ACCURACY)
+            result = rough.fit(
+                fit.values, [], max_evaluations=SEARCH.rough_evaluations_of_rig, tolerance=_ROUGH_ACCURACY
+            )
         else:
             result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
         error_over_noise = result.weighted_rms if result.residuals else float("inf")
@@ -295,7 +287,9 @@ def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
         stop = record.n_samples
         if all(is_constant(record[signal.name]) for signal in rig.inputs):
             energy = np.cumsum(np.diff(record[output]) ** 2)
-            stop = max(_FEWEST_IN_MOTION, int(np.searchsorted(energy, _DIED_AWAY * energy[-1])) + 1)
+            stop = max(
+                SEARCH.fewest_in_motion, int(np.searchsorted(energy, SEARCH.died_away * energy[-1])) + 1
+            )
         cut_off.append(record.slice(0, min(stop, record.n_samples)))
     return tuple(cut_off)
 

@@ -10,24 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.observer import Observer, sensors_of_motion
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 WINDOW = " window "
 """Stands between a record's name and the number of its window."""
-_PERIODS = 10.0
-_MIN_SAMPLES = 100
-_MAX_WINDOWS = 40
-_CYCLES = 4
-"""Cycles of motion in a window where a disturbance grows from cycle to cycle.
-
-An assumption, measured on two drawn rigs with play of a few widths: the true model reaches the noise in nearly every window
-of four cycles, in windows of eight not in the fastest ones.
-"""
-_FEWEST_SAMPLES = 60
-_ABOVE_NOISE = 3.0
-"""Deviation from the middle, in units of the noise, from which a crossing of it is one of the motion."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +43,7 @@ class Windowing:
     @classmethod
     def by_cycles(cls, noise: Mapping[str, float]) -> Windowing:
         """Return windows of a few cycles of the first of these outputs that a record holds, with their noise floors."""
-        return cls(cycles=_CYCLES, noise=noise)
+        return cls(cycles=VERDICT.window_cycles, noise=noise)
 
     @property
     def whole(self) -> bool:
@@ -80,13 +69,13 @@ class Windowing:
     def _edges(self, record: Record, cycles: int) -> list[int]:
         output = next(name for name in self.noise if name in record)
         deviation = record[output] - np.median(record[output])
-        size = _ABOVE_NOISE * self.noise[output]
+        size = SEARCH.crossing_above_noise * self.noise[output]
         sides = np.flatnonzero(np.abs(deviation) > size)
         above = deviation[sides] > 0.0
         crossings = sides[1:][above[1:] & ~above[:-1]]
         edges = [0]
         for crossing in map(int, crossings[cycles - 1 :: cycles]):
-            if min(crossing - edges[-1], record.n_samples - crossing) >= _FEWEST_SAMPLES:
+            if min(crossing - edges[-1], record.n_samples - crossing) >= SEARCH.fewest_window_samples:
                 edges.append(crossing)
         return [*edges, record.n_samples]
 
@@ -125,7 +114,11 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
     """
     dt = max(record.dt for record in records)
     longest = max(record.n_samples * record.dt for record in records)
-    wished = max(_PERIODS * typical_period(rig, records), _MIN_SAMPLES * dt, longest / _MAX_WINDOWS)
+    wished = max(
+        SEARCH.window_periods * typical_period(rig, records),
+        SEARCH.window_samples * dt,
+        longest / SEARCH.most_windows,
+    )
     return min(wished, longest)
 
 

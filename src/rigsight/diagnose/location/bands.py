@@ -13,16 +13,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-_BANDS = 8
-_SEGMENTS = 8
-_FEWEST_SAMPLES = 64
-_EXCITED = 1e-2
-"""Share of the input's power that may lie on either side of the excited range."""
-_RINGS = 1e-3
-"""Share of the answer's power that may lie above it: after a step the rig rings where the input has little power."""
-_STANDS_OUT = 4.0
-"""Power of an answer over that of the noise at which a frequency counts as answered."""
-_RESTS = 1e-3
+from rigsight.diagnose.policy import MAPS
 
 
 def spectrum(samples: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -31,7 +22,7 @@ def spectrum(samples: NDArray[np.float64], dt: float) -> tuple[NDArray[np.float6
     The record is reflected at its ends: else the first and last half segment, where many sweeps have their slowest and fastest
     waves, would weigh less than the rest.
     """
-    length = int(min(samples.size, max(_FEWEST_SAMPLES, samples.size // _SEGMENTS)))
+    length = int(min(samples.size, max(MAPS.fewest_band_samples, samples.size // MAPS.segments)))
     padded = np.pad(samples, min(length // 2, samples.size - 1), mode="reflect")
     # scipy's stubs do not know detrend=False.
     frequency, power = scipy.signal.welch(padded, 1.0 / dt, nperseg=length, detrend=False)  # type: ignore[call-overload,unused-ignore]
@@ -62,8 +53,12 @@ def band_edges(
         omega, drive = spectrum(source - np.mean(source), dt)
         answer = spectrum(response - np.mean(response), dt)[1]
         driven, rings = (np.cumsum(power) / (float(np.sum(power)) or 1.0) for power in (drive, answer))
-        answered = answer > _STANDS_OUT * noise**2 / omega.size
-        kept = answered & (driven >= _EXCITED) & ((driven <= 1.0 - _EXCITED) | (rings <= 1.0 - _RINGS))
+        answered = answer > MAPS.stands_out * noise**2 / omega.size
+        kept = (
+            answered
+            & (driven >= MAPS.beyond_the_input)
+            & ((driven <= 1.0 - MAPS.beyond_the_input) | (rings <= 1.0 - MAPS.beyond_the_answer))
+        )
         kept[0] = False
         lines = np.flatnonzero(kept) if np.any(kept) else np.array([1, omega.size - 1])
         lows.append(float(omega[lines[0]]))
@@ -71,7 +66,7 @@ def band_edges(
     low, high = min(lows), max(highs)
     nyquist = float(np.pi / min(dt for _, _, dt in records))
     high = min(max(high, 2.0 * low), nyquist / 1.01)
-    inner = np.geomspace(low, high, _BANDS + 1)[1:]
+    inner = np.geomspace(low, high, MAPS.bands + 1)[1:]
     return np.concatenate([[0.0], inner, [nyquist]])
 
 
@@ -99,7 +94,7 @@ def dominant_frequency(samples: NDArray[np.float64], dt: float, size: float) -> 
         Size of the whole signal: what varies by less than a small share of it rests.
     """
     centered = samples - np.mean(samples)
-    if samples.size < 2 or float(np.ptp(samples)) <= _RESTS * size:
+    if samples.size < 2 or float(np.ptp(samples)) <= MAPS.rests * size:
         return float("nan")
     power = np.abs(np.fft.rfft(centered * np.hanning(samples.size))) ** 2
     omega = 2.0 * np.pi * np.fft.rfftfreq(samples.size, dt)

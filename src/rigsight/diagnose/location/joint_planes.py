@@ -16,15 +16,13 @@ from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.state_plane import NOTHING, Plane, plane_parts, plane_units
 from rigsight.diagnose.location.trace import Trace
-from rigsight.diagnose.verdict.judgement import AT_FLOOR
+from rigsight.diagnose.policy import MAPS, VERDICT
 from rigsight.discover import JointMotion, joint_motions
 from rigsight.errors import SimulationError
 from rigsight.metrics import rms
 from rigsight.records.record import Record
 
 Signals = Mapping[str, NDArray[np.float64]]
-_MAPPED = 8000
-"""Samples that are followed: about a second of processor time per thousand on a drive train."""
 
 
 def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
@@ -38,9 +36,9 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
 
     Parameters
     ----------
-    bench
+    context
         Rig, noise and the records behind `scored`.
-    linear
+    reidentified
         The re-identified equations.
     scored
         Records, of which the stretches with the largest gap are looked at.
@@ -49,7 +47,7 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
         return ()
     if any(record.free_offsets for record in context.scoring):
         return ()
-    share = max(1, _MAPPED // len(scored))
+    share = max(1, MAPS.mapped_samples // len(scored))
     stretches = [_stretch(context, trace, share) for trace in scored]
     records = [_record(context, trace) for trace in stretches]
     try:
@@ -61,7 +59,7 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
     parts: list[StatePart] = []
     for motion in sorted(motions, key=lambda motion: motion.left):
         parts += plane_parts(
-            context, _plane(context, motion, reidentified.error_over_noise > AT_FLOOR), stretches
+            context, _plane(context, motion, reidentified.error_over_noise > VERDICT.at_floor), stretches
         )
     return tuple(parts)
 

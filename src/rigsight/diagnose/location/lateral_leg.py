@@ -17,15 +17,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import MAPS
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-
-_SLOWEST = 1e-3
-"""Slowest rate looked for, in units of the inverse length of the longest record."""
-_FASTEST = 1.0
-"""Fastest rate looked for, in units of the inverse sample time."""
-_LARGEST_SHIFT = 0.05
-"""Of the longest record."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,7 @@ def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralL
 
     Parameters
     ----------
-    bench
+    context
         Records; the estimation records are fitted, the scoring records give the residuals.
     given
         Parameters of the given simulation.
@@ -78,7 +72,7 @@ def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralL
         return None
     start = _given(rig, given)
     longest = max(r.duration for r in fitted_to)
-    lowest, highest = np.log(_SLOWEST / longest), np.log(_FASTEST / fitted_to[0].dt)
+    lowest, highest = np.log(MAPS.slowest_rate / longest), np.log(MAPS.fastest_rate / fitted_to[0].dt)
     first = float(np.clip(np.log(start.rate), lowest + 1e-6, highest - 1e-6))
 
     def residual(theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -86,7 +80,7 @@ def fit_lateral_leg(context: FitContext, given: Mapping[str, float]) -> LateralL
         return _projected(fitted_to, names, float(np.exp(theta[0])), shift)[0]
 
     plain = scipy.optimize.least_squares(residual, [first], bounds=([lowest], [highest]), x_scale=0.1)
-    reach = _LARGEST_SHIFT * longest / fitted_to[0].dt
+    reach = MAPS.largest_shift * longest / fitted_to[0].dt
     free = scipy.optimize.least_squares(
         residual,
         [plain.x[0], 0.0],

@@ -24,13 +24,8 @@ from rigsight.diagnose.location.quantify import budget_intervals
 from rigsight.diagnose.location.state_plane import state_parts
 from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
+from rigsight.diagnose.policy import MAPS
 from rigsight.metrics import rms
-
-_STRETCHES = 24
-"""Stretches of time into which a record is cut."""
-_FEWEST_SAMPLES = 20
-_LEAST_NOISE = 250
-"""Samples of noise alone below which its spectrum is not worth a guess."""
 
 
 def localize(
@@ -47,7 +42,7 @@ def localize(
 
     Parameters
     ----------
-    bench
+    context
         Records and noise.
     traces
         What the simulations leave of every record.
@@ -167,7 +162,7 @@ def _by_band(
 
 
 def _long_enough(stretches: Stretches) -> Stretches:
-    return tuple((noise, dt) for noise, dt in stretches if noise.size >= _LEAST_NOISE)
+    return tuple((noise, dt) for noise, dt in stretches if noise.size >= MAPS.least_noise)
 
 
 def _colored(std: float, stretches: Stretches, edges: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -189,7 +184,7 @@ def _by_time(scored: Sequence[Trace], noise: Mapping[str, float]) -> list[TimePa
     parts = []
     for trace in scored:
         edges = np.linspace(
-            0, trace.t.size, 1 + max(1, min(_STRETCHES, trace.t.size // _FEWEST_SAMPLES))
+            0, trace.t.size, 1 + max(1, min(MAPS.time_stretches, trace.t.size // MAPS.fewest_stretch_samples))
         ).astype(int)
         for output in trace.measured:
             holding = [other for other in scored if output in other.measured]

@@ -15,16 +15,11 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location.gap_parts import PathPart
 from rigsight.diagnose.location.lateral_leg import LateralLeg, fit_lateral_leg
-from rigsight.diagnose.verdict.judgement import AT_FLOOR
+from rigsight.diagnose.policy import NOTES, VERDICT
 from rigsight.effects import Place
 from rigsight.metrics import rms
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-
-_SIGNIFICANT = 5.0
-"""Standard errors from zero at which a shift counts: they take the residual for white, which it is not."""
-_WORTHWHILE = 1.1
-"""Factor by which a shift must lower what the leg leaves to be spoken of; an assumption."""
 
 
 def path_parts(
@@ -34,7 +29,7 @@ def path_parts(
 
     Parameters
     ----------
-    bench
+    context
         Records and noise.
     before, linear, after
         The given simulation, the re-identified equations, the model of the verdict.
@@ -66,15 +61,15 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
     if len(parts) == 1:
         return f"The path has one leg that can be checked: {motion} after re-identification."
     lateral = parts[1]
-    clean = lateral.reidentified <= AT_FLOOR * lateral.noise_floor
+    clean = lateral.reidentified <= VERDICT.at_floor * lateral.noise_floor
     said = (
         f"{lateral.path}, with {lateral.source} as measured, leaves {_times(lateral.reidentified, lateral)}"
     )
     moved = (
-        abs(lateral.shift) > _SIGNIFICANT * lateral.shift_std
-        and lateral.shifted * _WORTHWHILE < lateral.reidentified
+        abs(lateral.shift) > NOTES.clearly * lateral.shift_std
+        and lateral.shifted * VERDICT.worthwhile < lateral.reidentified
     )
-    if clean and first.reidentified > AT_FLOOR * first.noise_floor:
+    if clean and first.reidentified > VERDICT.at_floor * first.noise_floor:
         return (
             f"The gap lies before {lateral.source} is measured: {motion}, but {said}. Drive or {_words(rig)}, not the lateral "
             f"part and not a delay of the {lateral.source} sensor."
@@ -82,7 +77,7 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
     if clean:
         return f"No leg of the path has a gap worth the name: {motion}, {said}."
     shifted = _times(lateral.shifted, lateral)
-    if moved and lateral.shifted <= AT_FLOOR * lateral.noise_floor:
+    if moved and lateral.shifted <= VERDICT.at_floor * lateral.noise_floor:
         late, early = (
             (lateral.source, lateral.output) if lateral.shift > 0.0 else (lateral.output, lateral.source)
         )

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.location.trace import STAGES, Trace
 from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
-
-_LIMITS = (0.025, 0.975)
+from rigsight.diagnose.policy import MAPS
 
 Interval = tuple[float, float]
 
@@ -74,7 +73,7 @@ def gap_intervals(
 def _limits(values: NDArray[np.float64]) -> Interval:
     if not np.all(np.isfinite(values)):
         return math.nan, math.nan
-    low, high = np.quantile(values, _LIMITS)
+    low, high = np.quantile(values, MAPS.limits)
     return float(low), float(high)
 
 

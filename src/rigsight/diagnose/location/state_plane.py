@@ -19,17 +19,11 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.location.bands import spectrum
 from rigsight.diagnose.location.gap_parts import StatePart
 from rigsight.diagnose.location.trace import STAGES, Trace
+from rigsight.diagnose.policy import MAPS
 from rigsight.metrics import rms
 from rigsight.rigs import evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
-_CELLS = 9
-"""Cells along each axis of the plane."""
-_STANDS_OUT = 4.0
-_MARGIN = 1.5
-_HIGHEST_CUTOFF = 0.8
-"""Of the Nyquist frequency."""
-_ORDER = 4
 NOTHING = float("nan")
 """In place of a force that is not known."""
 
@@ -76,9 +70,9 @@ def state_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
 
     Parameters
     ----------
-    bench
+    context
         Rig and noise.
-    linear
+    reidentified
         The re-identified equations.
     scored
         Records.
@@ -104,7 +98,7 @@ def plane_parts(context: FitContext, plane: Plane, scored: Sequence[Trace]) -> t
 
     Parameters
     ----------
-    bench
+    context
         Rig and noise.
     plane
         Motion and force.
@@ -113,7 +107,7 @@ def plane_parts(context: FitContext, plane: Plane, scored: Sequence[Trace]) -> t
     """
     columns, x_edges = _cells(plane.x)
     rows, v_edges = _cells(plane.v)
-    cell = columns * _CELLS + rows
+    cell = columns * MAPS.cells + rows
     parts = []
     for signal in context.rig.outputs:
         holding = np.concatenate([np.full(t.t.size, signal.name in t.measured) for t in scored])
@@ -130,7 +124,7 @@ def plane_parts(context: FitContext, plane: Plane, scored: Sequence[Trace]) -> t
             inside = own_cell == i
             n_samples = int(np.count_nonzero(inside))
             lacking = own_force[inside] if is_forced else np.array([NOTHING])
-            column, row = divmod(int(i), _CELLS)
+            column, row = divmod(int(i), MAPS.cells)
             parts.append(
                 StatePart(
                     output=signal.name,
@@ -184,12 +178,16 @@ def _motion(context: FitContext, values: Mapping[str, float], trace: Trace) -> _
 def _low_pass(samples: NDArray[np.float64], dt: float, noise: float) -> NDArray[np.float64] | None:
     """Return a filter that keeps what stands out of the noise, None where nothing does."""
     omega, power = spectrum(samples, dt)
-    out = np.flatnonzero(power > _STANDS_OUT * noise**2 / omega.size)
+    out = np.flatnonzero(power > MAPS.stands_out * noise**2 / omega.size)
     if out.size == 0:
         return None
     nyquist = np.pi / dt
-    cutoff = float(np.clip(_MARGIN * omega[out[-1]], 2.0 * omega[1], _HIGHEST_CUTOFF * nyquist))
-    return np.asarray(scipy.signal.butter(_ORDER, cutoff / nyquist, output="sos"), dtype=np.float64)
+    cutoff = float(
+        np.clip(MAPS.cutoff_margin * omega[out[-1]], 2.0 * omega[1], MAPS.highest_cutoff * nyquist)
+    )
+    return np.asarray(
+        scipy.signal.butter(MAPS.filter_order, cutoff / nyquist, output="sos"), dtype=np.float64
+    )
 
 
 def _filtered(sections: NDArray[np.float64], samples: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -201,8 +199,8 @@ def _cells(values: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.fl
     low, high = float(np.min(values)), float(np.max(values))
     if high <= low:
         high = low + 1.0
-    edges = np.linspace(low, high, _CELLS + 1)
-    return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CELLS - 1), edges
+    edges = np.linspace(low, high, MAPS.cells + 1)
+    return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, MAPS.cells - 1), edges
 
 
 def _finite_mean(values: NDArray[np.float64]) -> float:

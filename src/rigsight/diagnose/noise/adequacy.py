@@ -30,29 +30,18 @@ from scipy.stats import spearmanr
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.noise.innovations import Innovations
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import alternatives, slopes
 from rigsight.diagnose.pushes.answers import Answers, Followed, orthonormal
 from rigsight.diagnose.pushes.probes import motion_columns, signal_columns
 
 Floats = NDArray[np.float64]
 
-SIGNIFICANCE = 0.01
-"""p-value below which a model is not adequate: one adequate model of a hundred is refused."""
-AGAINST_A_FLOOR = 0.1
-"""The same for a model that leaves more than a measured floor allows: that floor speaks against it already."""
 _TURNS = 9999
 _PORTIONS = 10
 """Turns are counted a tenth at a time, so that they need no more than some ten megabytes."""
 _SINGULAR = 1e-9
 """Keeps a turn that parameters could follow whole from a division by zero."""
-_STRETCHES = 64
-"""Stretches of all records together whose signs are turned: so many that a number which differs in one record shows, and so few
-that what a disturbance does to a sliding or sticking mass hardly reaches from one into the next (`experiments/adequacy`)."""
-_LONG_STRETCHES = 32
-"""Stretches over which a remainder must be spread: noise alone is of about the same size in each."""
-_LEAST_SPREAD = 0.25
-"""Share of the stretches over which a remainder must be spread, as their number that would hold its power evenly. Noise is spread
-over nearly all; what stands in a few of them agrees with anything there by one turn in two, so that no p-value can tell."""
 _TOO_FAST = "motion that is too fast for the sample time"
 """What a model is blamed for whose steps between samples cannot be as short as its motion needs: nothing can be compared."""
 
@@ -98,7 +87,7 @@ class Adequacy:
     p_value: float
     agreements: tuple[Agreement, ...]
     is_spread: bool = True
-    significance: float = SIGNIFICANCE
+    significance: float = VERDICT.significance
 
     @property
     def adequate(self) -> bool:
@@ -124,7 +113,7 @@ def adequacy(
     context: FitContext,
     model: Scored,
     rng: np.random.Generator,
-    significance: float = SIGNIFICANCE,
+    significance: float = VERDICT.significance,
     of_steady_size: bool = False,
 ) -> Adequacy:
     """Say whether what a model leaves of all records goes with anything.
@@ -134,7 +123,7 @@ def adequacy(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     model
         Fitted and scored.
@@ -151,7 +140,7 @@ def adequacy(
         return Adequacy(0.0, (Agreement(_TOO_FAST, "", 0.0, 1.0),), significance=significance)
     innovations = Innovations(answers)
     seen_left, new = answers.seen_left, innovations.without_free(innovations.of(answers.seen_left))
-    stretches = _stretches(answers, _STRETCHES)
+    stretches = _stretches(answers, VERDICT.stretches)
     signs = rng.choice([-1.0, 1.0], size=(_TURNS, len(stretches)))
     found: list[tuple[Agreement, _Turned]] = []
     for what, place, columns in alternatives(answers):
@@ -178,7 +167,7 @@ class Checks:
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     rng
         Source of the turned signs.
@@ -200,7 +189,9 @@ class Checks:
     def of(self, model: Scored) -> Adequacy:
         """Return what a model's remainder goes with."""
         if model.names not in self._known:
-            significance = SIGNIFICANCE if model.error_over_noise <= self._allowed else AGAINST_A_FLOOR
+            significance = (
+                VERDICT.significance if model.error_over_noise <= self._allowed else VERDICT.against_a_floor
+            )
             # Noise that only motion makes is no reason to say that nothing is missing.
             steady = not model.effects and model.error_over_noise > self._at_floor
             self._known[model.names] = adequacy(self._context, model, self._rng, significance, steady)
@@ -262,9 +253,9 @@ def _smallest(found: Sequence[_Turned]) -> float:
 
 
 def _is_spread(answers: Answers) -> bool:
-    stretches = _stretches(answers, _LONG_STRETCHES)
+    stretches = _stretches(answers, VERDICT.stretches // 2)
     powers = np.array([float(np.mean(answers.seen_left[part] ** 2)) for part in stretches])
-    return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= _LEAST_SPREAD * len(stretches)
+    return float(np.sum(powers)) ** 2 / float(np.sum(powers**2)) >= VERDICT.least_spread * len(stretches)
 
 
 def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:

@@ -17,17 +17,11 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.noise.block_means import block_means
 from rigsight.diagnose.noise.noise_floor import NoiseFloor, Stretches
+from rigsight.diagnose.policy import NOTES
 from rigsight.records.periods import differ_by_noise, repeated_period, roughness
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
-_QUIET_INPUT = 1e-3
-_QUIET_NOISE = 0.01
-"""Largest noise of an input at rest, relative to its span."""
-_WITHIN = 5.0
-"""Standard deviations of its noise within which the steps of a resting input stay."""
-_MIN_QUIET = 100
-_TOP_OF_SPECTRUM = 0.85
 _FREE_MODES = 6
 _MAX_HANKEL_ROWS = 200
 _SMALLEST = 1e-9
@@ -182,19 +176,19 @@ def _quiet_stretches(
         return []  # what swings by itself is no noise, however little drives it
     # A measured input is never quite still: its own noise is no motion, as long as it is small.
     noise = np.array(
-        [min(roughness(column), _QUIET_NOISE * s) for column, s in zip(samples.T, span, strict=True)]
+        [min(roughness(column), NOTES.quiet_noise * s) for column, s in zip(samples.T, span, strict=True)]
     )
-    allowed = np.maximum(_QUIET_INPUT * span, _WITHIN * noise)
+    allowed = np.maximum(NOTES.quiet_input * span, NOTES.quiet_deviations * noise)
     still = np.all(np.abs(np.diff(samples, axis=0)) <= allowed, axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
     found = []
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        moved = np.maximum(_QUIET_INPUT * span, 2.0 * _WITHIN * noise)
+        moved = np.maximum(NOTES.quiet_input * span, 2.0 * NOTES.quiet_deviations * noise)
         start, stop = (begin + place for place in _held(samples[begin : end + 1], moved))
-        if stop - start < _MIN_QUIET:
+        if stop - start < NOTES.least_rest:
             continue
         settled = record[output][start + (stop - start) // 2 if start > 0 else start : stop]
-        if settled.size < _MIN_QUIET // 2:
+        if settled.size < NOTES.least_rest // 2:
             continue
         first, second = np.array_split(settled, 2)
         trend = abs(float(np.mean(second) - np.mean(first)))
@@ -246,5 +240,5 @@ def _top_of_spectrum(samples: NDArray[np.float64]) -> float:
     """Return the standard deviation of white noise with the median power of the highest lines."""
     window = np.hanning(samples.size)
     power = np.abs(np.fft.rfft((samples - np.mean(samples)) * window)) ** 2
-    top = power[int(_TOP_OF_SPECTRUM * power.size) :]
+    top = power[int(NOTES.top_of_spectrum * power.size) :]
     return float(np.sqrt(np.median(top) / np.log(2.0) / np.sum(window**2)))

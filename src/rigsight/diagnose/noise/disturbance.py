@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from rigsight.diagnose.policy import NOTES
 from rigsight.records.record import Record
 from rigsight.rigs import Rig, evaluated
 
@@ -20,8 +21,6 @@ Floats = NDArray[np.float64]
 
 _SMOOTHED = 9
 """Lines of a spectrum that are averaged."""
-_ABOVE = 2.0
-"""Power, in units of the noise, from which a line is read: nine lines of white noise reach it once in a hundred times."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def disturbance(
     variances, highest = [], 0.0
     for record, residual in zip(records, left, strict=True):
         omega, power = _power(residual, record.dt)
-        covered = np.flatnonzero(power < _ABOVE * noise**2)
+        covered = np.flatnonzero(power < NOTES.disturbance_above * noise**2)
         stop = int(covered[0]) if covered.size else omega.size
         omega, power = omega[:stop], power[:stop]
         real = stiffness + follows**2 * inertia - inertia * omega**2

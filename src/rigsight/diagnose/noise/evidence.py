@@ -49,9 +49,9 @@ class Evidence:
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
-    linear
+    reidentified
         The re-identified equations: their resonances are divided out.
     reference
         The model whose remainder tells how large the forces from outside are and how large the sensors' noise.

@@ -106,7 +106,7 @@ class Answers:
 
     Parameters
     ----------
-    bench
+    context
         Scales and noise; its memory is not used.
     records
         Records that were fitted or scored.

@@ -13,13 +13,11 @@ import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.noise.evidence import Evidence
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import law_columns
 from rigsight.diagnose.pushes.answers import Answers, orthonormal
 from rigsight.diagnose.search.one_law import are_one_law, is_one_law
 from rigsight.effects import Effect
-
-_OTHER_FORM = 0.5
-"""Share of a gain that another form of the first effect may take: from a half on, it explains more than the second effect."""
 
 
 class OtherForms:
@@ -27,7 +25,7 @@ class OtherForms:
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     lower_bound
         True if the noise floor is only a lower bound, so that nothing of a remainder can be put down to noise beforehand.
@@ -59,7 +57,7 @@ class OtherForms:
 
         Where another form of it would take most of what it leaves, only those are that make one law with it.
         """
-        if self.share(single) < _OTHER_FORM:
+        if self.share(single) < VERDICT.larger_part:
             return list(effects)
         return [e for e in effects if are_one_law((*single.effects, e), self._context.rig)]
 
@@ -86,7 +84,9 @@ class OtherForms:
             # Two effects that are one law are another form of each other; they are told apart by other means.
             if len(model.effects) > 2 or single is None or not model.residuals or is_one_law(model):
                 return True
-            return self.gain(single) < _OTHER_FORM * (single.error_over_noise**2 - model.error_over_noise**2)
+            return self.gain(single) < VERDICT.larger_part * (
+                single.error_over_noise**2 - model.error_over_noise**2
+            )
 
         return [model for model in larger if stands(model)]
 

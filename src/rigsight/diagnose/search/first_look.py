@@ -20,27 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.starts import start_values, with_own_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
 from rigsight.simulate import Structure
 
-_LOOK_EVALUATIONS = 25
-_GLIMPSE_EVALUATIONS = 8
-_MOST_STARTS = 4
-"""Starts that are all fitted at length."""
-_LENGTHY = 2
-"""Of more starts, those that are fitted at length in pieces, best after a glimpse first; from the others the fit in one piece
-begins after the glimpse. Of hysteresis by sliders with five draws of noise mostly two to five of nine glimpses led on to the
-right place, of four fits at length in pieces one; these are for a model that is too far off for a fit in one piece.
-"""
-_WIDE_EVALUATIONS = 12
 _LOOK_TOLERANCE = 1e-3
 LOOK_ACCURACY = 1e-3
-_NEAR = 25.0
-"""A candidate whose error in the liveliest stretches is below this factor of the best (five times its RMS) sees whole records."""
-_ALIKE = 1.05
-"""Starts whose first looks end within this factor of the best cost are all followed."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +74,7 @@ def look_at(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     effects
         All effects of the model; the last is new.
@@ -130,7 +117,7 @@ def looked_from(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     effects, structure
         The model.
@@ -162,16 +149,19 @@ def _looked(
     ) -> FitResult:
         return in_pieces.fit(start, free, states, most, _LOOK_TOLERANCE, False, of_pieces)
 
-    if len(starts) > _MOST_STARTS:
+    if len(starts) > SEARCH.most_starts:
         glimpses = sorted(
-            (tried(start, None, _GLIMPSE_EVALUATIONS) for start in starts), key=lambda f: f.cost
+            (tried(start, None, SEARCH.glimpse_evaluations) for start in starts), key=lambda f: f.cost
         )
-        at_length = [tried(g.values, g.initial_states, _LOOK_EVALUATIONS) for g in glimpses[:_LENGTHY]]
-        first = [*at_length, *glimpses[_LENGTHY:]]
+        at_length = [
+            tried(g.values, g.initial_states, SEARCH.look_evaluations)
+            for g in glimpses[: SEARCH.lengthy_starts]
+        ]
+        first = [*at_length, *glimpses[SEARCH.lengthy_starts :]]
     else:
-        first = [tried(start, None, _LOOK_EVALUATIONS) for start in starts]
+        first = [tried(start, None, SEARCH.look_evaluations) for start in starts]
     near = [
-        fit.fit(found.values, free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False, substeps)
+        fit.fit(found.values, free, None, SEARCH.look_evaluations, _LOOK_TOLERANCE, False, substeps)
         for found in _apart(first)
     ]
     return _distinct(near)
@@ -187,7 +177,7 @@ def widened(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     looks
         First looks.
@@ -201,7 +191,7 @@ def widened(
     def one(look: FirstLook) -> FirstLook:
         return replace(look, fits=_on_whole_records(context, look.structure, look.free, look.fits, substeps))
 
-    near = [look for look in looks if look.nearest <= _NEAR * lowest]
+    near = [look for look in looks if look.nearest <= SEARCH.near * lowest]
     return list(context.threads.side_by_side(one, near))
 
 
@@ -212,7 +202,7 @@ def looked_again(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     settled
         Gives the equations and the free parameters.
@@ -221,9 +211,10 @@ def looked_again(
     """
     near = context.problem(settled.structure, context.look, LOOK_ACCURACY)
     looks = [
-        near.fit(start, settled.free, None, _LOOK_EVALUATIONS, _LOOK_TOLERANCE, False) for start in starts
+        near.fit(start, settled.free, None, SEARCH.look_evaluations, _LOOK_TOLERANCE, False)
+        for start in starts
     ]
-    best = sorted(looks, key=lambda fit: fit.cost)[:_MOST_STARTS]
+    best = sorted(looks, key=lambda fit: fit.cost)[: SEARCH.most_starts]
     return _on_whole_records(context, settled.structure, settled.free, best)
 
 
@@ -237,7 +228,7 @@ def _on_whole_records(
     whole = context.problem(structure, context.estimation, LOOK_ACCURACY)
 
     def one(near: FitResult, steps: Sequence[int] | None) -> FitResult:
-        found = whole.fit(near.values, free, None, _WIDE_EVALUATIONS, _LOOK_TOLERANCE, False, steps)
+        found = whole.fit(near.values, free, None, SEARCH.wide_evaluations, _LOOK_TOLERANCE, False, steps)
         # Steps that served another model may be too long for a lag of a fraction of a sample.
         return found if steps is None or np.isfinite(found.cost) else one(near, None)
 
@@ -261,7 +252,7 @@ def _apart(fits: Sequence[FitResult]) -> list[FitResult]:
 def _distinct(fits: Sequence[FitResult]) -> tuple[FitResult, ...]:
     """Return the best fit, and the next one that ended elsewhere if its cost is nearly that of the best."""
     best, *others = _apart(fits)
-    return (best, *[other for other in others if other.cost <= _ALIKE * best.cost][:1])
+    return (best, *[other for other in others if other.cost <= SEARCH.alike_starts * best.cost][:1])
 
 
 def _at_one_place(one: FitResult, other: FitResult) -> bool:

@@ -11,6 +11,7 @@ from rigsight.diagnose.fitting.observer import Observer, followed_sensors
 from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing, typical_period, window_length
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.errors import SimulationError
@@ -18,24 +19,6 @@ from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads
 from rigsight.records.record import Record
 from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, simulate_outputs, structure_of_fit
-
-_CLOSE, _LOOSE = 6.0, 0.1
-"""Bandwidths of the closest and the loosest observer, in units of the typical frequency of the velocity.
-
-At six the harmonics of friction that turns with the velocity still show; at a tenth errors add up for ten periods, as long as
-drift stays small against motion.
-"""
-_LOOSER = 2.0
-_OF_SAMPLING = 0.2
-"""Largest bandwidth times sample time: an observer that is closer follows the noise of single samples."""
-_AMPLIFIED = 1.1
-"""Most that a true model may leave of a sensor's noise, in units of that noise, as it follows the noise of others.
-
-A pressure or a speed is moved by the noise of the position that is followed. With a tenth more a true model still counts as one
-that reaches the floor, see `AT_FLOOR`.
-"""
-_CLEAR = 10.0
-"""Gap, in units of the noise floor, that shows its cause: benches of the catalogue are judged from ten floors on."""
 
 
 def brings_back(task: Task) -> bool:
@@ -45,7 +28,7 @@ def brings_back(task: Task) -> bool:
     typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
     motion, values = task.rig.motion, start_values_of(task)
     numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
-    return bool(np.min(np.abs(np.roots(numbers))) >= _LOOSE * typical)
+    return bool(np.min(np.abs(np.roots(numbers))) >= SEARCH.observer_loose * typical)
 
 
 def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[Windowing, dict[str, float]]:
@@ -75,18 +58,22 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[W
     if not sensors:
         return Windowing(window_length(task.rig, task.estimation)), dict.fromkeys(noise, 1.0)
     typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
-    bandwidth = min(_CLOSE * typical, _OF_SAMPLING / max(record.dt for record in task.records))
+    bandwidth = min(
+        SEARCH.observer_close * typical, SEARCH.observer_sampling / max(record.dt for record in task.records)
+    )
     values: Mapping[str, float] | None = None
     while True:
         windowing = Windowing(observer=Observer(sensors, bandwidth))
         context = fit_context_of(task, noise, windowing, None, IdleThreads(n_jobs))
         reidentified = reidentify(context, values or context.start)
         amplified = noise_of_following(context, reidentified.fit)
-        shows = reidentified.error_over_noise >= _CLEAR and max(amplified.values()) <= _AMPLIFIED
-        if shows or bandwidth <= _LOOSE * typical:
+        shows = (
+            reidentified.error_over_noise >= SEARCH.clear_gap and max(amplified.values()) <= VERDICT.at_floor
+        )
+        if shows or bandwidth <= SEARCH.observer_loose * typical:
             return windowing, {name: max(1.0, factor) for name, factor in amplified.items()}
         values = reidentified.fit.values if reidentified.residuals else None
-        bandwidth = max(bandwidth / _LOOSER, _LOOSE * typical)
+        bandwidth = max(bandwidth / SEARCH.observer_step, SEARCH.observer_loose * typical)
 
 
 def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
@@ -96,7 +83,7 @@ def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
 
     Parameters
     ----------
-    bench
+    context
         Records with what models follow, noise of each sensor.
     fit
         The equations without an effect, fitted to the records.

@@ -13,15 +13,10 @@ from collections.abc import Sequence
 import sympy as sp
 
 from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Rig
-
-_EXACT = 1.03
-"""Held-out error in units of the noise floor up to which such a pair counts as exact: floors are known to a few percent.
-
-An assumption: the two that were the truth left 0.99 and 1.01, seven of the twelve that were not 1.05 to 1.10.
-"""
 
 
 def split_distinguishable(
@@ -42,7 +37,7 @@ def split_distinguishable(
     competing: list[Scored] = []
     imitations: list[Scored] = []
     for pair in pairs:
-        stands = not _has_one_law(pair) or (pair.error_over_noise <= _EXACT and best > allowed)
+        stands = not _has_one_law(pair) or (pair.error_over_noise <= VERDICT.exact and best > allowed)
         (competing if stands else imitations).append(pair)
     return competing, imitations
 

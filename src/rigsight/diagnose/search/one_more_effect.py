@@ -12,22 +12,13 @@ from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.screening import structures_of_lineup
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.effects import Effect
 from rigsight.simulate import Structure
-
-_WORTH_FOLLOWING = 0.85
-"""Factor by which an effect must lower the cost at a first look to be fitted with care."""
-_MOST_FOLLOWED = 6
-_NEAR_THE_BEST = 2.0
-"""Models that cost at most this many times the best at a first look are fitted with care."""
-_BOTH_WAYS = 6
-"""Most promising pairs that are looked at from the fit of the second effect as well."""
-_MOST_STEPS = 4
-"""Substeps of a first look beyond its parent's: enough for a lag of a fifth of a sample."""
 
 Prepare = Callable[[Sequence[Structure]], None]
 
@@ -45,7 +36,7 @@ def with_one_more(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     parent
         The model that leaves something.
@@ -96,7 +87,9 @@ def _fitted_beside(
         own = alone.get(effect.name)
         if own is None:
             return base.substeps
-        return tuple(max(n, min(m, _MOST_STEPS)) for n, m in zip(base.substeps, own.substeps, strict=True))
+        return tuple(
+            max(n, min(m, SEARCH.most_added_steps)) for n, m in zip(base.substeps, own.substeps, strict=True)
+        )
 
     def one(effect: Effect) -> FirstLook:
         pushed = [search.starts[effect.name]] if effect.name in search.starts else []
@@ -109,7 +102,7 @@ def _fitted_beside(
         return widened(context, [look], substeps=steps(look.effects[-1]), lowest=near)
 
     found = list(context.threads.side_by_side(wide, looks))
-    looks = sorted(itertools.chain.from_iterable(found), key=_cost)[:_BOTH_WAYS]
+    looks = sorted(itertools.chain.from_iterable(found), key=_cost)[: SEARCH.both_ways]
 
     def other_way(found: FirstLook) -> FirstLook:
         second = found.effects[-1]
@@ -122,13 +115,13 @@ def _fitted_beside(
 
     looks = list(context.threads.side_by_side(other_way, looks))
     lowest = min((found.cost for found in looks), default=float("inf"))
-    worth = min(_WORTH_FOLLOWING * base.cost, _NEAR_THE_BEST * lowest)
+    worth = min(SEARCH.worth_following * base.cost, SEARCH.near_the_best * lowest)
     promising = sorted((found for found in looks if found.cost <= worth), key=_cost)
 
     def follow(found: FirstLook) -> Scored:
         return followed(context, found, promising=True, finish=False)
 
-    return list(context.threads.side_by_side(follow, promising[:_MOST_FOLLOWED]))
+    return list(context.threads.side_by_side(follow, promising[: SEARCH.most_followed]))
 
 
 def _cost(found: FirstLook) -> float:

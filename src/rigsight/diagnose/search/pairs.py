@@ -16,35 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
-from rigsight.diagnose.search.third_effect import IN_ITS_PLACE, with_a_third, with_relatives
+from rigsight.diagnose.search.third_effect import with_a_third, with_relatives
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
-
-_BEAM = 1.3
-"""Singles are grown if their held-out error is within this factor of the best: the simplest, and the best that is unlike it."""
-_TIE = 1.01
-_MOST_FINISHED = 2
-_MOST_PRUNED = 2
-_MOST_SWAPS = 2
-"""Times that a more general effect is put into the best pair: once for each of its two."""
-_FINEST_STEPS = 4
-"""Substeps up to which another parent than the plainest is grown from: a loop far stiffer than the records is no loop of the rig,
-and each of its partners would take as fine steps. An assumption, made for the time that it saves."""
-_NOTHING_LEFT = 1.03
-"""Held-out error in units of the noise floor above which more is tried: another parent, effects that contain one of the pair's.
-
-An assumption: floors are known to a few percent.
-"""
-_HALF = 0.5
-"""Share of what is left above the floor that one more effect must close, as the first must of the whole gap.
-
-An assumption: where the form of the first is not quite that of the rig, many a second one takes a little off the rest.
-Of three effects of one size the second closes less, and the third all that is left.
-"""
 
 
 def grown(
@@ -60,7 +39,7 @@ def grown(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     singles
         Every effect alone, fitted and scored.
@@ -87,22 +66,24 @@ def grown(
         return []
     # Beside an effect that explains nothing a second one does what it does alone.
     explaining = [model for model in usable if model.error_over_noise <= worthwhile] or usable
-    close = [model for model in explaining if model.error_over_noise <= _BEAM * usable[0].error_over_noise]
+    close = [
+        model for model in explaining if model.error_over_noise <= SEARCH.beam * usable[0].error_over_noise
+    ]
     # Of those that explain as much, the one with the fewest numbers leaves most for a second to explain; of those with as
     # many, the one that the catalogue has first is the plainer.
     best = min(close, key=lambda model: (model.n_free, model.error_over_noise))
     first = _plainest([model for model in close if model.n_free == best.n_free], best, effects)
     others = [model for model in close if model is not first and not _alike(first, model)]
-    others = [model for model in others if max(model.fit.substeps) <= _FINEST_STEPS]
+    others = [model for model in others if max(model.fit.substeps) <= SEARCH.finest_steps]
     allowed = _half_closed(usable[0].error_over_noise)
     # An effect that was left out of the singles, as another says the same, may still be half of a pair.
     alone = {effect.name: np.inf for effect in effects} | {
         model.names[0]: model.error_over_noise for model in singles
     }
     pairs: list[Scored] = []
-    parents = [(first, _NOTHING_LEFT)]
+    parents = [(first, VERDICT.exact)]
     if others:
-        parents.append((_plainest(others, others[0], effects), _NOTHING_LEFT))
+        parents.append((_plainest(others, others[0], effects), VERDICT.exact))
         # Fitted by itself, an effect may stand far off for what a second one does to it: one more where no pair competes.
         parents.append((min(others, key=lambda model: (model.n_free, model.error_over_noise)), allowed))
     tried: list[Scored] = []
@@ -116,19 +97,19 @@ def grown(
         for second in (model for model in usable if model not in tried):
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
-                instead = [e for e in effects if alone[e.name] <= IN_ITS_PLACE * alone[name]]
+                instead = [e for e in effects if alone[e.name] <= VERDICT.comparable * alone[name]]
                 pairs += with_one_more(
                     context, second, forms.partners(second, instead), pairs, usable, prepare
                 )
-    for _ in range(_MOST_SWAPS):
+    for _ in range(SEARCH.most_swaps):
         best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
-        if best_pair is None or not _NOTHING_LEFT < best_pair.error_over_noise <= allowed:
+        if best_pair is None or not VERDICT.exact < best_pair.error_over_noise <= allowed:
             break
         pairs += _more_general(context, best_pair, usable, effects, pairs, prepare)
     pairs.sort(key=lambda pair: pair.error_over_noise)
     # Of two that are one law, such as a late drive and a late sensor, the one that is finished alone would win.
-    last = pairs[:_MOST_FINISHED][-1].error_over_noise if pairs else 0.0
-    n_finished = sum(pair.error_over_noise <= _TIE * last for pair in pairs)
+    last = pairs[: SEARCH.most_finished][-1].error_over_noise if pairs else 0.0
+    n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
     pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
     pairs = refine(context, pairs)
     triples = with_a_third(context, usable, pairs, effects, at_floor, forms, prepare)
@@ -150,13 +131,13 @@ def grown(
 
 def _half_closed(left: float) -> float:
     """Return what one more effect may leave of what is left, in units of the noise floor."""
-    return left - _HALF * (left - 1.0)
+    return left - VERDICT.larger_part * (left - 1.0)
 
 
 def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect]) -> Scored:
     """Return of the models that explain as much as one of them that with the fewest numbers, the first in the catalogue."""
     order = {effect.name: place for place, effect in enumerate(effects)}
-    tied = [model for model in models if model.error_over_noise <= _TIE * like.error_over_noise]
+    tied = [model for model in models if model.error_over_noise <= SEARCH.alike_pairs * like.error_over_noise]
     return min(tied, key=lambda model: (model.n_free, order[model.names[0]]))
 
 
@@ -167,7 +148,7 @@ def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequenc
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     singles
         Every effect alone, fitted and scored.
@@ -175,10 +156,10 @@ def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequenc
         From `grown`.
     """
     better = {model.names: model for model in singles}
-    for pair in sorted(pairs, key=lambda pair: pair.error_over_noise)[:_MOST_PRUNED]:
+    for pair in sorted(pairs, key=lambda pair: pair.error_over_noise)[: SEARCH.most_refitted]:
         for effect in pair.effects:
             known = better.get((effect.name,))
-            if known is not None and known.error_over_noise <= _TIE * pair.error_over_noise:
+            if known is not None and known.error_over_noise <= SEARCH.alike_pairs * pair.error_over_noise:
                 continue
             structure = context.simplest((effect,)) if known is None else known.fit.structure
             free = tuple(context.free_parameters(structure)) if known is None else known.fit.free
@@ -193,7 +174,9 @@ def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequenc
             )
             # One that was left out of the singles, as another said the same, comes back only where it is all that is needed.
             if alone.error_over_noise <= (
-                _TIE * pair.error_over_noise if known is None else known.error_over_noise / _TIE
+                SEARCH.alike_pairs * pair.error_over_noise
+                if known is None
+                else known.error_over_noise / SEARCH.alike_pairs
             ):
                 better[alone.names] = alone
     return list(better.values())

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import looked_from
 from rigsight.diagnose.search.sensitive_motion import scored_in_windows
 from rigsight.diagnose.search.starts import start_values
-
-_MOST_FITTED = 3
-"""Pairs that are fitted in windows: those nearest to the whole records, which the true one still is; an assumption."""
 
 
 def pairs_in_windows(
@@ -26,17 +24,17 @@ def pairs_in_windows(
 
     Parameters
     ----------
-    bench
+    context
         Whole records, scales and noise.
     windows
         The same cut into windows.
-    linear
+    reidentified
         The re-identified equations on whole records.
     pairs
         Fitted to whole records; models of more effects are left out.
     """
     of_two = [pair for pair in pairs if len(pair.effects) == 2]
-    nearest = sorted(of_two, key=lambda pair: pair.error_over_noise)[:_MOST_FITTED]
+    nearest = sorted(of_two, key=lambda pair: pair.error_over_noise)[: SEARCH.most_windowed_pairs]
 
     def one(pair: Scored) -> Scored:
         return _fitted(context, windows, reidentified, pair)

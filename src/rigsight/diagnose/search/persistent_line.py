@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import get_window
 
-_NEIGHBORS = 21
-"""Frequencies whose median is what a line stands out of."""
-_LEAST_CYCLES = 4
-"""Cycles in a record that tell a line from a drift."""
+from rigsight.diagnose.policy import SEARCH
 
 
 def persistent_line(residuals: Sequence[NDArray[np.float64]], dt: Sequence[float]) -> float | None:
@@ -33,14 +30,14 @@ def persistent_line(residuals: Sequence[NDArray[np.float64]], dt: Sequence[float
     None if no record is long enough.
     """
     duration = min((r.size * step for r, step in zip(residuals, dt, strict=True)), default=0.0)
-    least = 2.0 * np.pi * _LEAST_CYCLES / duration if duration > 0.0 else np.inf
+    least = 2.0 * np.pi * SEARCH.line_cycles / duration if duration > 0.0 else np.inf
     most = min((np.pi / step for step in dt), default=0.0)
     omega = np.arange(least, most, np.pi / duration) if np.isfinite(least) else np.zeros(0)
-    if omega.size < _NEIGHBORS:
+    if omega.size < SEARCH.line_neighbors:
         return None
     levels = [_level(r, step, omega) for r, step in zip(residuals, dt, strict=True)]
     level = np.mean(levels, axis=0)
-    prominence = level - median_filter(level, _NEIGHBORS, mode="nearest")
+    prominence = level - median_filter(level, SEARCH.line_neighbors, mode="nearest")
     return float(omega[int(np.argmax(prominence))])
 
 

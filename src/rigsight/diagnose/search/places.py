@@ -6,15 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.screening import Lineup, Suspect
 from rigsight.effects import Effect
-
-_WORTH_LOOKING = 0.5
-"""Share of what the best place, or the best effect, takes away from which another one is looked at.
-
-An assumption, made before 80 drive trains were drawn (experiments/places): a push has the form of a start and not of the fit, so
-that the true place of a large gap may come second. The same number serves for effects on rigs with one motion.
-"""
 
 
 @dataclass(frozen=True)
@@ -56,7 +50,7 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     model
         The equations that leave something, fitted.
@@ -77,7 +71,7 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
         )
     shares = _by_place(context, suspects)
     places = sorted(
-        (SuspectedPlace(name, share, share >= _WORTH_LOOKING * most) for name, share in shares.items()),
+        (SuspectedPlace(name, share, share >= VERDICT.larger_part * most) for name, share in shares.items()),
         key=lambda place: -place.share,
     )
     looked_at = {place.name for place in places if place.looked_at}
@@ -90,7 +84,7 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
 def _promising(effects: Sequence[Effect], suspects: Sequence[Suspect]) -> tuple[Effect, ...]:
     """Return the effects whose push takes away enough, those that no push tells of, and the simpler ones that they start from."""
     shares = {suspect.effect.name: suspect.share for suspect in suspects}
-    enough = _WORTH_LOOKING * max(shares.values(), default=0.0)
+    enough = VERDICT.larger_part * max(shares.values(), default=0.0)
     found = [effect for effect in effects if shares.get(effect.name, enough) >= enough]
     parents = {name for effect in found for name in effect.parents}
     return tuple(effect for effect in effects if effect in found or effect.name in parents)

@@ -15,22 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from rigsight.diagnose.policy import SEARCH
+
 Floats = NDArray[np.float64]
 Law = Callable[[Floats, float], Sequence[Floats]]
 """Parts of a force (or an error) along a way at a wave number, shape (n_samples,) each, one for each coefficient."""
 Answer = Callable[[Floats], NDArray[np.complex128]]
 """Answer of the output to that force over the angular frequency."""
-
-_PER_WAVE = 4.0
-"""Wave numbers tried while one more wave comes to lie on the way; a fit finds back from half of one."""
-_MOST_WAVES = 120.0
-"""Waves on the way up to which lines are looked for: more of them would take as long as the fits."""
-_MOST_SAMPLES = 16000
-"""Samples of all records together, for the same reason."""
-_SMOOTHED = 15
-"""Lines over which the spectrum is averaged that the others are weighed by: fewer would flatten what is looked for."""
-_LOWEST_LINE = 2
-"""First line of a spectrum over time that is used: below is drift, which initial states take."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +56,7 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
     count
         Number of lines.
     """
-    share = max(_MOST_SAMPLES // max(len(runs), 1), 64)
+    share = max(SEARCH.most_wave_samples // max(len(runs), 1), 64)
     runs = [_liveliest(run, share) for run in runs]
     spans = [float(np.ptp(run.way)) for run in runs]
     span = max(spans, default=0.0)
@@ -73,8 +64,10 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
     if span <= 0.0 or not np.any(steps > 0.0):
         return []
     # Two samples tell a wave at the speed that nine tenths of them do not exceed.
-    shortest = 2.0 * max(float(np.quantile(steps, 0.9)), span / _MOST_WAVES / 2.0)
-    waves = np.arange(1.0, max(span / shortest, 1.0) + 1.0 / _PER_WAVE, 1.0 / _PER_WAVE)
+    shortest = 2.0 * max(float(np.quantile(steps, 0.9)), span / SEARCH.most_waves / 2.0)
+    waves = np.arange(
+        1.0, max(span / shortest, 1.0) + 1.0 / SEARCH.waves_per_line, 1.0 / SEARCH.waves_per_line
+    )
     spectra = [_Spectrum(run, answer) for run in runs]
     lines = [_line(law, spectra, float(wave)) for wave in 2.0 * np.pi * waves / span]
     shares = np.array([line.share for line in lines])
@@ -90,11 +83,11 @@ class _Spectrum:
         n = run.way.size
         self._window = np.hanning(n)
         omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(n, run.dt), dtype=np.float64)
-        self._used = slice(_LOWEST_LINE, None)
+        self._used = slice(SEARCH.lowest_line, None)
         self.way = run.way
         left = self._over_frequency(run.left)
         # Without weights the few lowest lines, of drift and of forces that are wrong elsewhere, would decide alone.
-        size = np.asarray(np.sqrt(uniform_filter1d(np.abs(left) ** 2, _SMOOTHED, mode="nearest")))
+        size = np.asarray(np.sqrt(uniform_filter1d(np.abs(left) ** 2, SEARCH.wave_smoothing, mode="nearest")))
         self._weight = 1.0 / np.maximum(size, 1e-12 * np.max(size, initial=1e-300))
         self._answer = answer(np.asarray(omega[self._used], dtype=np.float64)) * self._weight
         self.left = left * self._weight

@@ -10,15 +10,13 @@ from scipy.signal import lfilter
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.diagnose.policy import SEARCH
 from rigsight.errors import SimulationError
 from rigsight.records.plausibility import is_constant
 from rigsight.records.record import Record
 from rigsight.simulate import parameter_vector, record_input, record_values, simulate_outputs
 
-PREDICTABLE = 3.0
-"""Growth of a disturbance, beside what it does to the linear rig, up to which free run is a fair test; an assumption."""
 _ACCURACY = 1e-5
-_DRAWS = 4
 
 
 def growth_of_disturbances(
@@ -31,9 +29,9 @@ def growth_of_disturbances(
 
     Parameters
     ----------
-    bench
+    context
         Records and noise.
-    linear
+    reidentified
         The equations without an effect.
     model
         The model in question.
@@ -53,7 +51,7 @@ def growth_of_disturbances(
     sizes = moving or {rig.inputs[0].name: context.scales["input"]}
     largest = 0.0
     for index in range(len(context.scoring)):
-        for source in list(sizes) * math.ceil(_DRAWS / len(sizes)):
+        for source in list(sizes) * math.ceil(SEARCH.predictability_draws / len(sizes)):
             try:
                 grown = _growth(context, reidentified, model, index, source, sizes[source], rng)
             except SimulationError:

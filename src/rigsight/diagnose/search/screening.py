@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.pushes.answers import Answers
 from rigsight.diagnose.pushes.probes import (
     PUSH_SIZE,
@@ -45,15 +46,7 @@ Floats = NDArray[np.float64]
 
 _SMALL = 0.1
 """Size of a push whose answer is taken to be proportional to it, in units of what the effect itself would be."""
-_WIDER = (1.0 / 3.0, 1.0, 3.0)
-"""Factors on an effect's inner numbers beside its declared starts: a fit would move on from these, a push cannot."""
-_FEW = 4
-"""Declared starts up to which the wider ones are tried: more of them span their range by themselves."""
-_FITTED = 2
-"""Pushes of each effect that are fitted, of all its starts."""
-_EVALUATIONS = 6
 _TOLERANCE = 1e-3
-_SUBSTEPS = 4
 
 
 @dataclass(frozen=True)
@@ -80,7 +73,7 @@ class Lineup:
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     model
         The equations that leave something, fitted.
@@ -118,7 +111,7 @@ class Lineup:
         size = np.einsum("ij,ij->j", columns, columns)
         usable = np.flatnonzero(np.isfinite(size) & (size > 0.0))
         along = {int(i): float(columns[:, i] @ self._answers.left) for i in usable}
-        best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[:_FITTED]
+        best = sorted(along, key=lambda i: -(along[i] ** 2) / size[i])[: SEARCH.fitted_pushes]
         found = [(*self._fitted_share(place, pushes[i], along[i] / size[i]), formed[i][0]) for i in best]
         share, factor, own = max(found, key=lambda one: one[0], default=(0.0, 0.0, {}))
         return Suspect(effect, share, _sized(effect, own, factor))
@@ -141,7 +134,7 @@ class Lineup:
             {**self._answers.values, PUSH_SIZE: push_size},
             free,
             self._answers.fitted_states,
-            _EVALUATIONS,
+            SEARCH.push_evaluations,
             _TOLERANCE,
             False,
             self._fit.substeps,
@@ -167,7 +160,9 @@ class Lineup:
             moved = Record(record.name, record.dt, named, {}, hold=record.hold)
             held = record_input(structure, moved)
             with np.errstate(all="ignore"):
-                out = simulate_sets(structure, held, p, x0, record.n_samples, Substeps(_SUBSTEPS))[:, column]
+                out = simulate_sets(structure, held, p, x0, record.n_samples, Substeps(SEARCH.push_substeps))[
+                    :, column
+                ]
             without = (
                 smooth_motion(seen, record.dt)[0][:, None] * p[structure.names.index(STIFFNESS)]
                 if of_joint
@@ -206,7 +201,7 @@ class Lineup:
                 STIFFNESS: stiffness,
             }
             for own in declared
-            for factor in (_WIDER if inner and len(declared) <= _FEW else (1.0,))
+            for factor in (SEARCH.wider_starts if inner and len(declared) <= SEARCH.few_starts else (1.0,))
         ]
 
     def _times(self, effect: Effect) -> list[float]:

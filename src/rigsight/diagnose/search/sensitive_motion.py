@@ -12,25 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.search.predictability import PREDICTABLE, growth_of_disturbances
+from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.search.starts import start_values
-
-_AS_NEAR = 1.5
-_MOST_ASKED = 4
-"""Models that are asked how predictable the motion is: so many, with held-out errors within this factor of the best.
-
-An assumption, like the numbers below: two drawn rigs with play are all that was looked at.
-"""
-_MOST_FITTED = 4
-"""Models that are fitted in windows: those nearest to the whole records, which a true one still is."""
-_SMALLER = (1.0, 0.3)
-"""Factors on the declared starts of an effect: too large a play sticks where a small one would not."""
-_GLIMPSED = 3
-"""Every so many windows are read at a first glance."""
-_BY_CHANCE = 0.5
-"""Share of what a model leaves from which chance may be what it lacks: below, something else leaves most of it."""
-_GLIMPSE_EVALUATIONS = 10
-_MOST_STARTS = 2
 
 
 def is_predictable(
@@ -44,7 +28,7 @@ def is_predictable(
 
     Parameters
     ----------
-    bench, linear
+    context, reidentified
         Whole records, and the re-identified equations on them.
     models
         Candidates, fitted and scored.
@@ -56,13 +40,13 @@ def is_predictable(
     usable = _nearest(models)
     if not usable or usable[0].error_over_noise <= at_floor:
         return True
-    near = [model for model in usable if model.error_over_noise <= _AS_NEAR * usable[0].error_over_noise][
-        :_MOST_ASKED
-    ]
+    near = [
+        model for model in usable if model.error_over_noise <= VERDICT.comparable * usable[0].error_over_noise
+    ][: SEARCH.most_asked]
     # What chance makes of a disturbance can be no more than a part of what is left, where much more is left.
     return all(
         growth_of_disturbances(context, reidentified, model, rng)
-        <= max(PREDICTABLE, _BY_CHANCE * model.error_over_noise)
+        <= max(VERDICT.sensitive, VERDICT.larger_part * model.error_over_noise)
         for model in near
     )
 
@@ -72,14 +56,14 @@ def fitted_in_windows(context: FitContext, reidentified: Scored, singles: Sequen
 
     Parameters
     ----------
-    bench
+    context
         Records cut into windows, scales and noise.
-    linear
+    reidentified
         The re-identified equations.
     singles
         Every effect alone, fitted to whole records.
     """
-    nearest = {model.names for model in _nearest(singles)[:_MOST_FITTED]}
+    nearest = {model.names for model in _nearest(singles)[: SEARCH.most_asked]}
 
     def one(model: Scored) -> Scored:
         if not model.residuals:
@@ -101,15 +85,15 @@ def _fitted(context: FitContext, reidentified: Scored, model: Scored) -> Scored:
     declared = list(start_values(context, structure, effect, reidentified.fit, {}))
     starts = [
         model.fit.values,
-        *({**s, **{n: f * s[n] for n in own if n in free}} for s in declared for f in _SMALLER),
+        *({**s, **{n: f * s[n] for n in own if n in free}} for s in declared for f in SEARCH.smaller_starts),
     ]
-    few = context.problem(structure, context.estimation[::_GLIMPSED])
+    few = context.problem(structure, context.estimation[:: SEARCH.glimpsed_windows])
     glimpses = sorted(
-        (few.fit_windows(start, free, _GLIMPSE_EVALUATIONS, most_rounds=1) for start in starts),
+        (few.fit_windows(start, free, SEARCH.window_evaluations, most_rounds=1) for start in starts),
         key=lambda fit: fit.cost,
     )
     problem = context.problem(structure, context.estimation)
-    fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[:_MOST_STARTS]]
+    fits = [problem.fit_windows(glimpse.values, free) for glimpse in glimpses[: SEARCH.window_starts]]
     usable = [fit for fit in fits if fit.residuals]
     if not usable:
         return model.not_simulated()
@@ -135,7 +119,7 @@ def scored_in_windows(context: FitContext, model: Scored, values: Mapping[str, f
 
     Parameters
     ----------
-    bench
+    context
         Records cut into windows, scales and noise.
     model
         Gives the equations.

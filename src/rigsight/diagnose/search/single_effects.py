@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.first_look import (
     LOOK_ACCURACY,
     FirstLook,
@@ -25,34 +26,9 @@ from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
 from rigsight.simulate import Structure
 
-_MOST_RESTARTS = 4
-_WORTH_RESTARTING = 1e-3
-"""Share of the cost that a fit from elsewhere must remove to be followed."""
 _FAINT = 1e-3
-_LONG_PIECE = 20.0
-_STUCK = 2.0
-"""Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit counts as stopped short."""
-_ROUGH_EVALUATIONS = 40
 _ROUGH_TOLERANCE = 1e-4
-_HOPELESS_EVALUATIONS = 8
-_REFINE_EVALUATIONS = 150
-"""With one integration step per sample; a model that takes more gets fewer: far stiffer ones follow a valley without end."""
-_FEWEST_REFINE_EVALUATIONS = 15
 _HOPELESS_TOLERANCE = 1e-2
-_PROMISING = 9.0
-"""A candidate that costs less than this factor of the best on whole records (three times its RMS) is followed to the end."""
-CONTENDER = 1.5
-"""A model whose held-out error is within this factor of the best is fitted to full precision."""
-_WORTH_RELEASING = 1.05
-"""Excess over the floor above which a fixed exponent is released."""
-_SIGNIFICANT = 3.0
-"""Standard errors by which a constant force must differ from what is known of it to be one that is needed: one chance in 370.
-
-One that was estimated, as its value other than the default tells, is known no better than the other numbers of the simulation in
-question: it must differ by as many times their root mean square.
-"""
-_RELEASE_GAIN = 1.02
-"""Factor by which a released exponent must lower the held-out error to be kept."""
 
 
 def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
@@ -73,9 +49,9 @@ def fit_candidates(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
-    linear
+    reidentified
         The re-identified equations.
     effects
         Candidates; those that the rig does not offer are left out.
@@ -95,9 +71,9 @@ def fit_candidates(
 
     def one(found: FirstLook) -> Scored:
         found = wide.get(found.newest, found)
-        promising = found.newest in wide and found.cost <= _PROMISING * lowest
+        promising = found.newest in wide and found.cost <= SEARCH.promising * lowest
         scored = followed(context, found, promising)
-        if scored.fit.cost > (1.0 + _WORTH_RESTARTING) * reidentified.fit.cost:
+        if scored.fit.cost > (1.0 + SEARCH.worth_restarting) * reidentified.fit.cost:
             scored = min(
                 scored, _from_hardly_any(context, found, reidentified.fit), key=lambda model: model.fit.cost
             )
@@ -155,7 +131,7 @@ def _moves(context: FitContext, fit: FitResult, known: Mapping[str, float]) -> b
     others = _moves_of(fit, {name: value for name, value in estimated.items() if name not in known})
     usual = max(1.0, float(np.sqrt(np.mean(np.square(list(others.values())))))) if others else 1.0
     return any(
-        move > _SIGNIFICANT * (usual if name in estimated else 1.0)
+        move > VERDICT.standard_errors * (usual if name in estimated else 1.0)
         for name, move in _moves_of(fit, known).items()
     )
 
@@ -208,7 +184,7 @@ def fit_candidate(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     effects
         All effects of the model; the last is new.
@@ -226,10 +202,12 @@ def refine(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
     best = min((m.error_over_noise for m in models), default=float("inf"))
 
     def one(model: Scored) -> Scored:
-        if not (np.isfinite(model.error_over_noise) and model.error_over_noise <= CONTENDER * best):
+        if not (np.isfinite(model.error_over_noise) and model.error_over_noise <= VERDICT.comparable * best):
             return model
         steps = max(substeps.mean for substeps in model.fit.substeps)
-        return _refined(context, model, max(_FEWEST_REFINE_EVALUATIONS, round(_REFINE_EVALUATIONS / steps)))
+        return _refined(
+            context, model, max(SEARCH.fewest_refine_evaluations, round(SEARCH.refine_evaluations / steps))
+        )
 
     refined = list(context.threads.side_by_side(one, models))
     leading = min(range(len(refined)), key=lambda i: refined[i].error_over_noise, default=None)
@@ -238,7 +216,7 @@ def refine(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
         and np.isfinite(refined[leading].error_over_noise)
         and not refined[leading].fit.success
     ):
-        refined[leading] = _refined(context, refined[leading], _REFINE_EVALUATIONS)
+        refined[leading] = _refined(context, refined[leading], SEARCH.refine_evaluations)
     return refined
 
 
@@ -246,7 +224,7 @@ def contenders(models: Sequence[Scored]) -> list[Scored]:
     """Return the models that are close enough to the best one to have been fitted to full precision."""
     usable = [model for model in models if model.residuals and np.isfinite(model.error_over_noise)]
     best = min((model.error_over_noise for model in usable), default=float("inf"))
-    return [model for model in usable if model.error_over_noise <= CONTENDER * best]
+    return [model for model in usable if model.error_over_noise <= VERDICT.comparable * best]
 
 
 def _refined(context: FitContext, model: Scored, max_evaluations: int) -> Scored:
@@ -291,13 +269,13 @@ def finished(context: FitContext, scored: Scored) -> Scored:
 def restarted(context: FitContext, settled: Scored) -> Scored:
     """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
-    for _ in range(_MOST_RESTARTS):
-        if settled.error_over_noise <= _WORTH_RELEASING:
+    for _ in range(SEARCH.most_restarts):
+        if settled.error_over_noise <= VERDICT.exact:
             break
         starts = [s for effect in settled.effects for s in restart_values(structure, effect, settled.fit)]
         if not starts:
             break
-        enough = (1.0 - _WORTH_RESTARTING) * settled.fit.cost
+        enough = (1.0 - SEARCH.worth_restarting) * settled.fit.cost
         better = [found for found in looked_again(context, settled.fit, starts) if found.cost < enough]
         if not better:
             break
@@ -310,16 +288,12 @@ def restarted(context: FitContext, settled: Scored) -> Scored:
 
 def _released(context: FitContext, settled: Scored, structure: Structure, released: Sequence[str]) -> Scored:
     """Fit on with further parameters free; keep them only if the held-out error falls."""
-    if (
-        not released
-        or not np.isfinite(settled.error_over_noise)
-        or settled.error_over_noise <= _WORTH_RELEASING
-    ):
+    if not released or not np.isfinite(settled.error_over_noise) or settled.error_over_noise <= VERDICT.exact:
         return settled
     free = [name for name in structure.names if name in (*settled.fit.free, *released)]
     start = {**settled.fit.values, **dict(settled.fit.structure.fixed)}
     freer = _fitted(context, settled.effects, structure, free, (replace(settled.fit, values=start),), True)
-    return freer if freer.error_over_noise < settled.error_over_noise / _RELEASE_GAIN else settled
+    return freer if freer.error_over_noise < settled.error_over_noise / VERDICT.release_gain else settled
 
 
 def _fitted(
@@ -332,15 +306,15 @@ def _fitted(
     nearest: float = float("inf"),
 ) -> Scored:
     fit = context.problem(structure, context.estimation, DEFAULT_ACCURACY if promising else LOOK_ACCURACY)
-    evaluations = _ROUGH_EVALUATIONS if promising else _HOPELESS_EVALUATIONS
+    evaluations = SEARCH.rough_evaluations if promising else SEARCH.hopeless_evaluations
     tolerance = _ROUGH_TOLERANCE if promising else _HOPELESS_TOLERANCE
 
     def whole(values: Mapping[str, float]) -> FitResult:
         return fit.fit(values, free, max_evaluations=evaluations, tolerance=tolerance)
 
     results = [whole(start.values) for start in (starts if promising else starts[:1])]
-    if promising and min(map(mean_square, results)) > _STUCK * nearest:
-        in_pieces = context.problem(structure, context.cut_in_pieces(context.estimation, _LONG_PIECE))
+    if promising and min(map(mean_square, results)) > SEARCH.stuck * nearest:
+        in_pieces = context.problem(structure, context.cut_in_pieces(context.estimation, SEARCH.long_piece))
         near = in_pieces.fit(
             starts[0].values, free, max_evaluations=evaluations, tolerance=tolerance, finish=False
         )

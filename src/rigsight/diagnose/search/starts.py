@@ -33,7 +33,7 @@ def start_values(
 
     Parameters
     ----------
-    bench
+    context
         Gives the characteristic sizes.
     structure
         The equations with `effect`.

@@ -12,19 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import FirstLook
 from rigsight.diagnose.search.one_law import are_one_law
 from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
-from rigsight.diagnose.verdict.judgement import WORTHWHILE
-from rigsight.diagnose.verdict.main_cause import LARGER_PART
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
-
-IN_ITS_PLACE = 1.5
-"""Effects whose held-out error alone is within this factor of that of another one are tried in its place."""
-_MOST_FINISHED = 2
 
 
 def with_a_third(
@@ -40,7 +35,7 @@ def with_a_third(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     singles, pairs
         Fitted and scored.
@@ -55,9 +50,13 @@ def with_a_third(
     """
     best = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     alone = min((model.error_over_noise for model in singles), default=np.inf)
-    if best is None or best.error_over_noise <= at_floor or not best.error_over_noise * WORTHWHILE < alone:
+    if (
+        best is None
+        or best.error_over_noise <= at_floor
+        or not best.error_over_noise * VERDICT.worthwhile < alone
+    ):
         return []
-    least = max(LARGER_PART, forms.share(best))
+    least = max(VERDICT.larger_part, forms.share(best))
     found = with_one_more(context, best, effects, [], singles, prepare, least_share=least)
     return _finished(context, found)
 
@@ -76,7 +75,7 @@ def with_relatives(
 
     Parameters
     ----------
-    bench
+    context
         Records, scales and noise.
     triples
         Fitted and scored.
@@ -93,7 +92,7 @@ def with_relatives(
     alone = {model.names[0]: model.error_over_noise for model in singles}
 
     def as_good(replaced: Effect, other: Effect) -> bool:
-        near = alone.get(other.name, np.inf) <= IN_ITS_PLACE * alone.get(replaced.name, 0.0)
+        near = alone.get(other.name, np.inf) <= VERDICT.comparable * alone.get(replaced.name, 0.0)
         at_its_place = context.rig.acts_at(other) == context.rig.acts_at(replaced)
         related = at_its_place or are_one_law((replaced, other), context.rig)
         return near and related and other.name not in replaced.parents
@@ -118,8 +117,8 @@ def with_relatives(
 
 def _finished(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
     ordered = sorted(models, key=lambda model: model.error_over_noise)
-    best = [finished(context, model) for model in ordered[:_MOST_FINISHED]]
-    return refine(context, [*best, *ordered[_MOST_FINISHED:]])
+    best = [finished(context, model) for model in ordered[: SEARCH.most_finished]]
+    return refine(context, [*best, *ordered[SEARCH.most_finished :]])
 
 
 def _parts_of(context: FitContext, triple: Scored, known: Sequence[Scored]) -> list[Scored]:

@@ -26,7 +26,7 @@ def wave_starts(context: FitContext, effect: Effect, base: FitResult) -> Iterato
 
     Parameters
     ----------
-    bench
+    context
         Records and sizes.
     effect
         One with a wave number.

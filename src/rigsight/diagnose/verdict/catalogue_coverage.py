@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.one_law import is_one_law
-from rigsight.diagnose.verdict.judgement import AT_FLOOR, Judgement, most_left
+from rigsight.diagnose.verdict.judgement import Judgement, most_left
 from rigsight.diagnose.verdict.ranking import Ranking
 
 _ONE_LAW = 0.5
@@ -62,7 +63,7 @@ def probability_in_catalogue(
     floor = max(model.error_over_noise, 1.0) if adequate else 1.0
     gap /= floor
     left = model.error_over_noise / floor
-    above = max(left - AT_FLOOR, 0.0)
+    above = max(left - VERDICT.at_floor, 0.0)
     chance = _chance_of_a_relative(left, gap)
     odds = _ODDS_OUTSIDE_ONE
     if len(model.effects) > 1:
@@ -81,6 +82,6 @@ def probability_in_catalogue(
 
 def _chance_of_a_relative(left: float, gap: float) -> float:
     """Return the probability that a relative of the cause leaves no more of a gap than this, both in units of the noise floor."""
-    if gap <= AT_FLOOR:
+    if gap <= VERDICT.at_floor:
         return 1.0
-    return min(1.0, math.sqrt((max(left, AT_FLOOR) ** 2 - 1.0) / (gap**2 - 1.0)))
+    return min(1.0, math.sqrt((max(left, VERDICT.at_floor) ** 2 - 1.0) / (gap**2 - 1.0)))

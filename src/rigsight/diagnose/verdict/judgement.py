@@ -7,25 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict.main_cause import MainCause
 
 Verdict = Literal["effect", "parameters", "none", "unknown"]
-
-AT_FLOOR = 1.1
-"""RMS in units of the noise floor that counts as the floor itself: floors are known to a few percent."""
-AT_LOWER_BOUND = 3.0
-"""The same where the floor is only a lower bound: an assumption, white noise is taken to be at least a third of all."""
-WORTHWHILE = 1.1
-"""Factor by which a model must lower the held-out error to be believed to explain anything; an assumption."""
-LEAST_LEFT, MOST_LEFT, _LEFT_OF_GAP = 1.15, 1.6, 0.025
-"""What a named cause may leave of a measured noise floor: a share of the gap, within these RMS in units of the floor.
-
-Assumptions, between what true causes left on 141 blind rigs (up to 1.08 of gaps below 5, 1.14 of larger ones; where a disturbance
-moves a rig with memory more than the resting rig shows, up to 1.44 of a gap of 50) and what relatives of unknown ones left (from
-1.2 of gaps below 5, from 4 of larger ones). A relative of an unknown cause may close 99 % of a large gap and still leaves more.
-"""
-_HALF = 0.5
-"""Share of the re-identified gap that an effect must close to be named where it leaves more than the floor; an assumption."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +24,7 @@ class Judgement:
 
 def most_left(gap: float) -> float:
     """Return what a named cause may leave, in units of a measured noise floor, of a gap in the same units."""
-    return min(max(LEAST_LEFT, 1.0 + _LEFT_OF_GAP * (gap - 1.0)), MOST_LEFT)
+    return min(max(VERDICT.least_left, 1.0 + VERDICT.left_of_gap * (gap - 1.0)), VERDICT.most_left)
 
 
 def judge(
@@ -56,7 +41,7 @@ def judge(
     ----------
     before_excess
         RMS that the given simulation leaves.
-    linear
+    reidentified
         The re-identified equations.
     best
         The best model with an effect.
@@ -68,12 +53,12 @@ def judge(
         True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
         may stand well above it, so that a modest rest which no model lowers is taken for noise.
     """
-    at_floor = AT_LOWER_BOUND if lower_bound else AT_FLOOR
-    helps = best.error_over_noise * WORTHWHILE < reidentified.error_over_noise
-    retuned = reidentified.error_over_noise * WORTHWHILE < error_before
-    needs_effect = helps and reidentified.error_over_noise > AT_FLOOR
+    at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
+    helps = best.error_over_noise * VERDICT.worthwhile < reidentified.error_over_noise
+    retuned = reidentified.error_over_noise * VERDICT.worthwhile < error_before
+    needs_effect = helps and reidentified.error_over_noise > VERDICT.at_floor
     # Numbers that were fitted to a record like the held-out ones suit them by chance where no numbers suit all records.
-    if not needs_effect and (error_before <= AT_FLOOR or (error_before <= at_floor and not retuned)):
+    if not needs_effect and (error_before <= VERDICT.at_floor or (error_before <= at_floor and not retuned)):
         return Judgement(
             "none", reidentified, "The simulation in question leaves no more than the noise floor."
         )
@@ -99,11 +84,11 @@ def judge(
         return Judgement("none", reidentified, noisy)
     closed = (reidentified.error_over_noise - best.error_over_noise) / (reidentified.error_over_noise - 1.0)
     floor = "the lower bound of the noise floor" if lower_bound else "the noise floor"
-    allowed = AT_LOWER_BOUND if lower_bound else most_left(reidentified.error_over_noise)
+    allowed = VERDICT.at_lower_bound if lower_bound else most_left(reidentified.error_over_noise)
     nearest = f"{', '.join(best.names)} closes {closed:.0%} of the re-identified gap"
-    if best.error_over_noise <= AT_FLOOR:
+    if best.error_over_noise <= VERDICT.at_floor:
         return Judgement("effect", best, "With the effect the simulation reaches the noise floor.")
-    if best.error_over_noise <= allowed and closed >= _HALF:
+    if best.error_over_noise <= allowed and closed >= VERDICT.larger_part:
         return Judgement("effect", best, f"{nearest} and leaves {best.error_over_noise:.3g} times {floor}.")
     if is_adequate(best):
         return Judgement(

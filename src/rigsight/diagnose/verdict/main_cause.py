@@ -14,15 +14,8 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
+from rigsight.diagnose.policy import VERDICT
 from rigsight.rigs import Rig
-
-LARGER_PART = 0.5
-"""Share of the squared gap above the noise floor: what takes more of it than all else together is the main cause.
-
-It also says whether two models take the same part: the one explains the larger part of what the other does.
-"""
-_SURELY = 0.05
-"""Quantile, over resampled stretches of the records, at which it must still be the larger part."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +42,7 @@ class MainCause:
     @property
     def clear(self) -> bool:
         """True where the model surely takes the larger part and nothing that is as good contradicts it."""
-        return self.at_least > LARGER_PART and not self.contradicted_by
+        return self.at_least > VERDICT.larger_part and not self.contradicted_by
 
 
 def main_cause(
@@ -66,7 +59,7 @@ def main_cause(
     ----------
     rig
         Gives the place of each effect.
-    linear
+    reidentified
         The re-identified equations.
     best
         The model with an effect.
@@ -81,10 +74,10 @@ def main_cause(
     draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
     gap, left = np.moveaxis(np.mean(squares[draws], axis=1), 1, 0)
     share = _share(*np.mean(squares, axis=0))
-    lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, left, strict=True)], _SURELY))
+    lowest = float(np.quantile([_share(g, r) for g, r in zip(gap, left, strict=True)], VERDICT.surely))
     places = {rig.acts_at(effect) for effect in best.effects}
     elsewhere = [m for m in tied if places.isdisjoint(rig.acts_at(effect) for effect in m.effects)]
-    same = [m for m in elsewhere if _common_part(reidentified, best, m, noise) > LARGER_PART]
+    same = [m for m in elsewhere if _common_part(reidentified, best, m, noise) > VERDICT.larger_part]
     other = [m for m in elsewhere if m not in same]
     return MainCause(share, lowest, tuple(other), tuple(same))
 

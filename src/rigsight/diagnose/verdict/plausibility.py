@@ -8,17 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.policy import NOTES, VERDICT
 from rigsight.diagnose.verdict.ranking import Ranking
 
-_AS_GOOD = 1.5
-"""Held-out error, in units of that of an implausible best model, up to which a plausible one at the same place is preferred.
-
-An assumption: where no form is exact, half as much again is the price of one number more or less.
-"""
 _AT_BOUND = 1e-6
 """Distance from a bound of the search, relative to it, that counts as standing there."""
-_FAR_OFF = 100.0
-"""Factor by which a number of the rig may change beside an effect before it is told: the effect has then taken its place."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +30,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
     ----------
     model
         Fitted and scored.
-    linear
+    reidentified
         The re-identified equations, whose numbers are those of the rig without an effect.
     """
     fit = model.fit
@@ -61,7 +55,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
         before = reidentified.fit.values.get(name, 0.0)
         if name not in own and declared.lower >= 0.0 and before > 0.0 and value > 0.0:
             ratio = value / before
-            if not 1.0 / _FAR_OFF < ratio < _FAR_OFF:
+            if not 1.0 / NOTES.far_off < ratio < NOTES.far_off:
                 found.append(
                     Doubt(
                         f"{name} = {value:.3g} where the equations without the effect have {before:.3g}.",
@@ -80,7 +74,7 @@ def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str,
     ----------
     ranking
         By held-out error.
-    linear
+    reidentified
         The re-identified equations.
     places
         Place of each effect by name.
@@ -90,7 +84,9 @@ def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str,
         return ranking
     at = {places[name] for name in best.names}
     for index, model in enumerate(ranking.order[1:], start=1):
-        as_good = bool(model.residuals) and model.error_over_noise <= _AS_GOOD * best.error_over_noise
+        as_good = (
+            bool(model.residuals) and model.error_over_noise <= VERDICT.comparable * best.error_over_noise
+        )
         same_place = {places[name] for name in model.names} <= at
         if as_good and same_place and not any(doubt.grave for doubt in doubts(model, reidentified)):
             return _with_first(ranking, index)

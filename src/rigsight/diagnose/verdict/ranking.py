@@ -10,41 +10,9 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.one_law import is_linear
-from rigsight.diagnose.search.single_effects import CONTENDER
-from rigsight.diagnose.verdict.judgement import AT_FLOOR
 from rigsight.effects.effect import Place
-
-_TIE = 0.01
-"""Relative difference of held-out errors that no engineer would build a decision on."""
-_FINE = 1e-3
-"""The same between models with as many numbers and effects, where parsimony is silent and a small difference is still a hint."""
-_HINT = 0.9
-"""Share of the win that such a difference decides, if it is there all along the records; an assumption.
-
-Of 12 blind trials in which a rival differed by 1e-3 to 3e-2, the truth was the lower one in all; of 18 with less, it was lower or
-level in 16.
-"""
-_INEXACT = 1e-3
-"""Share of the gap by which models may differ without being told apart: no form is exact, and what disturbs the rig bends it.
-
-An assumption: play whose rig is disturbed left 4 % more than a stop with a thousandth of a spring beside it, of a gap of 48
-times the noise floor.
-"""
-_PRIOR_PER_EFFECT = 1.0 / 3.0
-"""Odds of one more effect between models with as many numbers and the same error."""
-_MODEL_ERROR = 0.1
-"""Share of what the best model leaves above the noise floor that may be worth nothing for the comparison."""
-_NEGLIGIBLE = 1e-3
-"""Probability, in units of the best model's, that a model keeps however large its error; one whose evidence is no more is told
-apart. A convention."""
-_FALL = 20.0
-"""Rate at which that probability falls with the relative difference of the error: to a third at 5 %. A convention."""
-_TEMPER = 0.1
-"""Exponent of the evidence: one sample of ten counts, as no form, no hold of an input and no filter is exact.
-
-Of 0, 0.01, 0.03, 0.06, 0.1, 0.2 and 0.5 the one with the best log score on 45 trials of the laboratory bench, seeds 5 and 6.
-"""
 
 
 @dataclass(frozen=True)
@@ -128,14 +96,14 @@ def rank(
     means = np.mean(squares[draws], axis=1)
     errors = np.sqrt(np.mean(squares, axis=0))
     best = float(np.min(errors))
-    inexact = (_MODEL_ERROR * max(best - 1.0, 0.0) + _INEXACT * gap) / best
-    tolerance = np.hypot(_TIE, inexact)
+    inexact = (VERDICT.model_error * max(best - 1.0, 0.0) + VERDICT.inexact * gap) / best
+    tolerance = np.hypot(VERDICT.tie, inexact)
     # Far above the floor no form is exact, and a small difference is no hint of the true one.
-    fine = _FINE + _MODEL_ERROR * max(best - AT_FLOOR, 0.0) / best
+    fine = VERDICT.inexact + VERDICT.model_error * max(best - VERDICT.at_floor, 0.0) / best
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
     n_free = np.array([m.n_free for m in usable])
-    prior = _PRIOR_PER_EFFECT ** np.array(
+    prior = VERDICT.prior_per_effect ** np.array(
         [
             len(m.effects)
             + _likened(m, usable)
@@ -154,10 +122,10 @@ def rank(
     plain = tie & (n_effects == plainest)
     lowest = np.min(np.where(plain, resampled, np.inf), axis=1, keepdims=True)
     ahead = plain & (resampled <= lowest * (1.0 + fine))
-    wins = np.mean((1.0 - _HINT) * _shared(tie, prior) + _HINT * _shared(ahead, prior), axis=0)
+    wins = np.mean((1.0 - VERDICT.hint) * _shared(tie, prior) + VERDICT.hint * _shared(ahead, prior), axis=0)
     evidence = _evidence_of(usable, errors / best, criterion)
     weights = _tempered(evidence) if evidence_counts else np.ones(len(usable))
-    likelihood = (wins + _NEGLIGIBLE * np.exp(-_FALL * (errors / best - 1.0))) * weights
+    likelihood = (wins + VERDICT.negligible * np.exp(-VERDICT.fall * (errors / best - 1.0))) * weights
     probabilities = likelihood / np.sum(likelihood)
     chosen = int(np.argmax(probabilities))
     ratio = resampled / resampled[:, chosen : chosen + 1]
@@ -166,7 +134,7 @@ def rank(
         for i in range(len(usable))
         if i != chosen
         and float(np.quantile(ratio[:, i], 0.05)) <= 1.0 + tolerance
-        and weights[i] > _NEGLIGIBLE * weights[chosen]
+        and weights[i] > VERDICT.negligible * weights[chosen]
     ]
     rest = sorted((i for i in range(len(usable)) if i != chosen), key=lambda i: errors[i])
     order = [chosen, *rest]
@@ -188,7 +156,8 @@ def _evidence_of(
     if criterion is None:
         return [None] * len(models)
     told = [
-        -0.5 * criterion(m) if error <= CONTENDER else None for m, error in zip(models, errors, strict=True)
+        -0.5 * criterion(m) if error <= VERDICT.comparable else None
+        for m, error in zip(models, errors, strict=True)
     ]
     most = max(value for value in told if value is not None)
     return [None if value is None else value - most for value in told]
@@ -197,7 +166,7 @@ def _evidence_of(
 def _tempered(evidence: Sequence[float | None]) -> NDArray[np.float64]:
     """Return the tempered evidence in units of the largest; models without one have the least of the others."""
     least = min((value for value in evidence if value is not None), default=0.0)
-    return np.exp(_TEMPER * np.array([least if value is None else value for value in evidence]))
+    return np.exp(VERDICT.temper * np.array([least if value is None else value for value in evidence]))
 
 
 def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,8 +7,8 @@ from typing import Any
 
 from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.noise.adequacy import Adequacy
+from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import BY_RECORD
-from rigsight.diagnose.verdict.main_cause import LARGER_PART
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Remainder:
             f"What is left, {percent:g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
             f"(p = {self.p_value:.2g})"
         )
-        if self.share > LARGER_PART:
+        if self.share > VERDICT.larger_part:
             return f"{left}: the larger part of the gap is not explained."
         if not self.beside_a_cause:
             return f"{left}."
@@ -85,7 +85,7 @@ def remainder_of(
 
     Parameters
     ----------
-    linear
+    reidentified
         The re-identified equations.
     model
         The model of the verdict.

@@ -7,15 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored, liveliest
+from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.discover import JointForce, MissingForce, missing_force, missing_forces, not_contradicted
 from rigsight.errors import SimulationError
 from rigsight.identify import without_offsets
 from rigsight.rigs import Rig
-
-_TRACED = 3000
-"""Samples in which forces at joints are traced: they take about ten seconds of processor time per thousand on a drive train."""
-_EXPLAINED = 1.5
-"""Noise floors that a force at a joint may leave of what the sensors showed and still explain it; as for discovery."""
 
 
 def force_of_one_motion(
@@ -27,7 +23,7 @@ def force_of_one_motion(
 
     Parameters
     ----------
-    bench, linear
+    context, reidentified
         Records, and the re-identified equations on them.
     no_spring
         True for an axis that has none.
@@ -49,7 +45,7 @@ def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointFo
 
     Parameters
     ----------
-    bench, linear
+    context, reidentified
         Records, of which the liveliest stretches are looked at, and the re-identified equations on them.
     """
     if context.modelled or context.rig.has_one_motion:
@@ -57,7 +53,10 @@ def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointFo
     centered = without_offsets(context.estimation, reidentified.fit)
     try:
         return missing_forces(
-            context.rig, liveliest(centered, context.rig, _TRACED), reidentified.fit.values, context.noise
+            context.rig,
+            liveliest(centered, context.rig, SEARCH.traced_samples),
+            reidentified.fit.values,
+            context.noise,
         )
     except (SimulationError, np.linalg.LinAlgError):
         # What is not known of the cause is no reason to have no diagnosis.
@@ -77,7 +76,7 @@ def traced_to(rig: Rig, forces: Sequence[JointForce]) -> tuple[str, ...]:
         At each of its joints.
     """
     agreeing = not_contradicted(forces)
-    if len(forces) < 2 or len(agreeing) != 1 or agreeing[0].error_over_noise > _EXPLAINED:
+    if len(forces) < 2 or len(agreeing) != 1 or agreeing[0].error_over_noise > VERDICT.comparable:
         return ()
     joint = next(joint for joint in rig.mechanism.joints if joint.name == agreeing[0].joint)
     return (joint.name, *(drive.name for drive in rig.mechanism.drives if drive.along == joint.motion))
