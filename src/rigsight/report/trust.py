@@ -23,7 +23,6 @@ TRUST_COLUMNS = ("parameter", "by", "group", "value", "std", "unit", "pattern", 
 """Columns of the table."""
 _MOST_PANELS = 6
 _TOLD_IN_A_LINE = 3
-_MOVES = {1: "grows", -1: "falls", 0: "differs"}
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def trust_view(diagnosis: Diagnosis) -> TrustView | None:
             trust_drawing(diagnosis),
             "figure-trust",
             f"Numbers as single groups have them, with 95 % intervals. {told}.",
-            "Each number as one record, level or window alone has it, with 95 % intervals. Dashed, with its band: the common fit.",
+            "Each number as one record, level or window alone has it, with 95 % intervals. Dashed with its band: the common fit.",
         )
     return TrustView(diagnosis.trust.statement, figure, tuple(map(_row, diagnosis.trust.parameters)))
 
@@ -166,12 +165,12 @@ def _how(number: ParameterTrust) -> str:
     if number.pattern is Pattern.RECORD:
         return "differs from record to record"
     if number.pattern is Pattern.PORTION:
-        return f"{_MOVES[number.direction]} along the records"
+        return f"{number.moves} along the records"
     if number.pattern is Pattern.WINDOW:
-        return f"{_MOVES[number.direction]} when windows get shorter"
+        return f"{number.moves} when windows get shorter"
     if number.pattern is Pattern.TIME:
-        return f"{_MOVES[number.direction]} from record to record"
-    return f"{_MOVES[number.direction]} with {' and '.join(number.goes_with)}"
+        return f"{number.moves} from record to record"
+    return f"{number.moves} with {' and '.join(number.goes_with)}"
 
 
 def _row(number: ParameterTrust) -> TrustRow:

@@ -6,13 +6,9 @@ import itertools
 
 import numpy as np
 
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.result import Entangled
 from rigsight.identify import FitResult
-
-_CORRELATED = 0.99
-"""Correlation of errors from which a number is known seven times better once the other is: 1 / sqrt(1 - 0.99^2)."""
-_ONE_TO_ONE = 0.2
-"""By how much relative errors may differ from one to one and still be those of a ratio or product."""
 
 
 def entangled(fit: FitResult) -> tuple[Entangled, ...]:
@@ -29,7 +25,7 @@ def entangled(fit: FitResult) -> tuple[Entangled, ...]:
         if not (np.all(np.isfinite(block)) and np.all(np.diag(block) > 0.0)):
             continue
         correlation = float(block[0, 1] / np.sqrt(block[0, 0] * block[1, 1]))
-        if abs(correlation) > _CORRELATED:
+        if abs(correlation) > TRUST.correlated:
             names = fit.free[i], fit.free[j]
             found.append(Entangled(names, correlation, _text(fit, names, block, correlation)))
     return tuple(sorted(found, key=lambda pair: -abs(pair.correlation)))
@@ -42,7 +38,7 @@ def _text(fit: FitResult, names: tuple[str, str], block: np.ndarray, correlation
         relative = block / np.outer(values, values)
         alone = np.sqrt(np.diag(relative))
         sign = float(np.sign(relative[0, 1]))
-        if abs(alone[1] / alone[0] - 1.0) < _ONE_TO_ONE:
+        if abs(alone[1] / alone[0] - 1.0) < TRUST.one_to_one:
             together = float(np.sqrt(max(relative[0, 0] + relative[1, 1] - 2.0 * sign * relative[0, 1], 0.0)))
             what = f"ratio {first}/{second}" if sign > 0.0 else f"product {first}*{second}"
             return (

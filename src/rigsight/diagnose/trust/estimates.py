@@ -15,14 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.pieces import Piece, Pieces, pseudo_inverse
 from rigsight.diagnose.trust.spectra import NoiseSpectra
 from rigsight.identify import DEFAULT_ACCURACY, SMOOTHED, sandwich_covariance, spectral_product
 
 Floats = NDArray[np.float64]
-
-_LEAST_FREEDOM = 2.0
-"""Degrees of freedom below which nothing can be said of a variance."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ class _Variance:
         # A line has two degrees of freedom: its variance is its squared mean, half of the mean of its square.
         spread = np.sum(shares**2, axis=(0, 1)) / 2.0
         freedom = 2.0 * smoothed**2 / np.maximum(spread, np.finfo(float).tiny)
-        left = np.maximum(freedom - piece.n_own, _LEAST_FREEDOM)
+        left = np.maximum(freedom - piece.n_own, TRUST.least_freedom)
         # What was fitted has taken its part of the noise with it, in the band that the estimate reads.
         size = np.maximum(smoothed * np.maximum(freedom / left, 1.0), spectra.variances(piece, columns))
         return cls(size, 2.0 * size**2 / left)
@@ -152,4 +150,4 @@ def _together(parts: Sequence[_Variance]) -> tuple[Floats, Floats]:
     size = np.sum([part.size for part in parts], axis=0)
     spread = np.sum([part.spread for part in parts], axis=0)
     freedom = 2.0 * size**2 / np.maximum(spread, np.finfo(float).tiny)
-    return size, np.maximum(freedom, _LEAST_FREEDOM)
+    return size, np.maximum(freedom, TRUST.least_freedom)

@@ -20,14 +20,9 @@ from scipy.stats import chi2, norm
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
-Floats = NDArray[np.float64]
+from rigsight.diagnose.policy import TRUST
 
-LEVEL = 0.01
-"""Probability that any number of a model without a fault is called unstable: one stable model of a hundred, the level at which
-adequacy refuses one, so that the two do not contradict each other more often than that."""
-_IN_ORDER = 0.9
-"""Share of the squared differences that a monotonic course must take where the rest is beyond chance: no effect is quite
-monotonic, and with small errors the smallest step back is beyond chance."""
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -116,7 +111,7 @@ def course(values: Floats, variances: Floats, along: Floats) -> Course:
         best = direction * isotonic_regression(direction * means, weights=total).x
         left = float(weights @ (values - best[place]) ** 2)
         freedom = max(1, values.size - np.unique(best).size)
-        in_order = left <= (1.0 - _IN_ORDER) * whole or chi2.sf(left, freedom) > LEVEL
+        in_order = left <= (1.0 - TRUST.in_order) * whole or chi2.sf(left, freedom) > TRUST.level
         if np.ptp(best) > 0.0 and in_order and left < found.left:
             found = Course(direction, left)
     return found

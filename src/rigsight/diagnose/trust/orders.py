@@ -8,15 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Pattern
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
-
-_ONE_LEVEL = 1.1
-"""Ratio up to which measured amplitudes count as one level: records of one experiment repeat within some percent, ladders of
-amplitudes go up by more."""
-_FEWEST_IN_TIME = 3
-"""Two records always grow or fall; from three on an order of time can be told from any other difference."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +57,7 @@ def orders(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) 
     amplitude = _amplitudes(rig, records)
     if len(set(amplitude.levels.values())) > 1:
         found.append(amplitude)
-    if len(records) >= _FEWEST_IN_TIME:
+    if len(records) >= TRUST.fewest_in_time:
         found.append(Order(Pattern.TIME, "time", "", {r.name: float(i) for i, r in enumerate(records)}))
     return tuple(found)
 
@@ -83,7 +78,7 @@ def _amplitudes(rig: Rig, records: Sequence[Record]) -> Order:
         return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), {})
     level, measured = 0.0, {}
     for name, size in sorted(sizes.items(), key=lambda item: item[1]):
-        level = level if size <= _ONE_LEVEL * level else size
+        level = level if size <= TRUST.one_level * level else size
         measured[name] = level
     return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), measured)
 

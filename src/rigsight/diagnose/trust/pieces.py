@@ -20,28 +20,16 @@ from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.windows import WINDOW
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.pushes.answers import orthonormal
 from rigsight.identify import FitResult, RecordDerivatives, derivatives, own_derivatives
 from rigsight.records.record import Record
 
 Floats = NDArray[np.float64]
 
-HALVES, QUARTERS = 2, 4
-_FEWEST_SAMPLES = 100
-"""Samples of a window below which its own initial state takes most of what it says; the least of other windows here."""
-_FEWEST_PERIODS = 2.0
-"""Natural periods in a window below which damping and stiffness are read off less than a swing to and fro."""
-_PERIODS_ALONE = 15.0
-"""Natural periods in a window that is compared with the others of its record: in fewer a resonance with a damping ratio of some
-hundredths is one spectral line wide, and what a disturbance does there is a single draw."""
-_OWN_STEPS = 3
-_WORTH_A_STEP = 0.05
-"""Share of a record's squared error from which numbers of its own are looked for beyond one linearization: where the common
-ones are right, ten numbers take a hundredth of a thousand samples of noise."""
 _DEPENDENT = 1e-7
 """Share of the largest singular value below which a direction of the numbers is not told by a record."""
-_STATE_EVALUATIONS = 15
-_STATE_TOLERANCE = 1e-3
+_TOLERANCE = 1e-3
 """Initial states of windows follow from one linearization: near the best place is near enough."""
 
 
@@ -130,7 +118,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
         piece = _piece(name, (0, 1), common)
         if piece is not None and _asks_for_other_numbers(piece):
             problem = context.problem(fit.structure, [record])
-            there = own_derivatives(problem, alone, free, _OWN_STEPS, _WORTH_A_STEP)
+            there = own_derivatives(problem, alone, free, TRUST.own_steps, TRUST.worth_a_step)
             if there is not None:
                 piece, alone = _piece(name, (0, 1), there.derivatives), there.fit
         if piece is None:
@@ -142,7 +130,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
     if any(WINDOW in record.name for record in records):
         return made
     cut: dict[int, tuple[Piece, ...]] = {}
-    for count in (HALVES, QUARTERS):
+    for count in TRUST.windows:
         windows = [_windows(context, record, count) for record in records]
         parts = [
             _in_windows(context, alone, part, free, piece, found.place)
@@ -153,7 +141,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
             break
         cut[count] = tuple(piece for part in parts for piece in part or ())
     shortest = min(record.n_samples * record.dt for record in records) / context.period
-    wide = [count for count in cut if shortest >= count * _PERIODS_ALONE]
+    wide = [count for count in cut if shortest >= count * TRUST.periods_alone]
     return replace(made, cut=cut, portions=max(wide, default=1))
 
 
@@ -172,14 +160,14 @@ def pseudo_inverse(rows: Floats) -> Floats:
 
 def _asks_for_other_numbers(piece: Piece) -> bool:
     left, here = float(piece.noise @ piece.noise), float(piece.residuals @ piece.residuals)
-    return left < (1.0 - _WORTH_A_STEP) * here
+    return left < (1.0 - TRUST.worth_a_step) * here
 
 
 def _windows(context: FitContext, record: Record, count: int) -> list[Record]:
     """Return a record cut into so many windows; nothing where one would be too short."""
     edges = np.linspace(0, record.n_samples, count + 1).astype(int)
     shortest = int(np.min(np.diff(edges)))
-    if shortest < _FEWEST_SAMPLES or shortest * record.dt < _FEWEST_PERIODS * context.period:
+    if shortest < TRUST.window_samples or shortest * record.dt < TRUST.window_periods * context.period:
         return []
     return [record.slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
@@ -195,7 +183,7 @@ def _in_windows(
     """Return the windows of a record with what they say beyond the whole record's own numbers."""
     problem = context.problem(alone.structure, windows)
     started = problem.fit(
-        alone.values, [], max_evaluations=_STATE_EVALUATIONS, tolerance=_STATE_TOLERANCE, finish=False
+        alone.values, [], max_evaluations=TRUST.state_evaluations, tolerance=_TOLERANCE, finish=False
     )
     if not np.isfinite(started.cost):
         return None

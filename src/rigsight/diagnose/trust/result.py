@@ -74,6 +74,11 @@ class ParameterTrust:
         """True where nothing contradicts that it is the same everywhere."""
         return self.pattern in (Pattern.STABLE, Pattern.UNKNOWN)
 
+    @property
+    def moves(self) -> str:
+        """Verb of how it differs along `goes_with`."""
+        return {1: "grows", -1: "falls", 0: "differs"}[self.direction]
+
 
 @dataclass(frozen=True)
 class Entangled:
@@ -147,7 +152,7 @@ def _parameter(parameter: ParameterTrust) -> dict[str, Any]:
         "p_value": _number(parameter.p_value),
         "largest_difference": _number(parameter.largest),
         "pattern": str(parameter.pattern),
-        "direction": {1: "grows", -1: "falls", 0: None}[parameter.direction],
+        "direction": parameter.moves if parameter.direction else None,
         "goes_with": list(parameter.goes_with),
         "points_to": None if told is None else told.cause,
         "next_experiment": None if told is None else told.experiment,

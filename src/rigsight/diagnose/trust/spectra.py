@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from rigsight.diagnose.noise.innovations import whitening_filter
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.pieces import Piece, pseudo_inverse
 
 Floats = NDArray[np.float64]
-
-_LEAST_FREEDOM = 2.0
-"""Degrees of freedom that the fit leaves of the noise in the narrowest band: those of one line."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ class NoiseSpectra:
                     * np.sum(shares, axis=0) ** 2
                     / np.maximum(np.sum(shares**2, axis=0), np.finfo(float).tiny)
                 )
-                factors.append(freedom / np.maximum(freedom - piece.n_own, _LEAST_FREEDOM))
+                factors.append(freedom / np.maximum(freedom - piece.n_own, TRUST.least_freedom))
             taken[name] = np.maximum(1.0, np.mean(factors, axis=0))
         return found
 

@@ -7,19 +7,12 @@ from itertools import groupby
 
 import numpy as np
 
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.patterns import Pattern
 from rigsight.diagnose.trust.result import Entangled, GroupValue, ParameterTrust
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 
-_TOLD = 3
-"""Numbers told one by one; the report has all."""
-_PAIRS_TOLD = 2
-_VAGUE = 0.1
-"""Relative error by group from which agreement says little: an engineer would call a tenth more another number. A convention."""
-_MAY_BE_ZERO = 3.0
-"""Standard errors from zero up to which a relative error says nothing."""
 _ONE_RECORD = "One record cannot tell whether they hold at another amplitude."
-_MOVES = {1: "grows", -1: "falls", 0: "differs"}
 
 
 def statement(
@@ -39,9 +32,9 @@ def statement(
         Kinds of groups that were compared.
     """
     differing = [number for number in numbers if not number.stable]
-    sentences = [_differs(alike) for alike in _alike(differing)[:_TOLD]]
-    if len(_alike(differing)) > _TOLD:
-        rest = [number.name for alike in _alike(differing)[_TOLD:] for number in alike]
+    sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
+    if len(_alike(differing)) > TRUST.told:
+        rest = [number.name for alike in _alike(differing)[TRUST.told :] for number in alike]
         sentences.append(f"{_listed(rest)} {'differs' if len(rest) == 1 else 'differ'} too.")
     compared = [number for number in numbers if number.pattern is Pattern.STABLE]
     if compared:
@@ -55,7 +48,7 @@ def statement(
         )
     if n_records == 1:
         sentences.append(_ONE_RECORD)
-    return " ".join([*sentences, *(pair.text for pair in pairs[:_PAIRS_TOLD])])
+    return " ".join([*sentences, *(pair.text for pair in pairs[: TRUST.pairs_told])])
 
 
 def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
@@ -70,9 +63,9 @@ def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
 
 
 def _differs(alike: Sequence[ParameterTrust]) -> str:
-    told = [_course(number) for number in alike[:_TOLD]]
-    if len(alike) > _TOLD:
-        told.append(f"{_listed([number.name for number in alike[_TOLD:]])} likewise")
+    told = [_course(number) for number in alike[: TRUST.told]]
+    if len(alike) > TRUST.told:
+        told.append(f"{_listed([number.name for number in alike[TRUST.told :]])} likewise")
     cause = alike[0].points_to.cause if alike[0].points_to else ""
     text = f"{'; '.join(told)}: {cause}." if cause else f"{'; '.join(told)}."
     first, *others = alike[0].goes_with or ("",)
@@ -85,7 +78,7 @@ def _differs(alike: Sequence[ParameterTrust]) -> str:
 
 def _course(number: ParameterTrust) -> str:
     """Return how a number differs, with values at both ends of its course."""
-    moves = _MOVES[number.direction]
+    moves = number.moves
     if number.pattern is Pattern.WINDOW:
         return f"{number.name} {moves} when windows get shorter{_ends(number, number.groups[WINDOW_LENGTH], 'in')}"
     if number.pattern is Pattern.PORTION:
@@ -151,7 +144,7 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, asked: Sequence[str]
     else:
         who = f"The only number, {names[0]}, is" if len(names) == 1 else f"All {len(names)} numbers are"
     text = f"{who} the same {where or 'wherever they were compared'} (largest difference {largest:.2g} standard errors)."
-    vague = {number.name: error for number in numbers if (error := _vagueness(number)) > _VAGUE}
+    vague = {number.name: error for number in numbers if (error := _vagueness(number)) > TRUST.vague}
     if vague:
         name = max(vague, key=vague.__getitem__)
         more = (
@@ -166,7 +159,7 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, asked: Sequence[str]
 def _vagueness(number: ParameterTrust) -> float:
     """Return the typical relative error of a number in groups; nothing of one that may be zero."""
     errors = [one.std for groups in number.groups.values() for one in groups]
-    if not errors or abs(number.value) <= _MAY_BE_ZERO * number.std:
+    if not errors or abs(number.value) <= TRUST.may_be_zero * number.std:
         return 0.0
     return float(np.median(errors)) / abs(number.value)
 

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.stats import t as t_distribution
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.entangled import entangled
-from rigsight.diagnose.trust.homogeneity import LEVEL, Spread, adjusted, course, spread, standard_errors
+from rigsight.diagnose.trust.homogeneity import Spread, adjusted, course, spread, standard_errors
 from rigsight.diagnose.trust.orders import Order, orders
 from rigsight.diagnose.trust.patterns import Pattern, Role, meaning, roles
 from rigsight.diagnose.trust.pieces import pieces
@@ -126,7 +127,7 @@ def _number(
             GroupValue(view.labels[g], value + float(values[g]), math.sqrt(float(variances[g])))
             for g in known
         )
-    differing = {one.view.kind: p for one, p in zip(asked, p_values, strict=True) if p <= LEVEL}
+    differing = {one.view.kind: p for one, p in zip(asked, p_values, strict=True) if p <= TRUST.level}
     found = _Way(Pattern.STABLE if asked else Pattern.UNKNOWN)
     if differing:
         found = _pattern(seen, index, differing, along)

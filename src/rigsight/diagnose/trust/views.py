@@ -8,22 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.policy import TRUST
 from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates
 from rigsight.diagnose.trust.orders import Order
 from rigsight.diagnose.trust.patterns import Pattern
-from rigsight.diagnose.trust.pieces import HALVES, QUARTERS, Pieces
+from rigsight.diagnose.trust.pieces import Pieces
 from rigsight.diagnose.trust.spectra import NoiseSpectra
+from rigsight.identify.undetermined import POORLY_KNOWN
 
 Floats = NDArray[np.float64]
 
 RECORD, PORTION, WINDOW_LENGTH = "record", "portion", "window"
-_WINDOWS = {HALVES: "half", QUARTERS: "quarter"}
-_NOTHING_SAID = 30.0
-"""Times the error of the best group from which a group's own value is left out if it is poorly known: it weighs a
-thousandth of that one."""
-
-_POORLY_KNOWN = 0.5
-"""Relative standard error from which a number is not determined: its 95 % interval holds zero, or twice the value."""
+_NAMES = ("half", "quarter")
 
 
 @dataclass(frozen=True)
@@ -58,8 +54,8 @@ class View:
         errors = np.sqrt([estimate.variances[index] for estimate in self.found])
         told = np.isfinite(errors) & (errors > 0.0)
         if np.any(told):
-            told &= (errors <= _NOTHING_SAID * np.min(errors[told])) | (
-                errors < _POORLY_KNOWN * self.sizes[index]
+            told &= (errors <= TRUST.unsure * np.min(errors[told])) | (
+                errors < POORLY_KNOWN * self.sizes[index]
             )
         return np.flatnonzero(told)
 
@@ -126,7 +122,7 @@ def _by_level(of: Pieces, spectra: NoiseSpectra, order: Order) -> View:
 def _portions(of: Pieces, spectra: NoiseSpectra) -> View:
     count = of.portions
     parts = [[piece for piece in of.cut[count] if piece.place[0] == i] for i in range(count)]
-    labels = tuple(f"{_WINDOWS[count]} {i + 1}" for i in range(count))
+    labels = tuple(f"{_NAMES[TRUST.windows.index(count)]} {i + 1}" for i in range(count))
     return View(PORTION, labels, tuple(estimates(of, part, spectra) for part in parts), np.abs(of.values))
 
 
@@ -138,5 +134,5 @@ def _lengths(of: Pieces, spectra: NoiseSpectra) -> View:
         for count, further in zip(counts, apart, strict=True)
     ]
     found = (replace(whole, shifts=np.zeros_like(whole.shifts)), *cut)
-    labels = ("whole", *(_WINDOWS[count] for count in counts))
+    labels = ("whole", *(_NAMES[TRUST.windows.index(count)] for count in counts))
     return View(WINDOW_LENGTH, labels, found, np.abs(of.values), apart[-1])
