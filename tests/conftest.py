@@ -195,7 +195,7 @@ def outcome_like() -> Callable[..., Outcome]:
             "rig": "axis", "noise": "low", "gap": 12.0, "tier": "clear",
             "verdict": "effect", "named": ("backlash",), "named_places": ("dynamics",), "right": True, "effect_right": True,
             "right_within_set": True, "place_right": True, "looked_at": None,
-            "probability": 0.9, "stated": 0.9, "held_out": 1.02,
+            "probability": 0.9, "stated": 0.9, "stated_is_true": True, "in_set": True, "set_size": 1, "held_out": 1.02,
             "withheld": (WithheldError("withheld_1", "step", 0.85, 3000, 1.02),),
             "parameters": (ParameterError("g", "backlash", -0.5), ParameterError("k", "rig", 1.5)),
             "seconds": 20.0,
@@ -212,7 +212,7 @@ def wrong_outcome(outcome_like: Callable[..., Outcome]) -> Callable[..., Outcome
     def like(**changes: Any) -> Outcome:
         content: dict[str, Any] = {
             "named": ("free_play",), "right": False, "effect_right": False, "right_within_set": False,
-            "probability": 0.2, "stated": 0.75,
+            "probability": 0.2, "stated": 0.75, "stated_is_true": False, "in_set": False,
             "parameters": (),
         }  # fmt: skip
         return outcome_like(**(content | changes))

@@ -66,7 +66,10 @@ def line(case: str, repeated: Sequence[dict[str, Any]]) -> str:
     spread = max(abs(other["error_over_noise"] - first["error_over_noise"]) for other in others)
     told = "yes" if same else ", ".join(sorted({r["verdict"] for r in repeated}))
     good = "yes" if same and largest <= ENOUGH else "**no**"
-    return f"| {case} | {first['verdict']} | {first['error_over_noise']:.4f} | {told} | {spread:.1e} | {largest:.1e} ({name}) | {good} |"
+    left = f"{first['error_over_noise']:.4f}"
+    return (
+        f"| {case} | {first['verdict']} | {left} | {told} | {spread:.1e} | {largest:.1e} ({name}) | {good} |"
+    )
 
 
 def main() -> None:

@@ -40,7 +40,10 @@ def models(scored):
 
 def ranked(*models: Scored) -> Ranking:
     return Ranking(
-        models, tuple(np.full(len(models), 1.0 / len(models))), (), tuple(Grounds(0.0, None) for _ in models)
+        models,
+        tuple(np.full(len(models), 1.0 / len(models))),
+        (),
+        tuple(Grounds(0.0, 0.0, None) for _ in models),
     )
 
 

@@ -52,6 +52,7 @@ TOLERANCES = {
     "_FREE_MODES": "order of a subspace",
     "_MAX_HANKEL_ROWS": "memory",
     "SCHEMA_VERSION": "no number of a diagnosis",
+    "_STEEPEST": "resolution of a bootstrap",
 }
 
 

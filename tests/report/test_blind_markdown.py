@@ -25,7 +25,7 @@ def test_every_row_of_a_table_has_the_columns_of_its_head(outcome_like: Like, wr
     pair = ("backlash", "input_delay")
     both = outcome_like(trial="018", kind="pair", effects=pair, named=pair)
     text = blind_markdown(content_of([outcome_like(), odd, both]))
-    assert len(tables(text)) == 12
+    assert len(tables(text)) == 13
     for rows in tables(text):
         assert len({row.count("|") for row in rows}) == 1
 

@@ -14,7 +14,7 @@ from rigsight.effects import AT
 from rigsight.errors import InputError
 from rigsight.rigs import Rig, declared_rig
 
-_BY_PLACE = 2
+BY_PLACE_SCHEMA = 2
 """Schema of keys from which on `where` holds the place of each effect; before, it was the set of places."""
 SEVERAL = "several"
 """Kind of a trial with more effects than a verdict names; the first of its key is the main one, which leaves the largest gap."""
@@ -86,6 +86,10 @@ class Outcome:
         On the truth; for an effect from outside, what is left beside all candidates.
     stated
         On what the verdict says; 0 where there is none.
+    stated_is_true
+        What the verdict says is the truth: as `right`, but a relative of an effect from outside is not that effect.
+    in_set, set_size
+        Whether the set of likely causes holds the truth, and how many it holds; None where the diagnosis states none.
     held_out
         RMS error on all withheld records in units of the true noise floor, from the model alone; None where one of them cannot
         be simulated, or there is none.
@@ -123,6 +127,9 @@ class Outcome:
     looked_at: bool | None
     probability: float
     stated: float
+    stated_is_true: bool
+    in_set: bool | None
+    set_size: int | None
     held_out: float | None
     withheld: tuple[WithheldError, ...]
     parameters: tuple[ParameterError, ...]
@@ -168,24 +175,25 @@ def outcome(
         "candidates": [],
     }
     kind = str(key["kind"])
-    by_place = key.get("schema_version", 1) >= _BY_PLACE
-    truth, named = _at_places(key, by_place), _at_places(found, by_place)
+    by_place = key.get("schema_version", 1) >= BY_PLACE_SCHEMA
+    truth, named = effects_at_places(key, by_place), effects_at_places(found, by_place)
     verdict = str(found["verdict"])
     expected = {"none": "none", "parameters": "parameters", "outside": "unknown"}.get(kind, "effect")
     honest = kind == "outside" and _is_relative_at_its_place(key, found)
-    needed = _needed(key, by_place)
+    needed = needed_effects(key, by_place)
     right = honest or (verdict == expected and (expected != "effect" or needed <= named <= truth))
     effect_right = honest or (
         verdict == expected and (expected != "effect" or _are_kinds_of(named, needed, truth))
     )
     within = expected == "effect" and _is_among(needed, truth, found["ambiguous_with"])
-    candidates = {_at_places(c, by_place): float(c["probability"] or 0.0) for c in found["candidates"]}
+    candidates = {effects_at_places(c, by_place): float(c["probability"] or 0.0) for c in found["candidates"]}
     left = max(0.0, 1.0 - sum(candidates.values()))
     known = math.fsum(p for effects, p in candidates.items() if needed <= effects <= truth)
     probability = left if kind == "outside" else known
     stated = left if verdict == "unknown" else candidates.get(named, 0.0)
     if verdict == FAILED:
         probability = stated = 0.0
+    likely = _likely(found, needed, truth, kind, expected == "effect")
     gap = None if key["gap"] is None else float(key["gap"])
     hides_a_place = bool(truth) and key["where"] is not None
     return Outcome(
@@ -211,6 +219,9 @@ def outcome(
         looked_at=_looked_at(key, found) if hides_a_place else None,
         probability=probability,
         stated=stated,
+        stated_is_true=right and not (honest and found["verdict"] == "effect"),
+        in_set=None if likely is None else likely[0],
+        set_size=None if likely is None else likely[1],
         held_out=_over_all(withheld),
         withheld=tuple(withheld),
         parameters=_parameter_errors(key, found) if right and kind != "outside" else (),
@@ -230,7 +241,7 @@ def rig_of(key: Mapping[str, Any]) -> Rig:
     return rig
 
 
-def _at_places(said: Mapping[str, Any], by_place: bool) -> frozenset[tuple[str, str]]:
+def effects_at_places(said: Mapping[str, Any], by_place: bool) -> frozenset[tuple[str, str]]:
     """Return effects with their places; with none where the key does not say them effect by effect."""
     effects = [str(name) for name in said["effects"]]
     places = (
@@ -247,10 +258,10 @@ def _places(effects: frozenset[tuple[str, str]]) -> tuple[str, ...]:
     return tuple(place for _, place in sorted(effects) if place)
 
 
-def _needed(key: Mapping[str, Any], by_place: bool) -> frozenset[tuple[str, str]]:
+def needed_effects(key: Mapping[str, Any], by_place: bool) -> frozenset[tuple[str, str]]:
     """Return the effects without which no verdict is right: all that are hidden, of several the main one."""
     if key["kind"] != SEVERAL:
-        return _at_places(key, by_place)
+        return effects_at_places(key, by_place)
     return frozenset({(str(key["effects"][0]), str(key["where"][0]))})
 
 
@@ -280,6 +291,28 @@ def _is_among(
         for rival in rivals
         for spelled in (plain, whole)
     )
+
+
+def _likely(
+    found: Mapping[str, Any],
+    needed: frozenset[tuple[str, str]],
+    truth: frozenset[tuple[str, str]],
+    kind: str,
+    hides_known_effects: bool,
+) -> tuple[bool, int] | None:
+    """Return whether the set of likely causes holds the truth, and its size; None where a diagnosis states no set.
+
+    Of a control, the equations without an effect are the truth.
+    """
+    likely = found.get("likely_causes")
+    if likely is None:
+        return None
+    size = len(likely["effects"]) + bool(likely["outside"])
+    if kind == "outside":
+        return bool(likely["outside"]), size
+    if not hides_known_effects:
+        return [] in likely["effects"], size
+    return _is_among(needed, truth, likely["effects"]), size
 
 
 def _is_place_right(
@@ -323,9 +356,9 @@ def _over_all(withheld: Sequence[WithheldError]) -> float | None:
 
 
 def _parameter_errors(key: Mapping[str, Any], found: Mapping[str, Any]) -> tuple[ParameterError, ...]:
-    by_place = key.get("schema_version", 1) >= _BY_PLACE
-    truth = _at_places(key, by_place)
-    named = next((c for c in found["candidates"] if _at_places(c, by_place) == truth), None)
+    by_place = key.get("schema_version", 1) >= BY_PLACE_SCHEMA
+    truth = effects_at_places(key, by_place)
+    named = next((c for c in found["candidates"] if effects_at_places(c, by_place) == truth), None)
     if named is None:
         return ()
     return parameter_errors(rig_of(key), sorted(truth), named["parameters"], key["values"])

@@ -47,13 +47,13 @@ def mean(values: Sequence[float]) -> float | None:
     return float(np.mean(values)) if len(values) else None
 
 
-def mean_interval(probabilities: Sequence[float]) -> tuple[float, float]:
-    """Return where the mean of many such trials lies, by the central limit theorem; everything below two."""
-    if len(probabilities) < 2:
-        return 0.0, 1.0
-    middle = float(np.mean(probabilities))
-    half = _TWO_SIDED * float(np.std(probabilities, ddof=1)) / math.sqrt(len(probabilities))
-    return max(0.0, middle - half), min(1.0, middle + half)
+def mean_interval(values: Sequence[float]) -> tuple[float | None, float | None]:
+    """Return where the mean of many such trials lies, by the central limit theorem; None, without limit, below two."""
+    if len(values) < 2:
+        return None, None
+    middle = float(np.mean(values))
+    half = _TWO_SIDED * float(np.std(values, ddof=1)) / math.sqrt(len(values))
+    return middle - half, middle + half
 
 
 def quantile(values: Sequence[float], share: float) -> float | None:

@@ -13,6 +13,7 @@ import numpy as np
 from rigsight.blind.goals import figures, laboratory_figures, targets
 from rigsight.blind.laboratory.subjects import CONDITIONS
 from rigsight.blind.parameter_errors import OF_RIG, ParameterError
+from rigsight.blind.probability_scores import log_score, probability_scores
 from rigsight.blind.score import FAILED, SEVERAL, Outcome, WithheldError
 from rigsight.blind.shares import mean, median, quantile, share_of
 
@@ -39,6 +40,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "confusion": confusion(outcomes),
         "pairs": pairs(outcomes),
         "reliability": reliability(outcomes),
+        "probabilities": probability_scores(outcomes),
         "held_out": held_out(outcomes),
         "parameters": parameters(outcomes),
         "conditions": conditions(outcomes),
@@ -128,7 +130,7 @@ def _of_pair(found: Outcome) -> str:
 
 
 def reliability(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """Return, for bins of the stated probability, its mean and the share of verdicts that were right.
+    """Return, for bins of the stated probability, its mean and the share of verdicts that were true.
 
     A diagnosis that failed states nothing.
     """
@@ -140,7 +142,7 @@ def reliability(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
                 "from": lower,
                 "to": upper,
                 "stated": mean([o.stated for o in inside]),
-                "right": share_of(inside, lambda o: o.right),
+                "right": share_of(inside, lambda o: o.stated_is_true),
             }
         )
     return rows
@@ -232,7 +234,7 @@ def _figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "right_within_set": share_of(outcomes, lambda o: o.right_within_set),
         "place_right": share_of(placed, lambda o: bool(o.place_right)),
         "looked_at": share_of([o for o in outcomes if o.looked_at is not None], lambda o: bool(o.looked_at)),
-        "mean_probability": mean([o.probability for o in outcomes]),
+        "log_score": mean([log_score(o.probability) for o in outcomes]),
         "held_out_median": median([_endless(o.held_out) for o in outcomes if o.withheld]),
         "seconds_median": median([o.seconds for o in outcomes]),
     }

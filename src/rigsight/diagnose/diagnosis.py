@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -21,12 +22,12 @@ from rigsight.diagnose.noise.detection import AT_REST
 from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, OutputGap
+from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, LikelyCauses, OutputGap
 from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.trust.trust import trust
-from rigsight.diagnose.verdict.catalogue_coverage import probability_in_catalogue
+from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.diagnose.verdict.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
@@ -43,8 +44,6 @@ _REFERENCE_USED = (
     "It serves as instrument where the frequency responses of two amplitudes are compared, if the input answers it in both; the "
     "responses in the report do not use it."
 )
-_WITHOUT_EFFECT = 0.95
-"""Probability given to the equations without an effect where they reach the noise floor."""
 
 
 def diagnose(
@@ -184,25 +183,19 @@ def _assembled(
         )
         for name in measured
     }
-    share = probability_in_catalogue(
-        judgement,
-        ranking,
-        reidentified.error_over_noise,
-        found.adequacy is not None and found.adequacy.adequate,
-    )
-    explained = judgement.verdict in ("none", "parameters")
-    without_effect = _candidate(context, reidentified, _WITHOUT_EFFECT if explained else 0.0)
+    calibration, situation = trained(), _situation(found)
+    without_effect = _candidate(context, reidentified, calibration.without_effect(situation))
+    probabilities = calibration.probabilities(situation, ranking.probabilities)
     with_effect = [
-        _candidate(context, model, probability * share, grounds)
-        for model, probability, grounds in zip(
-            ranking.order, ranking.probabilities, ranking.grounds, strict=True
-        )
+        _candidate(context, model, probability, grounds)
+        for model, probability, grounds in zip(ranking.order, probabilities, ranking.grounds, strict=True)
     ]
     candidates = tuple(
         sorted((*with_effect, without_effect), key=lambda c: (-c.probability, c.error_over_noise))
     )
     chosen = judgement.model.effects if is_effect else ()
-    tied = tuple(model.names for model in ranking.tied) if is_effect else ()
+    likely = _likely(candidates, calibration.least_probability)
+    rivals = [names for names in likely.sets if names != judgement.model.names] if is_effect else []
     where = tuple(rig.where(effect) for effect in chosen)
     if judgement.verdict == "unknown":
         where = _evidence(found)
@@ -220,7 +213,8 @@ def _assembled(
         verdict=judgement.verdict,
         effects=tuple(effect.name for effect in chosen),
         where=where,
-        ambiguous_with=tied,
+        ambiguous_with=tuple(rivals),
+        likely=likely,
         candidates=candidates,
         gap=gap,
         noise_floors=floors,
@@ -232,9 +226,12 @@ def _assembled(
         window_cycles=found.windowing.cycles,
         bandwidth=found.windowing.bandwidth,
         scored_on=scored_on,
-        advice=advise(context, judgement.model, ranking.tied, {n: f.std for n, f in noise.items()})
-        if is_effect
-        else (),
+        advice=advise(
+            context,
+            judgement.model,
+            [model for model in ranking.order if model.names in rivals],
+            {n: f.std for n, f in noise.items()},
+        ),
         places=found.places,
         adequate=None if found.adequacy is None else found.adequacy.adequate,
         remainder=left,
@@ -243,6 +240,31 @@ def _assembled(
             [effect.name for effect in chosen], {frozenset(c.effects): c.validation_nrmse for c in candidates}
         ),
     )
+
+
+def _situation(found: Examination) -> Situation:
+    """Return what the probability of the verdict is told from."""
+    ranking, judgement = found.ranking, found.judgement
+    first = ranking.order[0] if ranking.order else None
+    return Situation(
+        judgement.verdict,
+        ranking.probabilities[0] if first is not None else 0.0,
+        found.reidentified.error_over_noise if first is None else first.error_over_noise,
+        found.reidentified.error_over_noise,
+        0 if first is None else len(first.effects),
+        found.adequacy is not None and found.adequacy.adequate,
+        any(floor.lower_bound for floor in found.floors),
+        bool(found.places),
+    )
+
+
+def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
+    """Return the causes that are at least so probable; the likeliest always."""
+    outside = max(0.0, 1.0 - math.fsum(candidate.probability for candidate in candidates))
+    most = max(outside, *(candidate.probability for candidate in candidates))
+    enough = min(least, most)
+    sets = tuple(candidate.effects for candidate in candidates if candidate.probability >= enough)
+    return LikelyCauses(sets, outside >= enough)
 
 
 def _with_disturbance(

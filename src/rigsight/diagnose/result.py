@@ -102,6 +102,22 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class LikelyCauses:
+    """The smallest set of causes that holds the true one in nine trials of ten.
+
+    Attributes
+    ----------
+    sets
+        Names of the effects of each; empty names are the equations without an effect.
+    outside
+        True if a cause that is none of the candidates belongs to the set.
+    """
+
+    sets: tuple[tuple[str, ...], ...] = ()
+    outside: bool = False
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """The result of a diagnosis.
 
@@ -149,6 +165,8 @@ class Diagnosis:
         Whether what the diagnosed simulation leaves is noise and disturbance; None where that could not be asked.
     remainder
         What it leaves above them; None as above.
+    likely
+        The causes that the records leave open.
     trust
         Whether the numbers of the verdict's model are the same in every record, at every amplitude and in shorter windows; None
         where that was not asked.
@@ -180,6 +198,7 @@ class Diagnosis:
     joint_forces: tuple[JointForce, ...] = ()
     adequate: bool | None = None
     remainder: Remainder | None = None
+    likely: LikelyCauses = field(default_factory=LikelyCauses)
     trust: Trust | None = None
 
     def to_json(self) -> dict[str, Any]:
@@ -195,6 +214,10 @@ class Diagnosis:
             "remainder": None if self.remainder is None else self.remainder.to_json(),
             "trust": None if self.trust is None else self.trust.to_json(),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
+            "likely_causes": {
+                "effects": [list(effects) for effects in self.likely.sets],
+                "outside": self.likely.outside,
+            },
             "candidates": [_candidate(candidate) for candidate in self.candidates],
             "gap": {
                 output: {
@@ -252,6 +275,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
             for name, e in candidate.parameters.items()
         },
         "n_fitted": len(candidate.parameters),
+        "ranking_share": None if candidate.grounds is None else candidate.grounds.share,
         "held_out_share": None if candidate.grounds is None else candidate.grounds.held_out,
         "log_evidence": None if candidate.grounds is None else candidate.grounds.evidence,
         "success": candidate.success,

@@ -220,3 +220,13 @@ class VerdictNumbers:
         ),
         set_by="the best log score of seven exponents on 45 trials of the laboratory bench, seeds 5 and 6",
     )
+    prior_outside: float = number(
+        0.2,
+        "assumption",
+        "Share of causes that no catalogue holds, before any record is seen: one in five.",
+    )
+    set_coverage: float = number(
+        0.9,
+        "convention",
+        "Share of diagnoses whose true cause shall be in the set of likely causes.",
+    )

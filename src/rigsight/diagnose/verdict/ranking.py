@@ -21,12 +21,15 @@ class Grounds:
 
     Attributes
     ----------
+    share
+        Of the ranking: held-out errors and evidence together.
     held_out
         Share of the resamplings of the held-out errors in which it is the simplest of the best.
     evidence
         Logarithm of its evidence, less that of the likeliest model [nats]; None where its fit was not finished.
     """
 
+    share: float
     held_out: float
     evidence: float | None
 
@@ -89,7 +92,7 @@ def rank(
     failed = [m for m in models if m not in usable]
     if not usable:
         return Ranking(
-            tuple(models), tuple(0.0 for _ in models), (), tuple(Grounds(0.0, None) for _ in models)
+            tuple(models), tuple(0.0 for _ in models), (), tuple(Grounds(0.0, 0.0, None) for _ in models)
         )
     squares = np.column_stack([_blocks(m, noise) for m in usable])
     draws = rng.integers(0, squares.shape[0], size=(RESAMPLES, squares.shape[0]))
@@ -143,8 +146,8 @@ def rank(
         probabilities=(*(float(probabilities[i]) for i in order), *(0.0 for _ in failed)),
         tied=tuple(usable[i] for i in sorted(tied, key=lambda i: errors[i])),
         grounds=(
-            *(Grounds(float(wins[i]), evidence[i]) for i in order),
-            *(Grounds(0.0, None) for _ in failed),
+            *(Grounds(float(probabilities[i]), float(wins[i]), evidence[i]) for i in order),
+            *(Grounds(0.0, 0.0, None) for _ in failed),
         ),
     )
 

@@ -41,6 +41,8 @@ def render_blind(content: Mapping[str, Any]) -> str:
         confusion=confusion(content),
         pairs=pair_rows(content),
         reliability=views.reliability_rows(content),
+        score_heads=views.SCORE_HEADS,
+        scores=views.score_rows(content),
         reliability_plot=reliability_figure(content),
         held_out_plot=held_out_figure(content),
         held_out=views.held_out_rows(content),

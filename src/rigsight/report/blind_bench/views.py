@@ -26,8 +26,7 @@ SHARES = {
     "faint_right_within_set": "  or among those named alike",
 }
 NUMBERS = {
-    "mean_probability": "mean probability on the truth",
-    "log_score": "mean log score (0 is perfect)",
+    "log_score": "mean log score on the truth (0 is perfect)",
     "held_out_median": "error on withheld records, median, x floor",
     "seconds_median": "seconds per diagnosis, median",
 }
@@ -37,7 +36,7 @@ _GOALS = {
     "controls_right": "controls recognized (no gap, wrong parameters)",
     "outside_unknown_large_gap": "effects from outside the catalogue called unknown",
     "pairs_right": "pairs, both effects named",
-    "mean_probability": "mean probability on the truth",
+    "log_score": "log score on the truth, mean (0 is perfect)",
     "held_out_median": "error on withheld records, median",
     "laboratory_right": "effect and place named in a laboratory's records",
     "laboratory_wrong_name": "another effect or place named there",
@@ -86,7 +85,7 @@ class GroupView:
 
 GROUP_HEADS = (
     "Trials", "Right", "95 % interval", "Effect right", "Right or not to be told apart", "Place right", "Place looked at",
-    "Mean probability on the truth",
+    "Log score on the truth",
     "Withheld error, median", "Seconds, median",
 )  # fmt: skip
 
@@ -169,8 +168,7 @@ def goal_rows(content: Mapping[str, Any]) -> list[GoalRow]:
 def beside_rows(content: Mapping[str, Any]) -> list[list[str]]:
     """Return the figures without a goal: words, share, counts and interval."""
     goals = content["goals"]
-    shares = [[sentence_case(words), *share_cells(goals[name])] for name, words in _BESIDE.items()]
-    return [*shares, ["Mean log score on the truth (0 is perfect)", number(goals["log_score"]), "", ""]]
+    return [[sentence_case(words), *share_cells(goals[name])] for name, words in _BESIDE.items()]
 
 
 def share_cells(share: Mapping[str, Any]) -> list[str]:
@@ -196,7 +194,11 @@ def _in_percent(row: Mapping[str, Any]) -> bool:
 def _target(row: Mapping[str, Any]) -> str:
     if _in_percent(row):
         return f"{100.0 * row['target']:g} %"
-    return f"{row['target']:g} {TIMES} the noise floor" if row["at_most"] else f"{row['target']:g}"
+    return (
+        f"{row['target']:g} {TIMES} the noise floor"
+        if row["name"] == "held_out_median"
+        else f"{row['target']:g}"
+    )
 
 
 def _value(row: Mapping[str, Any]) -> str:
@@ -227,6 +229,36 @@ def reliability_rows(content: Mapping[str, Any]) -> list[list[str]]:
         [number(row["stated"]), *share_cells(row["right"])]
         for row in content["reliability"]
         if row["right"]["total"]
+    ]
+
+
+SCORE_HEADS = (
+    "Trials",
+    "Stated, mean",
+    "True",
+    "Log score",
+    "Brier score",
+    "Slope",
+    "Likely causes hold the truth",
+    "Causes in the set",
+)
+
+
+def score_rows(content: Mapping[str, Any]) -> list[list[str]]:
+    """Return, for all trials and each stratum, the cells of `SCORE_HEADS` behind its name."""
+    return [
+        [
+            sentence_case(name),
+            str(row["count"]),
+            number(row["stated"]),
+            share_cells(row["true"])[0],
+            number(row["log_score"]),
+            number(row["brier"]),
+            NOTHING if row["slope"] is None else f"{row['slope']:.2f} \u00b1 {row['slope_error']:.2f}",
+            share_cells(row["covered"])[0],
+            number(row["set_size"]),
+        ]
+        for name, row in content["probabilities"].items()
     ]
 
 
@@ -288,7 +320,7 @@ def _group_cells(row: Mapping[str, Any]) -> list[str]:
         share_cells(row["right_within_set"])[0],
         share_cells(row["place_right"])[0],
         share_cells(row["looked_at"])[0],
-        number(row["mean_probability"]),
+        number(row["log_score"]),
         number(row["held_out_median"]),
         number(row["seconds_median"]),
     ]

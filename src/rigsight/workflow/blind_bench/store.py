@@ -19,7 +19,7 @@ from typing import Any, get_type_hints
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.errors import InputError, MachineError
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 _PATIENCE = 60.0
 """Time [s] to wait for another process that writes."""
 _OF_THE_DISK = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY")
@@ -30,6 +30,7 @@ _TYPES: dict[Any, str] = {
     float: "REAL NOT NULL",
     float | None: "REAL",
     bool | None: "INTEGER",
+    int | None: "INTEGER",
 }
 _FROM_TEXT: dict[str, Callable[[list[Any]], tuple[Any, ...]]] = {
     "effects": tuple,

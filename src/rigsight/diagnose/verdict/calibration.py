@@ -1,0 +1,160 @@
+"""How probable is what a diagnosis names? Two small logistic models, trained on drawn rigs whose cause is known.
+
+The first says how probable it is that the cause is among the models tried at all, the second how probable it is that it is the
+first of them. Both read a handful of figures of the diagnosis, see `Situation`. Coefficients stand in ``calibration.json``,
+which ``make calibrate`` makes anew from the table of training trials in ``experiments/calibration``.
+
+References
+----------
+J. Platt, in *Advances in Large Margin Classifiers* (MIT Press 2000) 61, for probabilities by a logistic model of a score.
+M. Sadinle, J. Lei and L. Wasserman, J. Am. Stat. Assoc. 114 (2019) 223, for the smallest sets of a stated coverage.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.verdict.judgement import Verdict
+
+FILE = "calibration.json"
+_STEEPEST = 6.0
+"""Log odds of a share of the ranking beyond which resampling tells nothing: a thousand resamplings were drawn."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the probability of a verdict is told from.
+
+    Attributes
+    ----------
+    verdict
+        The verdict.
+    first_share
+        Share of the first model in the ranking of those with an effect, 0 to 1.
+    left, gap
+        What that model and what the re-identified equations leave, in units of the noise floor.
+    n_effects
+        Number of its effects.
+    adequate
+        Whether what it leaves counts as noise and disturbance.
+    lower_bound
+        Whether the noise floor is only a lower bound.
+    several_places
+        Whether effects had to be placed.
+    """
+
+    verdict: Verdict
+    first_share: float
+    left: float
+    gap: float
+    n_effects: int
+    adequate: bool
+    lower_bound: bool
+    several_places: bool
+
+    def figures(self) -> dict[str, float]:
+        """Return what the logistic models read, by name."""
+        has_effect = self.verdict in ("effect", "unknown")
+        share = min(max(self.first_share, 0.0), 1.0)
+        log_odds = math.log((share + 1e-12) / (1.0 - share + 1e-12))
+        left, gap = max(self.left, 1.0), max(self.gap, 1.0)
+        return {
+            "log_odds_of_first": max(-_STEEPEST, min(_STEEPEST, log_odds)) if has_effect else 0.0,
+            "log_left": math.log(left / VERDICT.at_floor) if has_effect and left > VERDICT.at_floor else 0.0,
+            "log_gap": math.log(gap) if has_effect else 0.0,
+            "more_effects": float(max(self.n_effects - 1, 0)) if self.verdict == "effect" else 0.0,
+            "inadequate": float(not self.adequate),
+            "lower_bound": float(self.lower_bound),
+            "several_places": float(self.several_places),
+            "no_effect": float(not has_effect),
+            "unknown": float(self.verdict == "unknown"),
+        }
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Coefficients of both models, and the threshold of the sets.
+
+    Attributes
+    ----------
+    listed, first
+        Coefficients by figure, with ``"intercept"``: that the cause is among the models tried, and that it is the first of them
+        if it is.
+    least_probability
+        Models at least so probable belong to the set; it holds the cause of nine trials in ten.
+    n_trials
+        Training trials.
+    """
+
+    listed: Mapping[str, float]
+    first: Mapping[str, float]
+    least_probability: float
+    n_trials: int
+
+    def probability_listed(self, situation: Situation) -> float:
+        """Return the probability that the cause is among the models tried."""
+        return _logistic(self.listed, situation.figures())
+
+    def probability_first(self, situation: Situation) -> float:
+        """Return the probability that the cause is the first model if it is among those tried."""
+        return _logistic(self.first, situation.figures())
+
+    def probabilities(self, situation: Situation, shares: Sequence[float]) -> list[float]:
+        """Return the probability of each model with an effect; what is left of 1 is that of all else.
+
+        Parameters
+        ----------
+        situation
+            The diagnosis.
+        shares
+            Of the ranking, the first model's first; the others share in their proportion what the first one leaves.
+        """
+        if not shares:
+            return []
+        listed, first = self.probability_listed(situation), self.probability_first(situation)
+        if situation.verdict in ("none", "parameters"):
+            return _in_proportion(listed * (1.0 - first), shares)
+        if len(shares) == 1:
+            return [listed * first]
+        return [listed * first, *_in_proportion(listed * (1.0 - first), shares[1:])]
+
+    def without_effect(self, situation: Situation) -> float:
+        """Return the probability that the equations need no effect."""
+        if situation.verdict in ("none", "parameters"):
+            return self.probability_listed(situation) * self.probability_first(situation)
+        return 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of the file."""
+        return {
+            "listed": dict(self.listed),
+            "first": dict(self.first),
+            "least_probability": self.least_probability,
+            "n_trials": self.n_trials,
+        }
+
+
+@functools.cache
+def trained() -> Calibration:
+    """Return the calibration that the package brings."""
+    text = resources.files(__package__).joinpath(FILE).read_text(encoding="utf-8")
+    return Calibration(**json.loads(text))
+
+
+def _logistic(coefficients: Mapping[str, float], figures: Mapping[str, float]) -> float:
+    told = sum(
+        value * (1.0 if name == "intercept" else figures[name]) for name, value in coefficients.items()
+    )
+    return 1.0 / (1.0 + math.exp(-told))
+
+
+def _in_proportion(total: float, shares: Sequence[float]) -> list[float]:
+    whole = math.fsum(shares)
+    return [total * share / whole if whole > 0.0 else total / len(shares) for share in shares]

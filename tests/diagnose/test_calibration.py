@@ -1,0 +1,61 @@
+"""Probabilities come from the calibration: they add up, and they fall where less speaks for the cause."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from rigsight.diagnose.verdict.calibration import Situation, trained
+
+CLEAR = Situation(
+    verdict="effect",
+    first_share=1.0,
+    left=1.02,
+    gap=30.0,
+    n_effects=1,
+    adequate=True,
+    lower_bound=False,
+    several_places=False,
+)
+
+
+def stated(situation: Situation) -> float:
+    return trained().probabilities(situation, [situation.first_share, 1.0 - situation.first_share])[0]
+
+
+def test_probabilities_and_what_is_left_for_all_else_add_up_to_one() -> None:
+    calibration = trained()
+    told = calibration.probabilities(CLEAR, [0.7, 0.2, 0.1])
+    assert sum(told) == pytest.approx(calibration.probability_listed(CLEAR))
+    assert told[1] == pytest.approx(2.0 * told[2])
+    assert calibration.without_effect(CLEAR) == 0.0
+
+
+def test_without_a_gap_the_equations_alone_are_probable() -> None:
+    calm = replace(CLEAR, verdict="none", gap=1.0, left=1.0, n_effects=0)
+    calibration = trained()
+    others = calibration.probabilities(calm, [0.5, 0.5])
+    assert calibration.without_effect(calm) > 0.8
+    assert calibration.without_effect(calm) + sum(others) == pytest.approx(
+        calibration.probability_listed(calm)
+    )
+
+
+def test_a_clear_cause_is_probable() -> None:
+    assert stated(CLEAR) > 0.9
+
+
+@pytest.mark.parametrize(
+    "worse",
+    [{"first_share": 0.5}, {"left": 5.0, "adequate": False}, {"gap": 1.3}, {"verdict": "unknown"}],
+    ids=str,
+)
+def test_less_evidence_is_less_probable(worse: dict) -> None:
+    assert stated(replace(CLEAR, **worse)) < stated(CLEAR) - 0.02
+
+
+def test_one_model_alone_takes_what_the_first_has() -> None:
+    calibration = trained()
+    assert calibration.probabilities(CLEAR, []) == []
+    assert calibration.probabilities(CLEAR, [1.0]) == [stated(CLEAR)]
