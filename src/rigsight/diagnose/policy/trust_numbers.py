@@ -54,7 +54,7 @@ class TrustNumbers:
         "Natural periods of a window that is compared with the others of its record: in fewer a resonance is one spectral line "
         "wide, and what a disturbance does there is a single draw.",
         "axis with a damping ratio of 0.08 and a disturbing force of up to 80 noises: with quarters of 9.5 periods 3 of 30 right "
-        "models were said to differ along the record, with halves of 19 none of 80",
+        "models were said to differ along the record, with halves of 19 one of 80",
     )
     worth_a_step: float = number(
         0.05,

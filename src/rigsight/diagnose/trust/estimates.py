@@ -42,7 +42,7 @@ class Estimates:
     freedom: Floats
 
 
-def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra) -> Estimates:
+def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
     """Return the numbers that some pieces speak for.
 
     Parameters
@@ -53,8 +53,10 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra) -> Estim
         Pieces, each with an initial state of its own.
     spectra
         Of the noise of each record.
+    kept
+        Which numbers are estimated; the others stand at the common fit, shape (n_free,).
     """
-    inverse, unknown = _weights(of, some)
+    inverse, unknown = _weights(of, some, kept)
     shifts, parts = np.zeros(len(of.free)), []
     for piece in some:
         columns = piece.rows @ inverse.T
@@ -64,7 +66,7 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra) -> Estim
     return Estimates(shifts, _widened(of, variances, unknown), freedom)
 
 
-def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra) -> Estimates:
+def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
     """Return how windows, pooled, differ from the whole records that they are made of (Hausman).
 
     Parameters
@@ -75,12 +77,14 @@ def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra) -> Estim
         All windows of one length, in order.
     spectra
         Of the noise of each record.
+    kept
+        Which numbers are estimated; the others stand at the common fit, shape (n_free,).
 
     References
     ----------
     J. A. Hausman, Econometrica 46 (1978) 1251, for the difference of two estimates from the same data.
     """
-    inverse, unknown = _weights(of, windows)
+    inverse, unknown = _weights(of, windows, kept)
     shifts, parts = np.zeros(len(of.free)), []
     for whole in of.whole:
         own = [piece for piece in windows if piece.record == whole.record]
@@ -88,17 +92,77 @@ def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra) -> Estim
         left = _joined([piece.residuals[:, None] for piece in own], whole.n_measured)[:, 0]
         shifts -= inverse @ (rows.T @ left)
         # Windows are counted from the record's own numbers, which hang on the same noise.
-        centered = pseudo_inverse(whole.rows).T
+        centered = np.zeros_like(rows)
+        centered[:, kept] = pseudo_inverse(whole.rows[:, kept]).T
         columns = rows @ inverse.T - centered @ (inverse @ (rows.T @ rows)).T
         parts.append(_Variance.of(spectra, whole, columns))
     variances, freedom = _together(parts)
     return Estimates(shifts, _widened(of, variances, unknown), freedom)
 
 
-def _weights(of: Pieces, some: Sequence[Piece]) -> tuple[Floats, NDArray[np.bool_]]:
+def mean(several: Sequence[Estimates]) -> Estimates:
+    """Return the mean of independent estimates, each with the weight of its own variance.
+
+    Parameters
+    ----------
+    several
+        One or more.
+    """
+    weights = np.array([1.0 / one.variances for one in several])
+    total = np.sum(weights, axis=0)
+    # A number that none of them determines has no weight anywhere.
+    whole = np.where(total > 0.0, total, 1.0)
+    shifts = np.sum(weights * np.array([one.shifts for one in several]), axis=0) / whole
+    spread = np.sum(weights**2 / np.array([one.freedom for one in several]), axis=0)
+    freedom = np.where(spread > 0.0, total**2 / np.where(spread > 0.0, spread, 1.0), TRUST.least_freedom)
+    return Estimates(shifts, np.where(total > 0.0, 1.0 / whole, np.inf), freedom)
+
+
+def told_by_most(of: Pieces, groups: Sequence[Sequence[Piece]]) -> NDArray[np.bool_]:
+    """Return which numbers most groups determine by themselves once the others are held at the common fit, shape (n_free,).
+
+    A number that follows another in most groups, as the two terms of a friction do under one load, takes no part; the other then
+    tells of both.
+
+    Parameters
+    ----------
+    of
+        As of `estimates`.
+    groups
+        Pieces of each group.
+    """
+    kept = np.ones(len(of.free), dtype=bool)
+    while np.any(kept):
+        worst = [own for group in groups if (own := _loosest(of, group, kept)) is not None]
+        if 2 * len(worst) <= len(groups):
+            break
+        kept[max(set(worst), key=worst.count)] = False
+    return kept
+
+
+def _loosest(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> int | None:
+    """Return the number that takes the largest part in what pieces do not determine; None where they determine all."""
+    normal = _normal(of, some)[np.ix_(kept, kept)]
+    if not np.any(np.isinf(np.diag(sandwich_covariance(normal, normal, of.derivative_error)))):
+        return None
+    size = np.sqrt(np.diag(normal))
+    size[size == 0.0] = 1.0
+    direction = np.abs(np.linalg.eigh(normal / np.outer(size, size))[1][:, 0])
+    # Of two that take part alike the last one goes: rigs come before effects, and what an effect is first named for stands first.
+    largest = np.flatnonzero(direction >= TRUST.in_order * np.max(direction))[-1]
+    return int(np.flatnonzero(kept)[largest])
+
+
+def _normal(of: Pieces, some: Sequence[Piece]) -> Floats:
+    none = np.zeros((len(of.free), len(of.free)))
+    return np.asarray(sum((piece.rows.T @ piece.rows for piece in some), start=none))
+
+
+def _weights(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
     """Return chain (J^T J)^-1, shape (n_free, n_free), and which parameters J^T J does not determine."""
-    normal = sum((piece.rows.T @ piece.rows for piece in some), start=np.zeros((len(of.free), len(of.free))))
-    covariance = sandwich_covariance(normal, normal, of.derivative_error)
+    normal, covariance = _normal(of, some), np.diag(np.full(len(of.free), np.inf))
+    own = normal[np.ix_(kept, kept)]
+    covariance[np.ix_(kept, kept)] = sandwich_covariance(own, own, of.derivative_error)
     infinite = np.isinf(np.diag(covariance))
     inverse = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
     touched = np.any(of.chain[:, infinite] != 0.0, axis=1)

@@ -16,7 +16,11 @@ _ONE_RECORD = "One record cannot tell whether they hold at another amplitude."
 
 
 def statement(
-    numbers: Sequence[ParameterTrust], pairs: Sequence[Entangled], n_records: int, asked: Sequence[str]
+    numbers: Sequence[ParameterTrust],
+    pairs: Sequence[Entangled],
+    n_records: int,
+    asked: Sequence[str],
+    left_open: Sequence[str] = (),
 ) -> str:
     """Return what is known of the numbers, in a few sentences.
 
@@ -30,6 +34,8 @@ def statement(
         Number of records.
     asked
         Kinds of groups that were compared.
+    left_open
+        Numbers that all records together do not determine.
     """
     differing = [number for number in numbers if not number.stable]
     sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
@@ -38,8 +44,15 @@ def statement(
         sentences.append(f"{_listed(rest)} {'differs' if len(rest) == 1 else 'differ'} too.")
     compared = [number for number in numbers if number.pattern is Pattern.STABLE]
     if compared:
-        sentences.append(_same(compared, bool(differing), asked))
-    open_numbers = [number.name for number in numbers if number.pattern is Pattern.UNKNOWN]
+        sentences.append(_same(compared, bool(differing), len(compared) == len(numbers), asked))
+    if left_open:
+        verb = "is" if len(left_open) == 1 else "are"
+        sentences.append(f"{_listed(left_open)} {verb} not determined even by all records together.")
+    open_numbers = [
+        number.name
+        for number in numbers
+        if number.pattern is Pattern.UNKNOWN and number.name not in left_open
+    ]
     if open_numbers:
         verb = "is" if len(open_numbers) == 1 else "are"
         where = "no two groups of records" if n_records > 1 else "no part of the record"
@@ -128,21 +141,20 @@ def _digits(first: GroupValue, second: GroupValue) -> int:
     return digits
 
 
-def _same(numbers: Sequence[ParameterTrust], is_rest: bool, asked: Sequence[str]) -> str:
+def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked: Sequence[str]) -> str:
     where = "in every record" if RECORD in asked else ""
     if WINDOW_LENGTH in asked:
         where = f"{where} and in shorter windows" if where else "along the record and in shorter windows"
     largest = max(number.largest for number in numbers)
     names = [number.name for number in numbers]
     if is_rest:
-        verb = "is" if len(names) == 1 else "are"
         who = (
-            f"The other number, {names[0]}, {verb}"
-            if len(names) == 1
-            else f"The other {len(names)} numbers are"
+            f"The other number, {names[0]}, is" if len(names) == 1 else f"The other {len(names)} numbers are"
         )
+    elif len(names) == 1:
+        who = f"{names[0]} is"
     else:
-        who = f"The only number, {names[0]}, is" if len(names) == 1 else f"All {len(names)} numbers are"
+        who = f"All {len(names)} numbers are" if are_all else f"{_listed(names)} are"
     text = f"{who} the same {where or 'wherever they were compared'} (largest difference {largest:.2g} standard errors)."
     vague = {number.name: error for number in numbers if (error := _vagueness(number)) > TRUST.vague}
     if vague:
@@ -152,7 +164,7 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, asked: Sequence[str]
             if len(vague) > 1
             else ""
         )
-        text += f" But single groups know {name} only to {100.0 * vague[name]:.2g} %{more}: smaller differences do not show."
+        text += f" But single groups know {name} only to {_percent(vague[name])}{more}: smaller differences do not show."
     return text
 
 
@@ -166,3 +178,7 @@ def _vagueness(number: ParameterTrust) -> float:
 
 def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _percent(share: float) -> str:
+    return f"{float(f'{100.0 * share:.2g}'):g} %"

@@ -22,6 +22,7 @@ from rigsight.diagnose.trust.pieces import pieces
 from rigsight.diagnose.trust.result import GroupValue, ParameterTrust, Trust
 from rigsight.diagnose.trust.statement import statement
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
+from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Record
 
 _NOT_SIMULATED = "Whether the numbers hold in each record could not be asked: the model cannot be simulated in one of them."
@@ -68,9 +69,12 @@ def trust(
         return Trust(_NOT_SIMULATED)
     along = orders(context.rig, records, constants)
     seen = views(found, [record.name for record in records], along)
+    open_numbers = _left_open(model)
     asked = [
-        [_Asked(view, told) for view in seen.values() if (told := _told(view, i))]
-        for i in range(len(found.free))
+        []
+        if name in open_numbers
+        else [_Asked(view, told) for view in seen.values() if (told := _told(view, i))]
+        for i, name in enumerate(found.free)
     ]
     p_values = iter(adjusted([one.told.p_value for of_number in asked for one in of_number]))
     allowed = [[next(p_values) for _ in of_number] for of_number in asked]
@@ -81,7 +85,17 @@ def trust(
     )
     ordered = tuple(sorted(numbers, key=lambda n: (n.stable, n.p_value if not n.stable else 0.0)))
     pairs = entangled(model.fit)
-    return Trust(statement(ordered, pairs, len(records), tuple(seen)), ordered, pairs)
+    return Trust(statement(ordered, pairs, len(records), tuple(seen), open_numbers), ordered, pairs)
+
+
+def _left_open(model: Scored) -> tuple[str, ...]:
+    """Return the numbers that cannot be negative and that all records together do not determine."""
+    fit, lower = model.fit, {p.name: p.lower for p in model.fit.structure.parameters}
+    return tuple(
+        name
+        for name in fit.free
+        if lower[name] >= 0.0 and not fit.standard_errors[name] < POORLY_KNOWN * abs(fit.values[name])
+    )
 
 
 def _effect_parameters(model: Scored) -> set[str]:

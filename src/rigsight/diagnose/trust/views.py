@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.policy import TRUST
-from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates
+from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates, mean, told_by_most
 from rigsight.diagnose.trust.orders import Order
 from rigsight.diagnose.trust.patterns import Pattern
-from rigsight.diagnose.trust.pieces import Pieces
+from rigsight.diagnose.trust.pieces import Piece, Pieces
 from rigsight.diagnose.trust.spectra import NoiseSpectra
 from rigsight.identify.undetermined import POORLY_KNOWN
 
@@ -83,56 +83,60 @@ def views(of: Pieces, records: Sequence[str], orders: Sequence[Order]) -> dict[s
     made: dict[str, View] = {}
     spectra = NoiseSpectra.of(of.whole)
     if len(records) > 1:
-        made[RECORD] = _grouped(of, spectra, RECORD, {name: [name] for name in records})
+        made[RECORD] = _by_record(of, records, spectra)
         for order in orders:
             if order.pattern is not Pattern.TIME:
-                made[order.name] = _by_level(of, spectra, order)
+                made[order.name] = _by_level(made[RECORD], order)
     if of.cut:
         if of.portions > 1:
-            made[PORTION] = _portions(of, spectra)
+            made[PORTION] = _portions(of)
         made[WINDOW_LENGTH] = _lengths(of, spectra)
     return made
 
 
-def _grouped(
-    of: Pieces, spectra: NoiseSpectra, kind: str, groups: Mapping[str, Sequence[str]], is_tested: bool = True
-) -> View:
+def _by_record(of: Pieces, records: Sequence[str], spectra: NoiseSpectra) -> View:
+    parts = [[piece for piece in of.whole if piece.record == name] for name in records]
+    return View(RECORD, tuple(records), _of_each(of, parts, spectra), np.abs(of.values))
+
+
+def _by_level(alone: View, order: Order) -> View:
+    """Return the means of what records of each level say alone, each record with the weight of its own error."""
+    levels = sorted(set(order.levels.values()))
+    own = [
+        [one for name, one in zip(alone.labels, alone.found, strict=True) if order.levels[name] == level]
+        for level in levels
+    ]
     return View(
-        kind,
-        tuple(groups),
-        tuple(
-            estimates(of, [p for p in of.whole if p.record in members], spectra)
-            for members in groups.values()
-        ),
-        np.abs(of.values),
-        is_tested=is_tested,
+        order.name,
+        tuple(f"{level:.3g} {order.unit}".strip() for level in levels),
+        tuple(map(mean, own)),
+        alone.sizes,
+        # One record at each level is the view by record once more.
+        is_tested=len(levels) < len(order.levels),
     )
 
 
-def _by_level(of: Pieces, spectra: NoiseSpectra, order: Order) -> View:
-    levels = sorted(set(order.levels.values()))
-    groups = {
-        f"{level:.3g} {order.unit}".strip(): [name for name, own in order.levels.items() if own == level]
-        for level in levels
-    }
-    # One record at each level is the view by record once more.
-    return _grouped(of, spectra, order.name, groups, len(groups) < len(order.levels))
-
-
-def _portions(of: Pieces, spectra: NoiseSpectra) -> View:
+def _portions(of: Pieces) -> View:
     count = of.portions
+    # What one number leaves of a record along which it changes is no noise of its parts.
+    spectra = NoiseSpectra.of(of.cut[count])
     parts = [[piece for piece in of.cut[count] if piece.place[0] == i] for i in range(count)]
     labels = tuple(f"{_NAMES[TRUST.windows.index(count)]} {i + 1}" for i in range(count))
-    return View(PORTION, labels, tuple(estimates(of, part, spectra) for part in parts), np.abs(of.values))
+    return View(PORTION, labels, _of_each(of, parts, spectra), np.abs(of.values))
 
 
 def _lengths(of: Pieces, spectra: NoiseSpectra) -> View:
-    counts, whole = sorted(of.cut), estimates(of, of.whole, spectra)
-    apart = [beyond(of, of.cut[count], spectra) for count in counts]
-    cut = [
-        replace(estimates(of, of.cut[count], spectra), shifts=further.shifts)
-        for count, further in zip(counts, apart, strict=True)
-    ]
-    found = (replace(whole, shifts=np.zeros_like(whole.shifts)), *cut)
+    counts = sorted(of.cut)
+    groups = [of.whole, *(of.cut[count] for count in counts)]
+    kept = told_by_most(of, groups)
+    whole, *cut = (estimates(of, group, spectra, kept) for group in groups)
+    apart = [beyond(of, of.cut[count], spectra, kept) for count in counts]
+    moved = (replace(own, shifts=further.shifts) for own, further in zip(cut, apart, strict=True))
+    found = (replace(whole, shifts=np.zeros_like(whole.shifts)), *moved)
     labels = ("whole", *(_NAMES[TRUST.windows.index(count)] for count in counts))
     return View(WINDOW_LENGTH, labels, found, np.abs(of.values), apart[-1])
+
+
+def _of_each(of: Pieces, parts: Sequence[Sequence[Piece]], spectra: NoiseSpectra) -> tuple[Estimates, ...]:
+    kept = told_by_most(of, parts)
+    return tuple(estimates(of, part, spectra, kept) for part in parts)
