@@ -19,6 +19,8 @@ _COLUMNS = 2
 _WIDTH = 5.4
 """Inch; on a phone, where it is scaled to the screen, letters stay readable."""
 _LONGEST_LABEL = 16
+_STYLES = {False: (WITH_EFFECT, "o", "the same within errors"), True: (GIVEN, "D", "differs")}
+"""Color, marker and label by whether a number differs between groups."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class GroupPanel:
     ----------
     name, unit
         Of the number.
+    by
+        What groups are of, such as ``"record"``.
     groups
         Label, value and standard error of each group, in order.
     common
@@ -39,6 +43,7 @@ class GroupPanel:
 
     name: str
     unit: str
+    by: str
     groups: tuple[tuple[str, float, float], ...]
     common: tuple[float, float]
     differs: bool
@@ -64,16 +69,11 @@ def parameters_by_group(panels: Sequence[GroupPanel]) -> Figure:
         _draw(ax, panel)
     for ax in axes[len(panels) :]:
         ax.set_visible(False)
-    handles = [
-        axes[0].plot([], [], color=color, marker="o", linestyle="none")[0]
-        for color, differs in ((WITH_EFFECT, False), (GIVEN, True))
-        if any(panel.differs is differs for panel in panels)
-    ]
-    labels = [
-        label
-        for label, differs in (("the same within errors", False), ("differs", True))
-        if any(panel.differs is differs for panel in panels)
-    ]
+    handles, labels = [], []
+    for differs, (color, marker, label) in _STYLES.items():
+        if any(panel.differs is differs for panel in panels):
+            handles.append(axes[0].plot([], [], color=color, marker=marker, linestyle="none")[0])
+            labels.append(label)
     handles.append(axes[0].plot([], [], color=MEASURED, linewidth=1.2, linestyle=(0, (4, 2)))[0])
     figure.legend(handles, [*labels, "common fit"], loc="outside upper left", ncols=3, fontsize=8.5)
     return figure
@@ -83,7 +83,7 @@ def _draw(ax: Axes, panel: GroupPanel) -> None:
     from matplotlib.ticker import MaxNLocator
 
     scale = display_scale(panel.unit, max(abs(value) for _, value, _ in panel.groups))
-    color, marker = (GIVEN, "D") if panel.differs else (WITH_EFFECT, "o")
+    color, marker = _STYLES[panel.differs][:2]
     places = np.arange(len(panel.groups))
     values = scale.factor * np.array([value for _, value, _ in panel.groups])
     reach = _TWO_SIDED * scale.factor * np.array([std for _, _, std in panel.groups])
@@ -99,7 +99,7 @@ def _draw(ax: Axes, panel: GroupPanel) -> None:
     ax.set_yticks(places, [_short(label) for label, _, _ in panel.groups])
     ax.set_ylim(len(panel.groups) - 0.4, -0.6)
     unit = "" if scale.unit in ("", "1") else f" [{scale.unit}]"
-    ax.set_title(f"{panel.name}{unit}")
+    ax.set_title(f"{panel.name}{unit} by {panel.by}")
     ax.margins(x=0.08)
     ax.xaxis.set_major_locator(MaxNLocator(4))
     # An offset would stand beside the axis, away from the number it belongs to.

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 TRUST_COLUMNS = ("parameter", "by", "group", "value", "std", "unit", "pattern", "p_value")
 """Columns of the table."""
+_BY = {PORTION: "part of the records", WINDOW_LENGTH: "window length"}
 _MOST_PANELS = 6
 _TOLD_IN_A_LINE = 3
 
@@ -35,7 +36,6 @@ class TrustRow:
     same: str
     p_value: str
     points_to: str
-    experiment: str
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,7 @@ def trust_drawing(diagnosis: Diagnosis) -> Figure:
             plot.GroupPanel(
                 number.name,
                 number.unit,
+                _BY.get(_shown(number), _shown(number)),
                 tuple((one.group, one.value, one.std) for one in number.groups[_shown(number)]),
                 (number.value, number.std),
                 not number.stable,
@@ -185,6 +186,5 @@ def _row(number: ParameterTrust) -> TrustRow:
         else f"{number.p_value:.2g}"
         if number.p_value > 1e-6
         else "< 1e-6",
-        points_to="" if told is None else sentence_case(f"{told.cause}."),
-        experiment="" if told is None else told.experiment,
+        points_to="" if told is None else f"{sentence_case(told.cause)}. Next: {told.experiment}",
     )
