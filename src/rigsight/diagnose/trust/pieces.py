@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.policy import TRUST
-from rigsight.diagnose.pushes.answers import orthonormal
 from rigsight.identify import FitResult, RecordDerivatives, derivatives, own_derivatives
 from rigsight.records.record import Record
 
@@ -127,7 +126,9 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
         own.append(alone)
     values = np.array([fit.values[name] for name in free])
     made = Pieces(free, values, found.chain, found.error, tuple(whole), {})
-    if any(WINDOW in record.name for record in records):
+    # The memory with which a window begins sticks and slips: no straight line tells what it does.
+    remembers = bool(np.any(context.problem(fit.structure, records[:1]).data.limited))
+    if remembers or any(WINDOW in record.name for record in records):
         return made
     cut: dict[int, tuple[Piece, ...]] = {}
     for count in TRUST.windows:
@@ -155,7 +156,8 @@ def pseudo_inverse(rows: Floats) -> Floats:
     """
     size = np.linalg.norm(rows, axis=0)
     size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.pinv(rows / size, rcond=_DEPENDENT) / size[:, None])
+    base, triangle = np.linalg.qr(rows / size)
+    return np.asarray(np.linalg.pinv(triangle, rcond=_DEPENDENT) @ base.T / size[:, None])
 
 
 def _asks_for_other_numbers(piece: Piece) -> bool:
@@ -203,7 +205,7 @@ def _piece(name: str, place: tuple[int, int], own: RecordDerivatives) -> Piece |
     together = np.column_stack([own.by_state, own.by_coordinate])
     if not (np.all(np.isfinite(together)) and np.all(np.isfinite(own.residuals))):
         return None
-    of_state, of_all = orthonormal(own.by_state), orthonormal(together)
+    of_state, of_all = _basis(own.by_state), _basis(together)
     return Piece(
         record=name,
         place=place,
@@ -212,4 +214,15 @@ def _piece(name: str, place: tuple[int, int], own: RecordDerivatives) -> Piece |
         noise=own.residuals - of_all @ (of_all.T @ own.residuals),
         n_measured=own.n_measured,
         n_own=of_all.shape[1],
+    )
+
+
+def _basis(columns: Floats) -> Floats:
+    """Return an orthonormal basis of columns, shape (n, rank); of many samples and few columns this takes a fifth of an SVD."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    base, triangle = np.linalg.qr(columns / size)
+    turned, singular, _ = np.linalg.svd(triangle)
+    return np.asarray(
+        base @ turned[:, singular > _DEPENDENT * max(float(np.max(singular, initial=0.0)), 1e-300)]
     )
