@@ -113,6 +113,15 @@ def test_a_linear_damper_in_the_place_of_friction_differs_with_amplitude(
     assert asked(records, effects, values).stable
 
 
+def test_mass_stiffness_and_damping_that_grow_together_point_to_the_drive() -> None:
+    effects = (effect_named("input_saturation"),)
+    found = asked(axis_records((1.0, 4.0, 0.5, 2.0), effects, {"u_max": 9.0}))
+    for name in ("m", "k", "d"):
+        told = number(found, name).points_to
+        assert told is not None
+        assert "saturation" in told.cause
+
+
 def test_amplitude_and_time_that_go_together_are_told_apart_by_nobody() -> None:
     effects = (effect_named("coulomb_friction"),)
     ordered = asked(axis_records(LADDER, effects, {"T_c": 0.3}))

@@ -154,7 +154,7 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked
     elif len(names) == 1:
         who = f"{names[0]} is"
     else:
-        who = f"All {len(names)} numbers are" if are_all else f"{_listed(names)} are"
+        who = f"All {len(names)} numbers are" if are_all else f"{len(names)} numbers are"
     text = f"{who} the same {where or 'wherever they were compared'} (largest difference {largest:.2g} standard errors)."
     vague = {number.name: error for number in numbers if (error := _vagueness(number)) > TRUST.vague}
     if vague:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as t_distribution
@@ -83,9 +83,23 @@ def trust(
         _number(model, i, seen, asked[i], allowed[i], along, own.get(name, Role.OTHER))
         for i, name in enumerate(found.free)
     )
+    numbers = _of_the_drive(numbers, own)
     ordered = tuple(sorted(numbers, key=lambda n: (n.stable, n.p_value if not n.stable else 0.0)))
     pairs = entangled(model.fit)
     return Trust(statement(ordered, pairs, len(records), tuple(seen), open_numbers), ordered, pairs)
+
+
+def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) -> tuple[ParameterTrust, ...]:
+    """Return the numbers with one cause for mass, stiffness and damping that all grow or all fall with amplitude.
+
+    They stand in one equation with the drive: where it gives less, all of them seem to be more.
+    """
+    moved = [n for n in numbers if own.get(n.name) in (Role.MASS, Role.STIFFNESS, Role.DAMPING)]
+    directions = {n.direction if n.pattern is Pattern.AMPLITUDE else 0 for n in moved}
+    if Role.MASS not in {own.get(n.name) for n in moved} or len(moved) < 2 or len(directions) > 1:
+        return numbers
+    told = meaning(Pattern.AMPLITUDE, Role.DRIVE, -directions.pop())
+    return tuple(replace(n, points_to=told) if told and n in moved and not n.stable else n for n in numbers)
 
 
 def _left_open(model: Scored) -> tuple[str, ...]:
