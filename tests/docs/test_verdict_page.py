@@ -57,7 +57,7 @@ STATED = (
     ("verdict.exact", 1.03, "reach 1.03 of the floor"),
     ("trust.level", 0.01, "one right model in a hundred"),
     ("trust.worth_a_step", 0.05, "more than 5 % of its squared error"),
-    ("trust.own_steps", 3, "three where a record takes"),
+    ("trust.own_steps", 5, "five where a record takes"),
     ("trust.correlated", 0.99, "correlation above 0.99"),
     ("trust.window_periods", 2.0, "two at least"),
     ("trust.periods_alone", 15.0, "fifteen where parts"),

@@ -1,5 +1,6 @@
 """Physical parameters from records: transfer functions, linear start values, grey-box fits, their uncertainty."""
 
+from rigsight.identify.fit.coordinates import Coordinates as Coordinates
 from rigsight.identify.fit.covariance import SMOOTHED as SMOOTHED
 from rigsight.identify.fit.covariance import sandwich_covariance as sandwich_covariance
 from rigsight.identify.fit.covariance import spectral_product as spectral_product
@@ -56,6 +57,7 @@ __all__ = [
     "SMOOTHED",
     "Calibration",
     "ConicityEstimate",
+    "Coordinates",
     "Derivatives",
     "DerivedQuantities",
     "DifferingMeans",

@@ -63,7 +63,7 @@ class TrustNumbers:
         "ones are right, ten numbers take a hundredth of a thousand samples of noise.",
     )
     own_steps: int = number(
-        3,
+        5,
         "budget",
         "Gauss-Newton steps of a record that asks for other numbers.",
     )

@@ -56,11 +56,15 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: ND
     kept
         Which numbers are estimated; the others stand at the common fit, shape (n_free,).
     """
-    inverse, unknown = _weights(of, some, kept)
-    shifts, parts = np.zeros(len(of.free)), []
+    inverse, infinite = _inverse(of, some, kept)
+    away = -inverse @ sum((piece.rows.T @ piece.residuals for piece in some), start=np.zeros(len(of.free)))
+    # A step that is longer than coordinates can count says no more than that.
+    there = np.clip(of.place + away, of.coordinates.lower, of.coordinates.upper)
+    shifts = of.coordinates.to_parameters(there)[of.coordinates.index] - of.values
+    chain, parts = of.coordinates.jacobian(there), []
+    unknown = np.any(chain[:, infinite] != 0.0, axis=1)
     for piece in some:
-        columns = piece.rows @ inverse.T
-        shifts -= columns.T @ piece.residuals
+        columns = piece.rows @ (chain @ inverse).T
         parts.append(_Variance.of(spectra, piece, columns))
     variances, freedom = _together(parts)
     return Estimates(shifts, _widened(of, variances, unknown), freedom)
@@ -84,7 +88,9 @@ def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: ND
     ----------
     J. A. Hausman, Econometrica 46 (1978) 1251, for the difference of two estimates from the same data.
     """
-    inverse, unknown = _weights(of, windows, kept)
+    plain, infinite = _inverse(of, windows, kept)
+    chain = of.coordinates.jacobian(of.place)
+    inverse, unknown = chain @ plain, np.any(chain[:, infinite] != 0.0, axis=1)
     shifts, parts = np.zeros(len(of.free)), []
     for whole in of.whole:
         own = [piece for piece in windows if piece.record == whole.record]
@@ -158,15 +164,13 @@ def _normal(of: Pieces, some: Sequence[Piece]) -> Floats:
     return np.asarray(sum((piece.rows.T @ piece.rows for piece in some), start=none))
 
 
-def _weights(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return chain (J^T J)^-1, shape (n_free, n_free), and which parameters J^T J does not determine."""
+def _inverse(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return (J^T J)^-1, shape (n_free, n_free), and which coordinates J^T J does not determine."""
     normal, covariance = _normal(of, some), np.diag(np.full(len(of.free), np.inf))
     own = normal[np.ix_(kept, kept)]
     covariance[np.ix_(kept, kept)] = sandwich_covariance(own, own, of.derivative_error)
     infinite = np.isinf(np.diag(covariance))
-    inverse = np.where(infinite[:, None] | infinite[None, :], 0.0, covariance)
-    touched = np.any(of.chain[:, infinite] != 0.0, axis=1)
-    return of.chain @ inverse, touched
+    return np.where(infinite[:, None] | infinite[None, :], 0.0, covariance), infinite
 
 
 def _widened(of: Pieces, variances: Floats, unknown: NDArray[np.bool_]) -> Floats:

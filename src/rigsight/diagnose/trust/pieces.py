@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.policy import TRUST
-from rigsight.identify import FitResult, RecordDerivatives, derivatives, own_derivatives
+from rigsight.identify import Coordinates, FitResult, RecordDerivatives, derivatives, own_derivatives
 from rigsight.records.record import Record
 
 Floats = NDArray[np.float64]
@@ -74,8 +74,10 @@ class Pieces:
         Names of the numbers.
     values
         Of the common fit, shape (n_free,).
-    chain
-        d parameters / d coordinates, shape (n_free, n_free).
+    place
+        The same in the coordinates in which rows are counted, shape (n_free,).
+    coordinates
+        From there to the values.
     derivative_error
         Relative error of the rows.
     whole
@@ -88,7 +90,8 @@ class Pieces:
 
     free: tuple[str, ...]
     values: Floats
-    chain: Floats
+    place: Floats
+    coordinates: Coordinates
     derivative_error: float
     whole: tuple[Piece, ...]
     cut: dict[int, tuple[Piece, ...]]
@@ -125,7 +128,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
         whole.append(piece)
         own.append(alone)
     values = np.array([fit.values[name] for name in free])
-    made = Pieces(free, values, found.chain, found.error, tuple(whole), {})
+    made = Pieces(free, values, found.place, found.coordinates, found.error, tuple(whole), {})
     # The memory with which a window begins sticks and slips: no straight line tells what it does.
     remembers = bool(np.any(context.problem(fit.structure, records[:1]).data.limited))
     if remembers or any(WINDOW in record.name for record in records):

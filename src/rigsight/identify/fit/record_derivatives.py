@@ -15,9 +15,11 @@ from rigsight.identify.fit.grey_box import GreyBoxFit
 
 Floats = NDArray[np.float64]
 
-_DEPENDENT = 1e-7
+_DEPENDENT = 1e-6
 _MARGIN = 3.0
 """A direction that moves residuals less than errors of the derivatives do, thrice, is not stepped along; as for covariances."""
+_SHARES = (1.0, 0.3, 0.1, 0.03)
+"""Of a step, the largest that lowers the cost is taken: a straight line reaches less far than to numbers that are quite other."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ class Derivatives:
         Their coordinates, shape (n_free,).
     records
         One each.
-    chain
-        d parameters / d coordinates, shape (n_free, n_free).
+    coordinates
+        Their way to the parameters.
     error
         Relative error of the derivatives.
     """
@@ -63,7 +65,7 @@ class Derivatives:
     free: tuple[str, ...]
     place: Floats
     records: tuple[RecordDerivatives, ...]
-    chain: Floats
+    coordinates: Coordinates
     error: float
 
 
@@ -87,7 +89,7 @@ def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Der
             _of_record(evaluated, index, sensitivity)
             for index, sensitivity in enumerate(evaluated.sensitivities(theta))
         ),
-        chain=evaluated.coordinates.jacobian(theta[: len(free)]),
+        coordinates=evaluated.coordinates,
         error=evaluated.derivative_error,
     )
 
@@ -122,7 +124,7 @@ def own_derivatives(
     free
         Names of the parameters.
     most_steps
-        Steps at the most; one that does not lower the cost is not taken.
+        Steps at the most; one of which no share lowers the cost is not taken.
     worth_a_step
         Share of the cost that a step must promise to take away.
 
@@ -137,18 +139,28 @@ def own_derivatives(
         size = np.linalg.norm(slopes, axis=0)
         size[size == 0.0] = 1.0
         smallest = max(_DEPENDENT, _MARGIN * evaluated.derivative_error)
-        step = np.linalg.lstsq(slopes / size, -residual, rcond=smallest)[0] / size
+        scaled = slopes / size
+        step = (
+            -np.linalg.pinv(scaled.T @ scaled, rcond=smallest**2, hermitian=True)
+            @ (scaled.T @ residual)
+            / size
+        )
         promised = float(residual @ residual) - float(np.sum((residual + slopes @ step) ** 2))
         if not promised > worth_a_step * float(residual @ residual):
             break
-        there = theta + step
-        there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
-        ahead, slopes_there = evaluated.sensitivities(there)[0]
-        # A motion that leaves the range of numbers is no improvement.
-        with np.errstate(over="ignore", invalid="ignore"):
-            if not float(ahead @ ahead) < float(residual @ residual):
-                break
-        theta, residual, slopes = there, ahead, slopes_there
+        ahead = None
+        for share in _SHARES:
+            there = theta + share * step
+            there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
+            tried = evaluated.sensitivities(there)[0]
+            # A motion that leaves the range of numbers is no improvement.
+            with np.errstate(over="ignore", invalid="ignore"):
+                if float(tried[0] @ tried[0]) < float(residual @ residual):
+                    ahead = tried
+                    break
+        if ahead is None:
+            break
+        theta, (residual, slopes) = there, ahead
     if theta is start:
         return None
     p = coordinates.to_parameters(theta[:n_free])
