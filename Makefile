@@ -26,7 +26,7 @@ NOW := date +%s
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench docs fuzz blind blind-small clean
+.PHONY: help demo test check bench docs fuzz calibrate blind blind-small clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
@@ -58,10 +58,13 @@ docs: $(DEVELOPMENT) $(DOCS_INSTALLED)  ## build the documentation site in build
 fuzz: $(DEVELOPMENT) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, a minute each; writes experiments/fuzzing/results.md
 	@$(BIN)/python experiments/fuzzing/run.py --seconds $(SECONDS_EACH)
 
-blind-small: $(RUNNABLE) $(COMPILER)  ## diagnose 202 drawn rigs whose effect is withheld; hours, goes on where it was stopped
+calibrate: $(DEVELOPMENT)  ## fit the calibration of probabilities anew to its table of training trials
+	@$(BIN)/python experiments/calibration/fit.py
+
+blind-small: $(RUNNABLE) $(COMPILER)  ## diagnose the small list of drawn rigs whose effect is withheld; hours, goes on where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
 
-blind: $(RUNNABLE) $(COMPILER)  ## the standard blind bench, 244 rigs; hours, goes on where it was stopped; writes docs/blind.md
+blind: $(RUNNABLE) $(COMPILER)  ## the standard blind bench; hours, goes on where it was stopped; writes docs/blind.md
 	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
 clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)

@@ -19,3 +19,16 @@ def test_static_friction_stays_above_sliding_friction_at_the_limit(seed: int) ->
         values = scaled(stribeck, shape, strength, SCALES)
         assert values["T_s"] / values["T_c"] == pytest.approx(shape["T_s"] / shape["T_c"])
         assert values["T_s"] <= 0.2 * SCALES["drive"] * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize(("name", "number"), [("stribeck_friction", "w_s"), ("flexible_mode", "w_a")])
+def test_most_inner_numbers_are_not_where_a_search_begins(name: str, number: str) -> None:
+    effect = effect_named(name)
+    unit = {"w_s": SCALES["x"] / SCALES["time"], "w_a": 1.0 / SCALES["time"]}[number]
+    starts = next(p.starts for p in effect.parameters if p.name == number)
+    rng = np.random.default_rng(0)
+    drawn = np.array([draw_shape(effect, SCALES, rng)[number] / unit for _ in range(400)])
+    nearest = np.min(np.abs(np.log(drawn[:, None] / np.array(starts))), axis=1)
+    assert np.mean(nearest < 0.1) < 0.4, "within a tenth of a start"
+    assert np.min(drawn) < 0.7 * min(starts)
+    assert np.max(drawn) > 1.4 * max(starts)

@@ -5,7 +5,7 @@ the displacement, a sensor that drifts. Five resemble something: each has the si
 another law. None of them becomes a catalogue equation, alone or with other linear parameters, for any value drawn here (a van
 der Pol term, for instance, is position-dependent damping beside less viscous damping, and friction of one direction is Coulomb
 friction beside an offset; a resistance that grows with the deflection is friction that goes with a spring's load: none of these
-is in).
+is in). Two more are smooth laws of the deflection and of the speed, drawn anew for each trial, so that nobody chose their form.
 """
 
 from __future__ import annotations
@@ -125,6 +125,54 @@ FRICTION_ON_ONE_SIDE = Effect(
     torque=_strength * sp.sign(v) * (1 + sp.sign(x)) / 2,
 )
 
+_N_WAVES = 3
+
+
+def _waves(argument: sp.Expr) -> sp.Expr:
+    """Return a smooth random function without a preferred shape: random Fourier features of a Gaussian process."""
+    numbers = [sp.symbols(f"height_{i} rate_{i} phase_{i}", real=True) for i in range(_N_WAVES)]
+    return sp.Add(*(height * sp.cos(rate * argument + phase) for height, rate, phase in numbers))
+
+
+def _wave_parameters() -> tuple[Parameter, ...]:
+    return tuple(
+        Parameter(f"{name}_{i}", description, "", starts=starts)
+        for i in range(_N_WAVES)
+        for name, description, starts in (
+            ("height", "of a wave of the logarithm of the law", (-0.4, 0.4)),
+            ("rate", "of a wave", (0.7, 2.0)),
+            ("phase", "of a wave", (-1.5, 1.5)),
+        )
+    )
+
+
+SMOOTH_SPRING = Effect(
+    name="smooth_spring",
+    place=Place.DYNAMICS,
+    summary="A second spring whose stiffness is a smooth random function of the deflection.",
+    parameters=(
+        _strength_of("its stiffness", "force x^-1", 0.5, 1.0),
+        Parameter("reach", "deflection over which it changes", "x", starts=(0.3,)),
+        *_wave_parameters(),
+    ),
+    energy=Energy.CONSERVATIVE,
+    signature=Signature(GainTrend.RISES, even_harmonics=True),
+    torque=_strength * x * sp.exp(_waves(x / _reach)),
+)
+SMOOTH_DAMPING = Effect(
+    name="smooth_damping",
+    place=Place.DYNAMICS,
+    summary="A second damper whose resistance is a smooth random function of the speed.",
+    parameters=(
+        _strength_of("its resistance", "force time x^-1", 0.5, 1.0),
+        Parameter("reach", "speed over which it changes", "x time^-1", starts=(0.3,)),
+        *_wave_parameters(),
+    ),
+    energy=Energy.DISSIPATIVE,
+    signature=Signature(GainTrend.RISES, even_harmonics=True),
+    torque=_strength * v * sp.exp(_waves(v / _reach)),
+)
+
 UNLIKE_THE_CATALOGUE: tuple[Effect, ...] = (
     PULSATING_STIFFNESS,
     FADING_DRIVE,
@@ -138,4 +186,5 @@ LIKE_THE_CATALOGUE: tuple[Effect, ...] = (
     DRIVE_OVER_SPEED,
     FRICTION_ON_ONE_SIDE,
 )
-OUTSIDE: tuple[Effect, ...] = UNLIKE_THE_CATALOGUE + LIKE_THE_CATALOGUE
+RANDOM: tuple[Effect, ...] = (SMOOTH_SPRING, SMOOTH_DAMPING)
+OUTSIDE: tuple[Effect, ...] = UNLIKE_THE_CATALOGUE + LIKE_THE_CATALOGUE + RANDOM

@@ -1,7 +1,8 @@
 """Which numbers does a hidden effect get, so that it leaves a gap of the wished size?
 
-The shape (which effect, which proportions) comes from the effect's own declaration; the strength is then scaled until the linear
-equations, identified anew on two sweeps, leave the wished multiple of the noise floor.
+The shape (which effect, which proportions) is drawn from ranges wider than the declared starts, so that a search does not begin
+where the truth is; the strength is then scaled until the linear equations, identified anew on two sweeps, leave the wished
+multiple of the noise floor.
 """
 
 from __future__ import annotations
@@ -14,10 +15,16 @@ import numpy as np
 
 from rigsight.effects import Effect, placed_dimension
 from rigsight.errors import SimulationError
+from rigsight.parameters import Parameter
 from rigsight.units import characteristic_value
 
 _STRONGEST = 1.5
 """Most that a strength may exceed the strongest start value of the effect's declaration."""
+_BEYOND_STARTS = 2.0
+"""Factor by which the range of an inner number (a delay's, a knee's, a wave's) exceeds the declared starts on either side.
+
+Starts of one number are two to five times apart, so that the truth is up to twice off the next start.
+"""
 _LIMITS = {"drive": 0.2, "input": 0.2}
 """Friction and dead zones beyond this share of the largest drive would stop the rig on its smallest sweep."""
 _NEVER = 1e300
@@ -34,7 +41,9 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
     shape: dict[str, float] = {}
     for p in effect.parameters:
         spread = math.exp(rng.uniform(-0.4, 0.4))
-        if p.starts and p.fitted:
+        if p.null is None and p.starts and p.fitted:
+            shape[p.name] = _inner(p, rng) * _unit(effect, p.dimension, scales)
+        elif p.starts and p.fitted:
             start = p.starts[int(rng.integers(len(p.starts)))]
             shape[p.name] = start * _unit(effect, p.dimension, scales) * spread
         else:
@@ -56,6 +65,15 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
         # Friction that grows with speed would be no Stribeck friction.
         shape["T_s"] = shape["T_c"] * rng.uniform(1.25, 2.0)
     return shape
+
+
+def _inner(parameter: Parameter, rng: np.random.Generator) -> float:
+    """Return an inner number in units of its dimension: evenly over its logarithm, or over itself where its sign is open."""
+    low, high = min(parameter.starts), max(parameter.starts)
+    if low > 0.0:
+        return math.exp(rng.uniform(math.log(low / _BEYOND_STARTS), math.log(high * _BEYOND_STARTS)))
+    half = 0.5 * (high - low)
+    return float(rng.uniform(low - half, high + half))
 
 
 def scaled(

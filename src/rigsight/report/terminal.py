@@ -56,7 +56,7 @@ class Summary:
             yield text(missing_force_sentence(diagnosis))
         if trust_line(diagnosis):
             yield text(trust_line(diagnosis))
-        if diagnosis.ambiguous_with:
+        if ambiguity_sentence(diagnosis):
             yield text(ambiguity_sentence(diagnosis))
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:
             yield text(sentence)

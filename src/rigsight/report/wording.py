@@ -249,11 +249,14 @@ def missing_force_sentence(diagnosis: Diagnosis) -> str:
 
 
 def ambiguity_sentence(diagnosis: Diagnosis) -> str:
-    """Return which other sets of effects explain the records as well; empty where there are none."""
-    if not diagnosis.ambiguous_with:
-        return ""
-    rivals = listed((effects_label(effects) for effects in diagnosis.ambiguous_with), "or")
-    return f"These records cannot tell {effects_label(diagnosis.effects)} from {rivals}."
+    """Return which other causes belong to the likely ones; empty where there are none."""
+    sentences = []
+    if diagnosis.ambiguous_with:
+        rivals = listed((effects_label(effects) for effects in diagnosis.ambiguous_with), "or")
+        sentences.append(f"These records cannot tell {effects_label(diagnosis.effects)} from {rivals}.")
+    if diagnosis.verdict == "effect" and diagnosis.likely.outside:
+        sentences.append("A cause that no catalogue holds belongs to the likely causes too.")
+    return " ".join(sentences)
 
 
 def told_unit(unit: str) -> str:
