@@ -10,6 +10,7 @@ _SECTIONS = (
     ("What is told about records and numbers", POLICY.notes),
     ("How far is searched", POLICY.search),
     ("How finely the gap is mapped", POLICY.maps),
+    ("Can the numbers be trusted?", POLICY.trust),
 )
 
 

@@ -55,6 +55,12 @@ STATED = (
     ("verdict.larger_part", 0.5, "from half of the gain on"),
     ("verdict.larger_part", 0.5, "at least half of the re-identified gap closed"),
     ("verdict.exact", 1.03, "reach 1.03 of the floor"),
+    ("trust.level", 0.01, "one right model in a hundred"),
+    ("trust.worth_a_step", 0.05, "more than 5 % of its squared error"),
+    ("trust.own_steps", 5, "five where a record takes"),
+    ("trust.correlated", 0.99, "correlation above 0.99"),
+    ("trust.window_periods", 2.0, "two at least"),
+    ("trust.periods_alone", 15.0, "fifteen where parts"),
     ("notes.advised_amplitudes", (0.3, 1.0, 1.5), "0.3, 1 and 1.5 times the largest input"),
 )
 

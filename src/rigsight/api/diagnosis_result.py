@@ -16,6 +16,7 @@ from rigsight.errors import check_option
 from rigsight.report.notebook import diagnosis_html
 from rigsight.report.record_views import record_drawing
 from rigsight.report.sections import budget_drawing, ranking_drawing
+from rigsight.report.trust import TRUST_COLUMNS, trust_drawing, trust_rows
 from rigsight.report.wording import named_candidate
 from rigsight.workflow.diagnose import write_diagnosis
 
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 
     from rigsight.plot import Figure
 
-Picture = Literal["gap", "candidates", "record"]
-Table = Literal["candidates", "gap", "parameters"]
+Picture = Literal["gap", "candidates", "record", "trust"]
+Table = Literal["candidates", "gap", "parameters", "trust"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class DiagnosisResult(Diagnosis):
         ----------
         picture
             ``"gap"``: how the gap shrinks, step by step. ``"candidates"``: what each of them leaves. ``"record"``: measured
-            and simulated output of one record, with the errors below.
+            and simulated output of one record, with the errors below. ``"trust"``: numbers as records alone have them.
         record
             Name of the record, for ``"record"``; by default the first that was scored.
         output
@@ -91,13 +92,15 @@ class DiagnosisResult(Diagnosis):
         Raises
         ------
         InputError
-            If there is no such picture, record or output.
+            If there is no such picture, record or output, or no number to draw by record.
         """
         check_option("The picture", picture, get_args(Picture))
         if picture == "gap":
             return budget_drawing(self)
         if picture == "candidates":
             return ranking_drawing(self)
+        if picture == "trust":
+            return trust_drawing(self)
         trace = named("record", record, {trace.record: trace for trace in self.traces})
         name = named("output", output, {name: name for name in trace.measured})
         return record_drawing(self, trace, name)
@@ -110,7 +113,8 @@ class DiagnosisResult(Diagnosis):
         table
             ``"candidates"``: a row per set of effects that was tried, best first; errors are NRMSE on the validation records.
             ``"gap"``: a row per output with the NRMSE of each stage. ``"parameters"``: a row per fitted number of the named
-            simulation, with its standard error and unit.
+            simulation, with its standard error and unit. ``"trust"``: a row per number and group (a record, an amplitude, windows
+            of a length) with the value that it has there, and how the number differs between groups.
 
         Raises
         ------
@@ -127,6 +131,8 @@ class DiagnosisResult(Diagnosis):
                 ),
                 ("output", *columns),
             )
+        if table == "trust":
+            return data_frame(trust_rows(self), tuple(TRUST_COLUMNS))
         if table == "parameters":
             best = named_candidate(self)
             return data_frame(

@@ -25,6 +25,8 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, LikelyCauses, OutputGap
 from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.predictability import growth_of_disturbances
+from rigsight.diagnose.trust.result import Trust
+from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import remainder_of
@@ -126,7 +128,8 @@ def diagnose(
             "as one law, and other laws of its kind fit equally well: they are not named."
         )
     diagnosis = _assembled(task, found, notes, scored_on, rng)
-    diagnosis = replace(diagnosis, data_quality=found.quality)
+    say("trust in the numbers")
+    diagnosis = replace(diagnosis, data_quality=found.quality, trust=_trust(task, found))
     if found.judgement.verdict != "unknown":
         return diagnosis
     forces = forces_at_joints(found.context, found.reidentified)
@@ -142,6 +145,12 @@ def diagnose(
         ),
         joint_forces=forces,
     )
+
+
+def _trust(task: Task, found: Examination) -> Trust:
+    """Return how far the numbers can be trusted: with the effects of the verdict, else of the re-identified equations."""
+    model = found.judgement.model if found.judgement.verdict == "effect" else found.reidentified
+    return trust(found.context, model, task.records, task.constants)
 
 
 def _least_left(found: Examination) -> float:

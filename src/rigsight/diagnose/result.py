@@ -14,6 +14,7 @@ from rigsight.diagnose.location.gap_parts import Localization
 from rigsight.diagnose.location.trace import Trace
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.search.places import SuspectedPlace
+from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.verdict.judgement import Verdict
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import Remainder
@@ -166,6 +167,9 @@ class Diagnosis:
         What it leaves above them; None as above.
     likely
         The causes that the records leave open.
+    trust
+        Whether the numbers of the verdict's model are the same in every record, at every amplitude and in shorter windows; None
+        where that was not asked.
     """
 
     title: str
@@ -195,6 +199,7 @@ class Diagnosis:
     adequate: bool | None = None
     remainder: Remainder | None = None
     likely: LikelyCauses = field(default_factory=LikelyCauses)
+    trust: Trust | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``; numbers that are not finite become None."""
@@ -207,6 +212,7 @@ class Diagnosis:
             "where": list(self.where),
             "adequate": self.adequate,
             "remainder": None if self.remainder is None else self.remainder.to_json(),
+            "trust": None if self.trust is None else self.trust.to_json(),
             "ambiguous_with": [list(effects) for effects in self.ambiguous_with],
             "likely_causes": {
                 "effects": [list(effects) for effects in self.likely.sets],

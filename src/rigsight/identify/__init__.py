@@ -1,10 +1,18 @@
 """Physical parameters from records: transfer functions, linear start values, grey-box fits, their uncertainty."""
 
+from rigsight.identify.fit.coordinates import Coordinates as Coordinates
+from rigsight.identify.fit.covariance import SMOOTHED as SMOOTHED
+from rigsight.identify.fit.covariance import sandwich_covariance as sandwich_covariance
+from rigsight.identify.fit.covariance import spectral_product as spectral_product
 from rigsight.identify.fit.fit_memory import FitMemory as FitMemory
 from rigsight.identify.fit.fit_result import FitResult as FitResult
 from rigsight.identify.fit.grey_box import DEFAULT_ACCURACY as DEFAULT_ACCURACY
 from rigsight.identify.fit.grey_box import GreyBoxFit as GreyBoxFit
 from rigsight.identify.fit.idle_threads import IdleThreads as IdleThreads
+from rigsight.identify.fit.record_derivatives import Derivatives as Derivatives
+from rigsight.identify.fit.record_derivatives import RecordDerivatives as RecordDerivatives
+from rigsight.identify.fit.record_derivatives import derivatives as derivatives
+from rigsight.identify.fit.record_derivatives import own_derivatives as own_derivatives
 from rigsight.identify.free_motion import OpenFactor as OpenFactor
 from rigsight.identify.free_motion import open_factor as open_factor
 from rigsight.identify.hysteresis import Calibration as Calibration
@@ -46,8 +54,11 @@ from rigsight.identify.transfer.transfer_step import fit_step as fit_step
 __all__ = [
     "DEFAULT_ACCURACY",
     "OFFSETS_MEND",
+    "SMOOTHED",
     "Calibration",
     "ConicityEstimate",
+    "Coordinates",
+    "Derivatives",
     "DerivedQuantities",
     "DifferingMeans",
     "EffectRegression",
@@ -60,6 +71,7 @@ __all__ = [
     "LoopArea",
     "OpenFactor",
     "PhysicalEstimates",
+    "RecordDerivatives",
     "RecordResidual",
     "SpectralRatio",
     "SteadyResponse",
@@ -71,6 +83,7 @@ __all__ = [
     "calibrate_to_responses",
     "characteristic_scales",
     "creep_error_of_sine",
+    "derivatives",
     "derived_quantities",
     "differing_means",
     "driven_offsets",
@@ -83,6 +96,9 @@ __all__ = [
     "loop_area",
     "offsets",
     "open_factor",
+    "own_derivatives",
+    "sandwich_covariance",
+    "spectral_product",
     "swallowed_by_offsets",
     "without_offsets",
     "yaw_parameters",

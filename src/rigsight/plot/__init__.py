@@ -33,6 +33,8 @@ from rigsight.plot.model_comparison import model_errors as model_errors
 from rigsight.plot.model_comparison import model_responses as model_responses
 from rigsight.plot.model_comparison import model_steps as model_steps
 from rigsight.plot.model_comparison import model_styles as model_styles
+from rigsight.plot.parameters_by_group import GroupPanel as GroupPanel
+from rigsight.plot.parameters_by_group import parameters_by_group as parameters_by_group
 from rigsight.plot.response_grid import ResponseCell as ResponseCell
 from rigsight.plot.response_grid import response_grid as response_grid
 from rigsight.plot.rig_picture import PlaceMark as PlaceMark
@@ -49,6 +51,7 @@ __all__ = [
     "ErrorPanel",
     "FittedCurve",
     "ForceLoop",
+    "GroupPanel",
     "Panel",
     "PlaceMark",
     "ResponseCell",
@@ -72,6 +75,7 @@ __all__ = [
     "model_steps",
     "model_styles",
     "overlaid_responses",
+    "parameters_by_group",
     "ranking",
     "response_grid",
     "rig_picture",

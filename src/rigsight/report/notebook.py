@@ -14,6 +14,7 @@ from rigsight.report.discovery import discovery_rows
 from rigsight.report.identification import estimate_cell, joint_rows, unit_in_brackets
 from rigsight.report.render import environment
 from rigsight.report.terminal import diagnosis_rows
+from rigsight.report.trust import trust_line
 from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
@@ -45,6 +46,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
         verdict_sentence(diagnosis),
         missing_force_sentence(diagnosis),
         remainder_sentence(diagnosis),
+        trust_line(diagnosis),
         ambiguity_sentence(diagnosis),
         *advice_sentences(diagnosis),
         basis_sentence(diagnosis),

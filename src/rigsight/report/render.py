@@ -22,6 +22,7 @@ from rigsight.report.equations import equation_groups, known_effects
 from rigsight.report.quantities import Written
 from rigsight.report.record_views import record_views
 from rigsight.report.responses import record_responses
+from rigsight.report.trust import trust_view
 from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
@@ -99,6 +100,7 @@ def render_report(
             ranking_rows=sections.ranking_rows(diagnosis),
             outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
             parameters=sections.parameter_rows(diagnosis, known),
+            trust=trust_view(diagnosis),
             equations=equation_groups(diagnosis, known),
             amplitude_figures=amplitude_figures(diagnosis, responses),
             loops=loop_figures(diagnosis),

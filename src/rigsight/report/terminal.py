@@ -13,6 +13,7 @@ from rich.text import Text
 
 from rigsight.diagnose.result import Candidate, Diagnosis
 from rigsight.report.quantities import estimate_text, gap_percent
+from rigsight.report.trust import trust_line
 from rigsight.report.wording import (
     TIMES,
     advice_sentences,
@@ -53,6 +54,8 @@ class Summary:
             yield text(remainder_sentence(diagnosis))
         if missing_force_sentence(diagnosis):
             yield text(missing_force_sentence(diagnosis))
+        if trust_line(diagnosis):
+            yield text(trust_line(diagnosis))
         if ambiguity_sentence(diagnosis):
             yield text(ambiguity_sentence(diagnosis))
         for sentence in advice_sentences(diagnosis)[:_ADVICES]:

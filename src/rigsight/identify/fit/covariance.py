@@ -67,7 +67,7 @@ def colored_covariance(
         columns = np.concatenate([np.arange(n_common), first + np.arange(n_own)]).astype(np.intp)
         first += n_own
         bread[np.ix_(columns, columns)] += derivative.T @ derivative
-        filling[np.ix_(columns, columns)] += _spectral_product(residual, derivative, count)
+        filling[np.ix_(columns, columns)] += spectral_product(residual, derivative, count)
     covariance = sandwich_covariance(bread, filling, derivative_error)
     return np.asarray(covariance[:n_common, :n_common])
 
@@ -133,10 +133,24 @@ def propagated_covariance(covariance: NDArray[np.float64], chain: NDArray[np.flo
     return np.asarray(result)
 
 
-def _spectral_product(
+def spectral_product(
     residual: NDArray[np.float64], derivative: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
-    """Return the covariance of J^T r for residuals of `count` outputs, one after the other."""
+    """Return the covariance of J^T r of one record from the smoothed spectrum of its residual.
+
+    Parameters
+    ----------
+    residual
+        Of `count` outputs, one after the other, shape (count * n_samples,).
+    derivative
+        J, in the same order, shape (count * n_samples, n).
+    count
+        Number of outputs.
+
+    Returns
+    -------
+    Shape (n, n).
+    """
     by_output = residual.reshape(count, -1)
     n = by_output.shape[1]
     lines = np.fft.rfft(by_output, axis=1)
@@ -148,12 +162,12 @@ def _spectral_product(
     product = np.zeros((derivative.shape[1], derivative.shape[1]))
     for one in range(count):
         for other in range(count):
-            power = _smoothed(lines[one] * lines[other].conj() / n) * (folded / n)
+            power = smoothed_spectrum(lines[one] * lines[other].conj() / n) * (folded / n)
             product += np.real((spectra[one].conj() * power[:, None]).T @ spectra[other])
     return np.asarray(product)
 
 
-def _smoothed(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def smoothed_spectrum(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Average over neighbors; beyond zero and Nyquist the spectrum of a real signal goes on conjugated."""
     half = min(SMOOTHED // 2, spectrum.size - 1)
     before, after = spectrum[half:0:-1].conj(), spectrum[-2 : -2 - half : -1].conj()

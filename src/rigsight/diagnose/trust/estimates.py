@@ -1,0 +1,221 @@
+"""Which numbers do some records or windows alone speak for, and how sure is that? One Gauss-Newton step from the common fit.
+
+References
+----------
+L. Ljung, *System Identification* (Prentice Hall 1999), chapter 9, for the covariance beside colored residuals. F. E.
+Satterthwaite, Biometrics Bulletin 2 (1946) 110, for the degrees of freedom of an estimated variance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.pieces import Piece, Pieces, pseudo_inverse
+from rigsight.diagnose.trust.spectra import NoiseSpectra
+from rigsight.identify import DEFAULT_ACCURACY, SMOOTHED, sandwich_covariance, spectral_product
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Numbers as some pieces alone have them.
+
+    Attributes
+    ----------
+    shifts
+        Difference from the common fit, in units of the parameters, shape (n_free,).
+    variances
+        Infinite where these pieces do not determine a number, shape (n_free,).
+    freedom
+        Degrees of freedom of these variances, shape (n_free,).
+    """
+
+    shifts: Floats
+    variances: Floats
+    freedom: Floats
+
+
+def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
+    """Return the numbers that some pieces speak for.
+
+    Parameters
+    ----------
+    of
+        Coordinates and their chain to the parameters.
+    some
+        Pieces, each with an initial state of its own.
+    spectra
+        Of the noise of each record.
+    kept
+        Which numbers are estimated; the others stand at the common fit, shape (n_free,).
+    """
+    inverse, infinite = _inverse(of, some, kept)
+    away = -inverse @ sum((piece.rows.T @ piece.residuals for piece in some), start=np.zeros(len(of.free)))
+    # A step that is longer than coordinates can count says no more than that.
+    there = np.clip(of.place + away, of.coordinates.lower, of.coordinates.upper)
+    shifts = of.coordinates.to_parameters(there)[of.coordinates.index] - of.values
+    chain, parts = of.coordinates.jacobian(there), []
+    unknown = np.any(chain[:, infinite] != 0.0, axis=1)
+    for piece in some:
+        columns = piece.rows @ (chain @ inverse).T
+        parts.append(_Variance.of(spectra, piece, columns))
+    variances, freedom = _together(parts)
+    return Estimates(shifts, _widened(of, variances, unknown), freedom)
+
+
+def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
+    """Return how windows, pooled, differ from the whole records that they are made of (Hausman).
+
+    Parameters
+    ----------
+    of
+        As of `estimates`, with all whole records.
+    windows
+        All windows of one length, in order.
+    spectra
+        Of the noise of each record.
+    kept
+        Which numbers are estimated; the others stand at the common fit, shape (n_free,).
+
+    References
+    ----------
+    J. A. Hausman, Econometrica 46 (1978) 1251, for the difference of two estimates from the same data.
+    """
+    plain, infinite = _inverse(of, windows, kept)
+    chain = of.coordinates.jacobian(of.place)
+    inverse, unknown = chain @ plain, np.any(chain[:, infinite] != 0.0, axis=1)
+    shifts, parts = np.zeros(len(of.free)), []
+    for whole in of.whole:
+        own = [piece for piece in windows if piece.record == whole.record]
+        rows = _joined([piece.rows for piece in own], whole.n_measured)
+        left = _joined([piece.residuals[:, None] for piece in own], whole.n_measured)[:, 0]
+        shifts -= inverse @ (rows.T @ left)
+        # Windows are counted from the record's own numbers, which hang on the same noise.
+        centered = np.zeros_like(rows)
+        centered[:, kept] = pseudo_inverse(whole.rows[:, kept]).T
+        columns = rows @ inverse.T - centered @ (inverse @ (rows.T @ rows)).T
+        parts.append(_Variance.of(spectra, whole, columns))
+    variances, freedom = _together(parts)
+    return Estimates(shifts, _widened(of, variances, unknown), freedom)
+
+
+def mean(several: Sequence[Estimates]) -> Estimates:
+    """Return the mean of independent estimates, each with the weight of its own variance.
+
+    Parameters
+    ----------
+    several
+        One or more.
+    """
+    weights = np.array([1.0 / one.variances for one in several])
+    total = np.sum(weights, axis=0)
+    # A number that none of them determines has no weight anywhere.
+    whole = np.where(total > 0.0, total, 1.0)
+    shifts = np.sum(weights * np.array([one.shifts for one in several]), axis=0) / whole
+    spread = np.sum(weights**2 / np.array([one.freedom for one in several]), axis=0)
+    freedom = np.where(spread > 0.0, total**2 / np.where(spread > 0.0, spread, 1.0), TRUST.least_freedom)
+    return Estimates(shifts, np.where(total > 0.0, 1.0 / whole, np.inf), freedom)
+
+
+def told_by_most(of: Pieces, groups: Sequence[Sequence[Piece]]) -> NDArray[np.bool_]:
+    """Return which numbers most groups determine by themselves once the others are held at the common fit, shape (n_free,).
+
+    A number that follows another in most groups, as the two terms of a friction do under one load, takes no part; the other then
+    tells of both.
+
+    Parameters
+    ----------
+    of
+        As of `estimates`.
+    groups
+        Pieces of each group.
+    """
+    kept = np.ones(len(of.free), dtype=bool)
+    while np.any(kept):
+        worst = [own for group in groups if (own := _loosest(of, group, kept)) is not None]
+        if 2 * len(worst) <= len(groups):
+            break
+        kept[max(set(worst), key=worst.count)] = False
+    return kept
+
+
+def _loosest(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> int | None:
+    """Return the number that takes the largest part in what pieces do not determine; None where they determine all."""
+    normal = _normal(of, some)[np.ix_(kept, kept)]
+    if not np.any(np.isinf(np.diag(sandwich_covariance(normal, normal, of.derivative_error)))):
+        return None
+    size = np.sqrt(np.diag(normal))
+    size[size == 0.0] = 1.0
+    direction = np.abs(np.linalg.eigh(normal / np.outer(size, size))[1][:, 0])
+    # Of two that take part alike the last one goes: rigs come before effects, and what an effect is first named for stands first.
+    largest = np.flatnonzero(direction >= TRUST.in_order * np.max(direction))[-1]
+    return int(np.flatnonzero(kept)[largest])
+
+
+def _normal(of: Pieces, some: Sequence[Piece]) -> Floats:
+    none = np.zeros((len(of.free), len(of.free)))
+    return np.asarray(sum((piece.rows.T @ piece.rows for piece in some), start=none))
+
+
+def _inverse(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return (J^T J)^-1, shape (n_free, n_free), and which coordinates J^T J does not determine."""
+    normal, covariance = _normal(of, some), np.diag(np.full(len(of.free), np.inf))
+    own = normal[np.ix_(kept, kept)]
+    covariance[np.ix_(kept, kept)] = sandwich_covariance(own, own, of.derivative_error)
+    infinite = np.isinf(np.diag(covariance))
+    return np.where(infinite[:, None] | infinite[None, :], 0.0, covariance), infinite
+
+
+def _widened(of: Pieces, variances: Floats, unknown: NDArray[np.bool_]) -> Floats:
+    """Return variances that allow for the accuracy of the simulations in a fit; infinite where nothing is known."""
+    return np.where(unknown, np.inf, variances + (DEFAULT_ACCURACY * of.values) ** 2)
+
+
+def _joined(parts: Sequence[Floats], n_measured: int) -> Floats:
+    """Return rows of windows as rows of the whole record: each output runs on from window to window."""
+    by_output = [part.reshape(n_measured, -1, part.shape[1]) for part in parts]
+    whole = np.concatenate(by_output, axis=1)
+    return whole.reshape(-1, whole.shape[2])
+
+
+@dataclass(frozen=True)
+class _Variance:
+    """What one piece's noise makes of linear estimates: variance and the variance of that, each of shape (n_free,).
+
+    The larger of two: the smoothed spectrum of a fit's standard errors holds for any noise, an autoregression is sharp.
+    """
+
+    size: Floats
+    spread: Floats
+
+    @classmethod
+    def of(cls, spectra: NoiseSpectra, piece: Piece, columns: Floats) -> _Variance:
+        count, noise = piece.n_measured, piece.noise
+        smoothed = np.diag(spectral_product(noise, columns, count))
+        n = noise.size // count
+        lines = np.abs(np.fft.rfft(noise.reshape(count, n), axis=1)) ** 2 / n
+        weights = np.abs(np.fft.rfft(columns.reshape(count, n, -1), axis=1)) ** 2 / n
+        # The variance is a sum over lines, each of which counts with the weights of its neighbors too.
+        shares = 2.0 * lines[:, :, None] * uniform_filter1d(weights, SMOOTHED, axis=1, mode="constant")
+        # A line has two degrees of freedom: its variance is its squared mean, half of the mean of its square.
+        spread = np.sum(shares**2, axis=(0, 1)) / 2.0
+        freedom = 2.0 * smoothed**2 / np.maximum(spread, np.finfo(float).tiny)
+        left = np.maximum(freedom - piece.n_own, TRUST.least_freedom)
+        # What was fitted has taken its part of the noise with it, in the band that the estimate reads.
+        size = np.maximum(smoothed * np.maximum(freedom / left, 1.0), spectra.variances(piece, columns))
+        return cls(size, 2.0 * size**2 / left)
+
+
+def _together(parts: Sequence[_Variance]) -> tuple[Floats, Floats]:
+    """Return variances and their degrees of freedom of estimates that are sums over independent pieces."""
+    size = np.sum([part.size for part in parts], axis=0)
+    spread = np.sum([part.spread for part in parts], axis=0)
+    freedom = 2.0 * size**2 / np.maximum(spread, np.finfo(float).tiny)
+    return size, np.maximum(freedom, TRUST.least_freedom)

@@ -1,0 +1,88 @@
+"""Along what may a number change from record to record? Amplitude, constants of the records, and the order of the records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigsight.diagnose.fitting.windows import leading_output
+from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.patterns import Pattern
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
+
+
+@dataclass(frozen=True)
+class Order:
+    """A quantity by which records differ.
+
+    Attributes
+    ----------
+    pattern
+        What a number does that goes along it.
+    name
+        In words, such as ``"amplitude"`` or the name of a constant.
+    unit
+        Of the quantity; empty for a plain number.
+    levels
+        Its value by the name of the record.
+    """
+
+    pattern: Pattern
+    name: str
+    unit: str
+    levels: Mapping[str, float]
+
+
+def orders(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> tuple[Order, ...]:
+    """Return the quantities by which records differ; first what was set, the order of the records last.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    records
+        Whole ones, in the order of the campaign.
+    constants
+        Of the campaign, where a record has none of its own.
+    """
+    found = []
+    units = {p.name: _told(p.unit) for p in rig.constants}
+    for name in dict.fromkeys(name for record in records for name in record.constants):
+        levels = {r.name: r.constants.get(name, constants.get(name, np.nan)) for r in records}
+        if len(set(levels.values())) > 1 and all(map(np.isfinite, levels.values())):
+            found.append(Order(Pattern.CONSTANT, name, units.get(name, ""), levels))
+    amplitude = _amplitudes(rig, records)
+    if len(set(amplitude.levels.values())) > 1:
+        found.append(amplitude)
+    if len(records) >= TRUST.fewest_in_time:
+        found.append(Order(Pattern.TIME, "time", "", {r.name: float(i) for i, r in enumerate(records)}))
+    return tuple(found)
+
+
+def _amplitudes(rig: Rig, records: Sequence[Record]) -> Order:
+    """Return the stated amplitude of each record where all state one, else its measured one in levels."""
+    moving = [s for s in rig.inputs if all(s.name in r and np.ptp(r[s.name]) > 0.0 for r in records)]
+    # A free motion has no amplitude but its own.
+    outputs = {signal.name: signal for signal in rig.outputs}
+    signal = moving[0] if moving else outputs[leading_output(rig, records)]
+    stated = [record.amplitude for record in records]
+    known = [amplitude for amplitude in stated if amplitude is not None]
+    if moving and len(known) == len(records):
+        levels = dict(zip((r.name for r in records), map(float, known), strict=True))
+        return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), levels)
+    sizes = {r.name: float(np.sqrt(2.0) * np.std(r[signal.name])) for r in records if signal.name in r}
+    if len(sizes) < len(records):
+        return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), {})
+    level, measured = 0.0, {}
+    for name, size in sorted(sizes.items(), key=lambda item: item[1]):
+        level = level if size <= TRUST.one_level * level else size
+        measured[name] = level
+    return Order(Pattern.AMPLITUDE, "amplitude", _told(signal.unit), measured)
+
+
+def _told(unit: str) -> str:
+    """Return a unit as it stands behind a number; an axis calls the unit of its input just that."""
+    return "" if unit in ("input", "1") else unit

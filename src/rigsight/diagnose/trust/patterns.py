@@ -1,0 +1,179 @@
+"""What does it point to where a number is not the same everywhere? Pattern -> likely cause -> next experiment.
+
+Causes are likely ones, not proven: the table says what most often makes a number of a wrong or incomplete model differ like that.
+
+References
+----------
+A. Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions and Nonlinear System Design* (McGraw-Hill 1968): stiffness
+and damping that a linear model needs where a law bends, as functions of the amplitude. Coulomb friction acts as a damping
+4 T_c / (pi omega A), quadratic damping as one that grows with omega A, a clearance g as a spring that is absent below g.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rigsight.rigs import Rig
+
+
+class Pattern(StrEnum):
+    """How a number differs."""
+
+    STABLE = "stable"
+    AMPLITUDE = "with amplitude"
+    CONSTANT = "with a constant"
+    TIME = "with time"
+    RECORD = "between records"
+    PORTION = "along the record"
+    WINDOW = "with window length"
+    UNKNOWN = "not known"
+    """By itself the number is determined by no two groups that could be compared."""
+
+
+class Role(StrEnum):
+    """What a number is in the equations."""
+
+    DAMPING = "damping"
+    STIFFNESS = "stiffness"
+    MASS = "mass"
+    DRIVE = "drive"
+    OFFSET = "offset"
+    EFFECT = "effect"
+    OTHER = "other"
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a pattern points to.
+
+    Attributes
+    ----------
+    cause
+        Likely cause, a main clause without a full stop.
+    experiment
+        What would tell, a sentence.
+    """
+
+    cause: str
+    experiment: str
+
+
+_LADDER = "Record the same input at three amplitudes or more, each twice."
+_REPEAT = "Record the first input again at the end, and write down temperature, supply and load."
+
+_MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
+    # Its share of the damping is 4 T_c / (pi omega A).
+    (Pattern.AMPLITUDE, Role.DAMPING, -1): Meaning(
+        "damping depends on the motion: dry friction is missing, or has another form", _LADDER
+    ),
+    (Pattern.AMPLITUDE, Role.DAMPING, 1): Meaning(
+        "damping depends on the motion: one that grows with speed or displacement is missing, or has another form",
+        _LADDER,
+    ),
+    # Within the sliding range a spring of hysteresis or presliding lets go.
+    (Pattern.AMPLITUDE, Role.STIFFNESS, -1): Meaning(
+        "stiffness depends on the motion: a softening spring, hysteresis or presliding friction is missing, or has another form",
+        _LADDER,
+    ),
+    # A clearance takes the spring away from small motions.
+    (Pattern.AMPLITUDE, Role.STIFFNESS, 1): Meaning(
+        "stiffness depends on the motion: a hardening spring, an end stop or free play is missing, or has another form",
+        _LADDER,
+    ),
+    (Pattern.AMPLITUDE, Role.DRIVE, -1): Meaning(
+        "the drive gives less than in proportion: a saturation is missing, or has another form",
+        "Record steps of the input up to its largest value.",
+    ),
+    (Pattern.AMPLITUDE, Role.DRIVE, 1): Meaning(
+        "the drive gives more than in proportion: a dead zone or dry friction is missing, or has another form",
+        "Record slow steps of the input from its smallest value on.",
+    ),
+    (Pattern.AMPLITUDE, Role.EFFECT, None): Meaning(
+        "the effect has not quite the form of the rig's: its equation answers otherwise to amplitude", _LADDER
+    ),
+    # No mass depends on the amplitude: it makes up for a law that does.
+    (Pattern.AMPLITUDE, None, None): Meaning(
+        "it makes up for something that depends on the motion and is missing or has another form", _LADDER
+    ),
+    # What a load presses on rubs: the constant stands in a place where the equations do not have it.
+    (Pattern.CONSTANT, Role.DAMPING, None): Meaning(
+        "friction depends on it, as that of a loaded joint does, and the equations do not say so",
+        "Record three values of it with the same input.",
+    ),
+    (Pattern.CONSTANT, Role.EFFECT, None): Meaning(
+        "the effect depends on it, as the friction of a loaded joint does, and its equation does not say so",
+        "Record three values of it with the same input.",
+    ),
+    (Pattern.CONSTANT, None, None): Meaning(
+        "the equations have it in the wrong place, or its stated values are wrong",
+        "Measure it, and record three values of it with the same input.",
+    ),
+    (Pattern.TIME, Role.OFFSET, None): Meaning("a zero drifts from record to record", _REPEAT),
+    (Pattern.TIME, None, None): Meaning(
+        "something changes slowly that is not recorded, such as temperature or wear", _REPEAT
+    ),
+    (Pattern.RECORD, Role.OFFSET, None): Meaning(
+        "the zero of a sensor or a constant load differs from record to record",
+        'Write offsets = "per_record" in campaign.toml, or record a rest before each run.',
+    ),
+    (Pattern.RECORD, None, None): Meaning(
+        "something changes that is not recorded, such as temperature, load or mounting",
+        "Record one input several times without touching the rig, then again after mounting it anew.",
+    ),
+    # Along a sweep frequency changes with time, along a decay amplitude does.
+    (Pattern.PORTION, None, None): Meaning(
+        "it depends on what changes along a record: the frequency of a sweep, the amplitude of a decay, or warming up",
+        "Record the same input backwards: what goes with time stays, what goes with frequency turns round.",
+    ),
+    # A window's own initial state takes up what is slow.
+    (Pattern.WINDOW, None, None): Meaning(
+        "slow errors of the model are absorbed in it where records are long: a drift, a disturbance or a slow effect is missing",
+        "Trust the short windows for this number, and record the slow part alone: very slow motion, or rest after a step.",
+    ),
+}
+
+
+def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
+    """Return what a pattern points to, the most special entry first; None where nothing differs.
+
+    Parameters
+    ----------
+    pattern
+        How the number differs.
+    role
+        What it is in the equations.
+    direction
+        1 where it grows, -1 where it falls, 0 where it does neither.
+    """
+    for known_role, known_direction in ((role, direction), (role, None), (None, None)):
+        found = _MEANINGS.get((pattern, known_role, known_direction))
+        if found is not None:
+            return found
+    return None
+
+
+def roles(rig: Rig, effects: Iterable[str]) -> dict[str, Role]:
+    """Return what each number is in the equations.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    effects
+        Names of the parameters of effects in the equations.
+    """
+    found: dict[str, Role] = {}
+    mechanism = rig.mechanism
+    for drive in mechanism.drives:
+        found |= dict.fromkeys((symbol.name for symbol in drive.signal.free_symbols), Role.DRIVE)
+    found |= dict.fromkeys((symbol.name for symbol in mechanism.kinetic.free_symbols), Role.MASS)
+    for joint in mechanism.joints:
+        found |= dict.fromkeys((symbol.name for symbol in joint.stiffness.free_symbols), Role.STIFFNESS)
+        found |= dict.fromkeys((symbol.name for symbol in joint.damping.free_symbols), Role.DAMPING)
+    if rig.has_one_motion:
+        resting = rig.motion.rest.free_symbols | rig.motion.bias.free_symbols
+        found |= dict.fromkeys((symbol.name for symbol in resting), Role.OFFSET)
+    named = {p.name: found.get(p.name, Role.OTHER) for p in rig.parameters}
+    return named | dict.fromkeys(effects, Role.EFFECT)

@@ -1,0 +1,184 @@
+"""How is the trust in numbers said in a few sentences?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+
+from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.patterns import Pattern
+from rigsight.diagnose.trust.result import Entangled, GroupValue, ParameterTrust
+from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
+
+_ONE_RECORD = "One record cannot tell whether they hold at another amplitude."
+
+
+def statement(
+    numbers: Sequence[ParameterTrust],
+    pairs: Sequence[Entangled],
+    n_records: int,
+    asked: Sequence[str],
+    left_open: Sequence[str] = (),
+) -> str:
+    """Return what is known of the numbers, in a few sentences.
+
+    Parameters
+    ----------
+    numbers
+        Those that differ first.
+    pairs
+        Numbers that go together.
+    n_records
+        Number of records.
+    asked
+        Kinds of groups that were compared.
+    left_open
+        Numbers that all records together do not determine.
+    """
+    differing = [number for number in numbers if not number.stable]
+    sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
+    if len(_alike(differing)) > TRUST.told:
+        rest = [number.name for alike in _alike(differing)[TRUST.told :] for number in alike]
+        sentences.append(f"{_listed(rest)} {'differs' if len(rest) == 1 else 'differ'} too.")
+    compared = [number for number in numbers if number.pattern is Pattern.STABLE]
+    if compared:
+        sentences.append(_same(compared, bool(differing), len(compared) == len(numbers), asked))
+    if left_open:
+        verb = "is" if len(left_open) == 1 else "are"
+        sentences.append(f"{_listed(left_open)} {verb} not determined even by all records together.")
+    open_numbers = [
+        number.name
+        for number in numbers
+        if number.pattern is Pattern.UNKNOWN and number.name not in left_open
+    ]
+    if open_numbers:
+        verb = "is" if len(open_numbers) == 1 else "are"
+        where = "no two groups of records" if n_records > 1 else "no part of the record"
+        sentences.append(
+            f"{_listed(open_numbers)} {verb} determined by {where} alone, and could not be compared."
+        )
+    if n_records == 1:
+        sentences.append(_ONE_RECORD)
+    return " ".join([*sentences, *(pair.text for pair in pairs[: TRUST.pairs_told])])
+
+
+def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
+    """Return numbers that differ in one way and point to one thing together, in their order."""
+
+    def way(number: ParameterTrust) -> tuple[str, tuple[str, ...], str]:
+        return number.pattern, number.goes_with, number.points_to.cause if number.points_to else ""
+
+    first = {way(number): place for place, number in reversed(list(enumerate(numbers)))}
+    ordered = sorted(numbers, key=lambda number: first[way(number)])
+    return [list(alike) for _, alike in groupby(ordered, key=way)]
+
+
+def _differs(alike: Sequence[ParameterTrust]) -> str:
+    told = [_course(number) for number in alike[: TRUST.told]]
+    if len(alike) > TRUST.told:
+        told.append(f"{_listed([number.name for number in alike[TRUST.told :]])} likewise")
+    cause = alike[0].points_to.cause if alike[0].points_to else ""
+    text = f"{'; '.join(told)}: {cause}." if cause else f"{'; '.join(told)}."
+    first, *others = alike[0].goes_with or ("",)
+    if others:
+        text += (
+            f" In these records {first} and {_listed(others)} go together, so that they cannot be told apart."
+        )
+    return text
+
+
+def _course(number: ParameterTrust) -> str:
+    """Return how a number differs, with values at both ends of its course."""
+    moves = number.moves
+    if number.pattern is Pattern.WINDOW:
+        return f"{number.name} {moves} when windows get shorter{_ends(number, number.groups[WINDOW_LENGTH], 'in')}"
+    if number.pattern is Pattern.PORTION:
+        return f"{number.name} {moves} along the records{_ends(number, number.groups[PORTION], 'in')}"
+    if number.pattern is Pattern.TIME:
+        return f"{number.name} {moves} from record to record{_ends(number, number.groups[RECORD], 'in')}"
+    if number.pattern is Pattern.RECORD:
+        return f"{number.name} differs from record to record without order{_extremes(number)}"
+    what = number.goes_with[0]
+    if not number.direction:
+        return f"{number.name} differs with {what}, in no order{_extremes(number, what)}"
+    return f"{number.name} {moves} with {what}{_ends(number, number.groups[what], 'at')}"
+
+
+def _ends(number: ParameterTrust, groups: Sequence[GroupValue], preposition: str) -> str:
+    if len(groups) < 2:
+        return ""
+    return ", " + _values(number, groups[0], groups[-1], preposition)
+
+
+def _extremes(number: ParameterTrust, kind: str = RECORD) -> str:
+    groups = number.groups[kind]
+    if len(groups) < 2:
+        return ""
+    lowest, highest = min(groups, key=lambda one: one.value), max(groups, key=lambda one: one.value)
+    return ", " + _values(number, lowest, highest, "in" if kind == RECORD else "at")
+
+
+def _values(number: ParameterTrust, first: GroupValue, second: GroupValue, preposition: str) -> str:
+    unit = "" if number.unit in ("", "1", "input") else f" {number.unit}"
+    digits = _digits(first, second)
+    return " and ".join(
+        f"{one.value:.{digits}g}{unit} {preposition} {_group(one.group)}" for one in (first, second)
+    )
+
+
+def _group(label: str) -> str:
+    return {"whole": "whole records", "half": "halves", "quarter": "quarters"}.get(label, label)
+
+
+def _digits(first: GroupValue, second: GroupValue) -> int:
+    """Return digits that show a difference, three at least."""
+    size, apart = max(abs(first.value), abs(second.value)), abs(first.value - second.value)
+    digits = 3
+    while digits < 7 and size > 0.0 and apart < 5.0 * size * 10.0 ** (1 - digits):
+        digits += 1
+    return digits
+
+
+def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked: Sequence[str]) -> str:
+    where = "in every record" if RECORD in asked else ""
+    if WINDOW_LENGTH in asked:
+        where = f"{where} and in shorter windows" if where else "along the record and in shorter windows"
+    largest = max(number.largest for number in numbers)
+    names = [number.name for number in numbers]
+    if is_rest:
+        who = (
+            f"The other number, {names[0]}, is" if len(names) == 1 else f"The other {len(names)} numbers are"
+        )
+    elif len(names) == 1:
+        who = f"{names[0]} is"
+    else:
+        who = f"All {len(names)} numbers are" if are_all else f"{len(names)} numbers are"
+    text = f"{who} the same {where or 'wherever they were compared'} (largest difference {largest:.2g} standard errors)."
+    vague = {number.name: error for number in numbers if (error := _vagueness(number)) > TRUST.vague}
+    if vague:
+        name = max(vague, key=vague.__getitem__)
+        more = (
+            f", {_listed([other for other in vague if other != name])} hardly better"
+            if len(vague) > 1
+            else ""
+        )
+        text += f" But single groups know {name} only to {_percent(vague[name])}{more}: smaller differences do not show."
+    return text
+
+
+def _vagueness(number: ParameterTrust) -> float:
+    """Return the typical relative error of a number in groups; nothing of one that may be zero."""
+    errors = [one.std for groups in number.groups.values() for one in groups]
+    if not errors or abs(number.value) <= TRUST.may_be_zero * number.std:
+        return 0.0
+    return float(np.median(errors)) / abs(number.value)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _percent(share: float) -> str:
+    return f"{float(f'{100.0 * share:.2g}'):g} %"

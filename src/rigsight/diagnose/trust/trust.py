@@ -1,0 +1,215 @@
+"""Are the numbers of the verdict's model the same in every record, at every amplitude, in shorter windows? And if not, why?
+
+Nothing is fitted anew: estimates by group follow from one Gauss-Newton step out of the common fit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t as t_distribution
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.entangled import entangled
+from rigsight.diagnose.trust.homogeneity import Spread, adjusted, course, spread, standard_errors
+from rigsight.diagnose.trust.orders import Order, orders
+from rigsight.diagnose.trust.patterns import Pattern, Role, meaning, roles
+from rigsight.diagnose.trust.pieces import pieces
+from rigsight.diagnose.trust.result import GroupValue, ParameterTrust, Trust
+from rigsight.diagnose.trust.statement import statement
+from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, views
+from rigsight.identify.undetermined import POORLY_KNOWN
+from rigsight.records.record import Record
+
+_NOT_SIMULATED = "Whether the numbers hold in each record could not be asked: the model cannot be simulated in one of them."
+_NOTHING_FITTED = "No number was fitted, so none can differ from record to record."
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """How one number differs in one view."""
+
+    view: View
+    told: Spread
+
+
+@dataclass(frozen=True)
+class _Way:
+    """How a number differs, in which direction, and with what it goes."""
+
+    pattern: Pattern
+    direction: int = 0
+    goes_with: tuple[str, ...] = ()
+
+
+def trust(
+    context: FitContext, model: Scored, records: Sequence[Record], constants: Mapping[str, float]
+) -> Trust:
+    """Return how far the numbers of a model can be trusted.
+
+    Parameters
+    ----------
+    context
+        Records as they were fitted and scored, scales and noise.
+    model
+        Fitted and scored.
+    records
+        Whole ones, in the order of the campaign.
+    constants
+        Of the campaign.
+    """
+    if not model.fit.free:
+        return Trust(_NOTHING_FITTED)
+    found = pieces(context, model)
+    if found is None:
+        return Trust(_NOT_SIMULATED)
+    along = orders(context.rig, records, constants)
+    seen = views(found, [record.name for record in records], along)
+    open_numbers = _left_open(model)
+    asked = [
+        []
+        if name in open_numbers
+        else [_Asked(view, told) for view in seen.values() if (told := _told(view, i))]
+        for i, name in enumerate(found.free)
+    ]
+    p_values = iter(adjusted([one.told.p_value for of_number in asked for one in of_number]))
+    allowed = [[next(p_values) for _ in of_number] for of_number in asked]
+    own = roles(context.rig, _effect_parameters(model))
+    numbers = tuple(
+        _number(model, i, seen, asked[i], allowed[i], along, own.get(name, Role.OTHER))
+        for i, name in enumerate(found.free)
+    )
+    numbers = _of_the_drive(numbers, own)
+    ordered = tuple(sorted(numbers, key=lambda n: (n.stable, n.p_value if not n.stable else 0.0)))
+    pairs = entangled(model.fit)
+    return Trust(statement(ordered, pairs, len(records), tuple(seen), open_numbers), ordered, pairs)
+
+
+def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) -> tuple[ParameterTrust, ...]:
+    """Return the numbers with one cause for mass, stiffness and damping that all grow or all fall with amplitude.
+
+    They stand in one equation with the drive: where it gives less, all of them seem to be more.
+    """
+    moved = [n for n in numbers if own.get(n.name) in (Role.MASS, Role.STIFFNESS, Role.DAMPING)]
+    directions = {n.direction if n.pattern is Pattern.AMPLITUDE else 0 for n in moved}
+    if Role.MASS not in {own.get(n.name) for n in moved} or len(moved) < 2 or len(directions) > 1:
+        return numbers
+    told = meaning(Pattern.AMPLITUDE, Role.DRIVE, -directions.pop())
+    return tuple(replace(n, points_to=told) if told and n in moved and not n.stable else n for n in numbers)
+
+
+def _left_open(model: Scored) -> tuple[str, ...]:
+    """Return the numbers that cannot be negative and that all records together do not determine."""
+    fit, lower = model.fit, {p.name: p.lower for p in model.fit.structure.parameters}
+    return tuple(
+        name
+        for name in fit.free
+        if lower[name] >= 0.0 and not fit.standard_errors[name] < POORLY_KNOWN * abs(fit.values[name])
+    )
+
+
+def _effect_parameters(model: Scored) -> set[str]:
+    structure = model.fit.structure
+    return {
+        structure.parameter_name(effect, p.name) for effect in structure.effects for p in effect.parameters
+    }
+
+
+def _told(view: View, index: int) -> Spread | None:
+    """Return how a number differs in a view; None where nothing can be compared or another view is of the same groups."""
+    known = view.known(index)
+    if not view.is_tested or known.size < 2:
+        return None
+    if view.apart is None:
+        values, variances, freedom = view.of(index)
+        return spread(values[known], variances[known], freedom[known])
+    error = math.sqrt(view.apart.variances[index])
+    if not 0.0 < error < math.inf:
+        return None
+    ratio = abs(float(view.apart.shifts[index])) / error
+    known_by = float(view.apart.freedom[index])
+    return Spread(float(2.0 * t_distribution.sf(ratio, known_by)), standard_errors(ratio, known_by))
+
+
+def _number(
+    model: Scored,
+    index: int,
+    seen: Mapping[str, View],
+    asked: Sequence[_Asked],
+    p_values: Sequence[float],
+    along: Sequence[Order],
+    role: Role,
+) -> ParameterTrust:
+    name = model.fit.free[index]
+    unit = next(p.unit for p in model.fit.structure.parameters if p.name == name)
+    value = model.fit.values[name]
+    groups = {}
+    for kind, view in seen.items():
+        known = view.known(index)
+        values, variances, _ = view.of(index)
+        groups[kind] = tuple(
+            GroupValue(view.labels[g], value + float(values[g]), math.sqrt(float(variances[g])))
+            for g in known
+        )
+    differing = {one.view.kind: p for one, p in zip(asked, p_values, strict=True) if p <= TRUST.level}
+    found = _Way(Pattern.STABLE if asked else Pattern.UNKNOWN)
+    if differing:
+        found = _pattern(seen, index, differing, along)
+    return ParameterTrust(
+        name=name,
+        unit=unit,
+        value=value,
+        std=model.fit.standard_errors[name],
+        of_effect=role is Role.EFFECT,
+        groups=groups,
+        p_value=min(p_values, default=1.0),
+        largest=max((one.told.largest for one in asked), default=0.0),
+        pattern=found.pattern,
+        direction=found.direction,
+        goes_with=found.goes_with,
+        points_to=meaning(found.pattern, role, found.direction),
+    )
+
+
+def _pattern(
+    seen: Mapping[str, View], index: int, differing: Mapping[str, float], along: Sequence[Order]
+) -> _Way:
+    """Return how a number differs: first from record to record, then along records, then with the length of windows."""
+    if set(differing) - {PORTION, WINDOW_LENGTH}:
+        return _between_records(seen, index, differing, along)
+    if PORTION in differing:
+        view = seen[PORTION]
+        known = view.known(index)
+        values, variances, _ = view.of(index)
+        found = course(values[known], variances[known], known.astype(float))
+        return _Way(Pattern.PORTION, found.direction, ("time",))
+    apart = seen[WINDOW_LENGTH].apart
+    assert apart is not None
+    return _Way(Pattern.WINDOW, 1 if apart.shifts[index] > 0.0 else -1, ("window length",))
+
+
+def _between_records(
+    seen: Mapping[str, View], index: int, differing: Mapping[str, float], along: Sequence[Order]
+) -> _Way:
+    view = seen[RECORD]
+    known = view.known(index)
+    values, variances, _ = view.of(index)
+    courses = []
+    for order in along:
+        levels = np.array([order.levels[view.labels[g]] for g in known])
+        found = course(values[known], variances[known], levels)
+        if found.direction:
+            courses.append((order, found))
+    if courses:
+        least = min(found.left for _, found in courses)
+        best = [(order, found) for order, found in courses if found.left <= least]
+        return _Way(best[0][0].pattern, best[0][1].direction, tuple(order.name for order, _ in best))
+    # Levels of several records each that agree within and differ between need no order.
+    for order in along:
+        if order.name in differing and RECORD in differing and differing[order.name] < differing[RECORD]:
+            return _Way(order.pattern, 0, (order.name,))
+    return _Way(Pattern.RECORD)

@@ -1,0 +1,142 @@
+"""By what is a number estimated again? By record, by level of what was set, by portion of a record, in shorter windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.policy import TRUST
+from rigsight.diagnose.trust.estimates import Estimates, beyond, estimates, mean, told_by_most
+from rigsight.diagnose.trust.orders import Order
+from rigsight.diagnose.trust.patterns import Pattern
+from rigsight.diagnose.trust.pieces import Piece, Pieces
+from rigsight.diagnose.trust.spectra import NoiseSpectra
+from rigsight.identify.undetermined import POORLY_KNOWN
+
+Floats = NDArray[np.float64]
+
+RECORD, PORTION, WINDOW_LENGTH = "record", "portion", "window"
+_NAMES = ("half", "quarter")
+
+
+@dataclass(frozen=True)
+class View:
+    """Numbers estimated in several groups.
+
+    Attributes
+    ----------
+    kind
+        By what.
+    labels
+        Of the groups.
+    found
+        Of each group.
+    sizes
+        Of the numbers of the common fit, without sign, shape (n_free,).
+    apart
+        Where groups share samples, as windows of each length do: how the last differs from the first. Else None.
+    is_tested
+        False where the groups are those of another view.
+    """
+
+    kind: str
+    labels: tuple[str, ...]
+    found: tuple[Estimates, ...]
+    sizes: Floats
+    apart: Estimates | None = None
+    is_tested: bool = True
+
+    def known(self, index: int) -> NDArray[np.intp]:
+        """Return which groups determine a number by themselves."""
+        errors = np.sqrt([estimate.variances[index] for estimate in self.found])
+        told = np.isfinite(errors) & (errors > 0.0)
+        if np.any(told):
+            told &= (errors <= TRUST.unsure * np.min(errors[told])) | (
+                errors < POORLY_KNOWN * self.sizes[index]
+            )
+        return np.flatnonzero(told)
+
+    def of(self, index: int) -> tuple[Floats, Floats, Floats]:
+        """Return shifts, variances and degrees of freedom of a number in all groups, shape (n_groups,) each."""
+        return (
+            np.array([estimate.shifts[index] for estimate in self.found]),
+            np.array([estimate.variances[index] for estimate in self.found]),
+            np.array([estimate.freedom[index] for estimate in self.found]),
+        )
+
+
+def views(of: Pieces, records: Sequence[str], orders: Sequence[Order]) -> dict[str, View]:
+    """Return every view that the records allow, by its kind.
+
+    Parameters
+    ----------
+    of
+        What records and windows say.
+    records
+        Names of the records in the order of the campaign.
+    orders
+        By what records differ.
+    """
+    made: dict[str, View] = {}
+    spectra = NoiseSpectra.of(of.whole)
+    if len(records) > 1:
+        made[RECORD] = _by_record(of, records, spectra)
+        for order in orders:
+            if order.pattern is not Pattern.TIME:
+                made[order.name] = _by_level(made[RECORD], order)
+    if of.cut:
+        if of.portions > 1:
+            made[PORTION] = _portions(of)
+        made[WINDOW_LENGTH] = _lengths(of, spectra)
+    return made
+
+
+def _by_record(of: Pieces, records: Sequence[str], spectra: NoiseSpectra) -> View:
+    parts = [[piece for piece in of.whole if piece.record == name] for name in records]
+    return View(RECORD, tuple(records), _of_each(of, parts, spectra), np.abs(of.values))
+
+
+def _by_level(alone: View, order: Order) -> View:
+    """Return the means of what records of each level say alone, each record with the weight of its own error."""
+    levels = sorted(set(order.levels.values()))
+    own = [
+        [one for name, one in zip(alone.labels, alone.found, strict=True) if order.levels[name] == level]
+        for level in levels
+    ]
+    return View(
+        order.name,
+        tuple(f"{level:.3g} {order.unit}".strip() for level in levels),
+        tuple(map(mean, own)),
+        alone.sizes,
+        # One record at each level is the view by record once more.
+        is_tested=len(levels) < len(order.levels),
+    )
+
+
+def _portions(of: Pieces) -> View:
+    count = of.portions
+    # What one number leaves of a record along which it changes is no noise of its parts.
+    spectra = NoiseSpectra.of(of.cut[count])
+    parts = [[piece for piece in of.cut[count] if piece.place[0] == i] for i in range(count)]
+    labels = tuple(f"{_NAMES[TRUST.windows.index(count)]} {i + 1}" for i in range(count))
+    return View(PORTION, labels, _of_each(of, parts, spectra), np.abs(of.values))
+
+
+def _lengths(of: Pieces, spectra: NoiseSpectra) -> View:
+    counts = sorted(of.cut)
+    groups = [of.whole, *(of.cut[count] for count in counts)]
+    kept = told_by_most(of, groups)
+    whole, *cut = (estimates(of, group, spectra, kept) for group in groups)
+    apart = [beyond(of, of.cut[count], spectra, kept) for count in counts]
+    moved = (replace(own, shifts=further.shifts) for own, further in zip(cut, apart, strict=True))
+    found = (replace(whole, shifts=np.zeros_like(whole.shifts)), *moved)
+    labels = ("whole", *(_NAMES[TRUST.windows.index(count)] for count in counts))
+    return View(WINDOW_LENGTH, labels, found, np.abs(of.values), apart[-1])
+
+
+def _of_each(of: Pieces, parts: Sequence[Sequence[Piece]], spectra: NoiseSpectra) -> tuple[Estimates, ...]:
+    kept = told_by_most(of, parts)
+    return tuple(estimates(of, part, spectra, kept) for part in parts)

@@ -1,0 +1,191 @@
+"""How do the residuals of each record answer to the fitted numbers and to its initial state? At the end of a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.identify.fit.coordinates import Coordinates
+from rigsight.identify.fit.fit_problem import Problem
+from rigsight.identify.fit.fit_result import FitResult
+from rigsight.identify.fit.grey_box import GreyBoxFit
+
+Floats = NDArray[np.float64]
+
+_DEPENDENT = 1e-6
+_MARGIN = 3.0
+"""A direction that moves residuals less than errors of the derivatives do, thrice, is not stepped along; as for covariances."""
+_SHARES = (1.0, 0.3, 0.1, 0.03)
+"""Of a step, the largest that lowers the cost is taken: a straight line reaches less far than to numbers that are quite other."""
+
+
+@dataclass(frozen=True)
+class RecordDerivatives:
+    """Residuals of one record and their derivatives, in units of the noise.
+
+    Attributes
+    ----------
+    residuals
+        Weighted, of all measured outputs one after the other, shape (n_measured * n_samples,).
+    by_coordinate
+        Their derivatives by the coordinates of the free parameters, shape (n, n_free).
+    by_state
+        Their derivatives by the initial state of the record, offsets behind it, shape (n, n_states).
+    n_measured
+        Number of outputs that the record holds.
+    """
+
+    residuals: Floats
+    by_coordinate: Floats
+    by_state: Floats
+    n_measured: int
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """The same of all records of a fit.
+
+    Attributes
+    ----------
+    free
+        Names of the free parameters.
+    place
+        Their coordinates, shape (n_free,).
+    records
+        One each.
+    coordinates
+        Their way to the parameters.
+    error
+        Relative error of the derivatives.
+    """
+
+    free: tuple[str, ...]
+    place: Floats
+    records: tuple[RecordDerivatives, ...]
+    coordinates: Coordinates
+    error: float
+
+
+def derivatives(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> Derivatives:
+    """Return residuals and derivatives of every record at the values of a fit.
+
+    Parameters
+    ----------
+    problem
+        The records and the structure.
+    fit
+        Values, and the initial state of each of these records.
+    free
+        Names of the parameters by which derivatives are taken.
+    """
+    evaluated, theta = _at_end(problem, fit, free)
+    return Derivatives(
+        free=tuple(free),
+        place=theta[: len(free)],
+        records=tuple(
+            _of_record(evaluated, index, sensitivity)
+            for index, sensitivity in enumerate(evaluated.sensitivities(theta))
+        ),
+        coordinates=evaluated.coordinates,
+        error=evaluated.derivative_error,
+    )
+
+
+@dataclass(frozen=True)
+class OwnDerivatives:
+    """Where one record alone leads.
+
+    Attributes
+    ----------
+    derivatives
+        There, with the residuals that the straight line through there has at the common values.
+    fit
+        Its own values and initial state.
+    """
+
+    derivatives: RecordDerivatives
+    fit: FitResult
+
+
+def own_derivatives(
+    problem: GreyBoxFit, fit: FitResult, free: Sequence[str], most_steps: int, worth_a_step: float
+) -> OwnDerivatives | None:
+    """Return where some Gauss-Newton steps lead one record away from common values: derivatives there are not those here.
+
+    Parameters
+    ----------
+    problem
+        One record and the structure.
+    fit
+        Common values, and the initial state of this record.
+    free
+        Names of the parameters.
+    most_steps
+        Steps at the most; one of which no share lowers the cost is not taken.
+    worth_a_step
+        Share of the cost that a step must promise to take away.
+
+    Returns
+    -------
+    None where no step was taken.
+    """
+    evaluated, start = _at_end(problem, fit, free)
+    n_free, coordinates, theta = len(free), evaluated.coordinates, start
+    residual, slopes = evaluated.sensitivities(start)[0]
+    for _ in range(most_steps):
+        size = np.linalg.norm(slopes, axis=0)
+        size[size == 0.0] = 1.0
+        smallest = max(_DEPENDENT, _MARGIN * evaluated.derivative_error)
+        scaled = slopes / size
+        step = (
+            -np.linalg.pinv(scaled.T @ scaled, rcond=smallest**2, hermitian=True)
+            @ (scaled.T @ residual)
+            / size
+        )
+        promised = float(residual @ residual) - float(np.sum((residual + slopes @ step) ** 2))
+        if not promised > worth_a_step * float(residual @ residual):
+            break
+        ahead = None
+        for share in _SHARES:
+            there = theta + share * step
+            there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
+            tried = evaluated.sensitivities(there)[0]
+            # A motion that leaves the range of numbers is no improvement.
+            with np.errstate(over="ignore", invalid="ignore"):
+                if float(tried[0] @ tried[0]) < float(residual @ residual):
+                    ahead = tried
+                    break
+        if ahead is None:
+            break
+        theta, (residual, slopes) = there, ahead
+    if theta is start:
+        return None
+    p = coordinates.to_parameters(theta[:n_free])
+    own = replace(
+        fit,
+        values={**fit.values, **{name: float(p[coordinates.index[i]]) for i, name in enumerate(free)}},
+        initial_states=tuple(evaluated.states(theta)),
+    )
+    return OwnDerivatives(_of_record(evaluated, 0, (residual - slopes @ (theta - start), slopes)), own)
+
+
+def _at_end(problem: GreyBoxFit, fit: FitResult, free: Sequence[str]) -> tuple[Problem, Floats]:
+    """Return the problem with derivatives by these parameters, and where the fit ended in its coordinates."""
+    coordinates = Coordinates.of(problem.data.structure, free, fit.values, problem.scales)
+    own = coordinates.from_values(fit.values)
+    sizes = problem.data.state_sizes(coordinates.to_parameters(own)[:, None])[:, 0]
+    # A state that cannot leave a range of zero has no place in it.
+    units = np.where(sizes > 0.0, sizes, 1.0)
+    theta = np.concatenate([own, *(state / units for state in fit.initial_states)])
+    evaluated = Problem(problem.data, coordinates, sizes.size, np.full(theta.size, np.inf))
+    evaluated.substeps = list(fit.substeps)
+    return evaluated, theta
+
+
+def _of_record(evaluated: Problem, index: int, sensitivity: tuple[Floats, Floats]) -> RecordDerivatives:
+    (residual, slopes), n_free = sensitivity, evaluated.n_free
+    measured = int(np.count_nonzero(evaluated.data.records[index].weights))
+    return RecordDerivatives(residual, slopes[:, :n_free], slopes[:, n_free:], measured)

@@ -1,0 +1,190 @@
+"""Can the numbers be trusted? The section of the report, its figure and table, and one line for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rigsight import plot
+from rigsight.diagnose.result import Diagnosis
+from rigsight.diagnose.trust.patterns import Pattern
+from rigsight.diagnose.trust.result import ParameterTrust
+from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
+from rigsight.errors import InputError
+from rigsight.report.drawing.figures import PageFigure, page_figure
+from rigsight.report.quantities import Written, written
+from rigsight.report.wording import sentence_case
+
+if TYPE_CHECKING:
+    from rigsight.plot import Figure
+
+TRUST_COLUMNS = ("parameter", "by", "group", "value", "std", "unit", "pattern", "p_value")
+"""Columns of the table."""
+_BY = {PORTION: "part of the records", WINDOW_LENGTH: "window length"}
+_MOST_PANELS = 6
+_TOLD_IN_A_LINE = 3
+
+
+@dataclass(frozen=True)
+class TrustRow:
+    """One number in the table of the report."""
+
+    name: str
+    number: Written
+    unit: str
+    same: str
+    p_value: str
+    points_to: str
+
+
+@dataclass(frozen=True)
+class TrustView:
+    """The section of the report; `figure` is None where no number was estimated in two groups."""
+
+    statement: str
+    figure: PageFigure | None
+    rows: tuple[TrustRow, ...]
+
+
+def trust_view(diagnosis: Diagnosis) -> TrustView | None:
+    """Return what the section shows; None where the question was not asked.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    """
+    if diagnosis.trust is None:
+        return None
+    figure = None
+    if _drawn(diagnosis):
+        told = "; ".join(f"{n.name}: {_how(n)}" for n in _drawn(diagnosis))
+        figure = page_figure(
+            trust_drawing(diagnosis),
+            "figure-trust",
+            f"Numbers as single groups have them, with 95 % intervals. {told}.",
+            "Each number as one record, level or window alone has it, with 95 % intervals. Dashed with its band: the common fit.",
+        )
+    return TrustView(diagnosis.trust.statement, figure, tuple(map(_row, diagnosis.trust.parameters)))
+
+
+def trust_drawing(diagnosis: Diagnosis) -> Figure:
+    """Return the numbers by group: those that differ and those of the effects, six at most.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+
+    Raises
+    ------
+    InputError
+        If no number was estimated in two groups.
+    """
+    drawn = _drawn(diagnosis)
+    if not drawn:
+        raise InputError("No number of this diagnosis was estimated in two groups of records.")
+    return plot.parameters_by_group(
+        [
+            plot.GroupPanel(
+                number.name,
+                number.unit,
+                _BY.get(_shown(number), _shown(number)),
+                tuple((one.group, one.value, one.std) for one in number.groups[_shown(number)]),
+                (number.value, number.std),
+                not number.stable,
+            )
+            for number in drawn
+        ]
+    )
+
+
+def trust_line(diagnosis: Diagnosis) -> str:
+    """Return one line: that all numbers are the same, or which are not; empty where that was not asked.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    """
+    if diagnosis.trust is None or not diagnosis.trust.parameters:
+        return ""
+    differing = [number for number in diagnosis.trust.parameters if not number.stable]
+    if not differing:
+        return f"Trust: {diagnosis.trust.statement}"
+    told = [f"{number.name} {_how(number)}" for number in differing[:_TOLD_IN_A_LINE]]
+    more = len(differing) - len(told)
+    rest = f"; {more} more {'differs' if more == 1 else 'differ'}" if more > 0 else ""
+    first = differing[0].points_to
+    return f"Trust: {'; '.join(told)}{rest}. {sentence_case(first.cause) if first else ''}."
+
+
+def trust_rows(diagnosis: Diagnosis) -> Iterator[dict[str, Any]]:
+    """Yield a row per number and group, with the columns `TRUST_COLUMNS`.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    """
+    for number in () if diagnosis.trust is None else diagnosis.trust.parameters:
+        for kind, groups in number.groups.items():
+            for one in groups:
+                row = (
+                    number.name,
+                    kind,
+                    one.group,
+                    one.value,
+                    one.std,
+                    number.unit,
+                    str(number.pattern),
+                    number.p_value,
+                )
+                yield dict(zip(TRUST_COLUMNS, row, strict=True))
+
+
+def _drawn(diagnosis: Diagnosis) -> list[ParameterTrust]:
+    numbers = () if diagnosis.trust is None else diagnosis.trust.parameters
+    told = [n for n in numbers if (not n.stable or n.of_effect) and len(n.groups.get(_shown(n), ())) > 1]
+    return told[:_MOST_PANELS]
+
+
+def _shown(number: ParameterTrust) -> str:
+    """Return by which groups a number is drawn: those in which it differs, else by record."""
+    if number.pattern in (Pattern.AMPLITUDE, Pattern.CONSTANT):
+        return number.goes_with[0]
+    by_pattern = {Pattern.PORTION: PORTION, Pattern.WINDOW: WINDOW_LENGTH}
+    return by_pattern.get(number.pattern, RECORD if RECORD in number.groups else WINDOW_LENGTH)
+
+
+def _how(number: ParameterTrust) -> str:
+    if number.pattern is Pattern.UNKNOWN:
+        return "not compared"
+    if number.stable:
+        return "the same"
+    if number.pattern is Pattern.RECORD:
+        return "differs from record to record"
+    if number.pattern is Pattern.PORTION:
+        return f"{number.moves} along the records"
+    if number.pattern is Pattern.WINDOW:
+        return f"{number.moves} when windows get shorter"
+    if number.pattern is Pattern.TIME:
+        return f"{number.moves} from record to record"
+    return f"{number.moves} with {' and '.join(number.goes_with)}"
+
+
+def _row(number: ParameterTrust) -> TrustRow:
+    told = number.points_to
+    return TrustRow(
+        name=number.name,
+        number=written(number.value, number.std),
+        unit=number.unit,
+        same=sentence_case(_how(number)),
+        p_value=""
+        if number.pattern is Pattern.UNKNOWN
+        else f"{number.p_value:.2g}"
+        if number.p_value > 1e-6
+        else "< 1e-6",
+        points_to="" if told is None else f"{sentence_case(told.cause)}. Next: {told.experiment}",
+    )
