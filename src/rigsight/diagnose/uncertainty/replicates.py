@@ -1,0 +1,162 @@
+"""What would a fitted model have shown under another force from outside and other noise of its sensors?
+
+A force acts at the joints and moves the model with all its effects: where friction holds a mass it does nothing, where a mass is
+about to let go it does much. Its response is the difference to the same simulation without it. An observer follows the readings
+that were measured, and of another noise only what it hands on: an error dies away in it as one of the rig's own motion would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.diagnose.places.probes import push
+from rigsight.diagnose.uncertainty.sources import Sources
+from rigsight.diagnose.workbench import Workbench
+from rigsight.identify import FitResult
+from rigsight.records.record import Record
+from rigsight.rigs import Rig, Signal
+from rigsight.simulate import (
+    Structure,
+    compose,
+    parameter_vector,
+    record_input,
+    record_values,
+    simulate_outputs,
+    structure_of_fit,
+)
+
+Floats = NDArray[np.float64]
+
+_ACCURACY = 1e-5
+"""Of simulations whose difference is the response: a tenth of what a fit asks for, as the response is small beside the motion."""
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """A fitted model along the records of its fit.
+
+    Attributes
+    ----------
+    bench
+        Records and threads.
+    fit
+        Of the model, to the bench's estimation records.
+    """
+
+    bench: Workbench
+    fit: FitResult
+
+    @cached_property
+    def _structure(self) -> Structure:
+        own = self.fit.structure
+        pushed = compose(with_forces(own.rig), own.effects, dict(own.fixed))
+        return structure_of_fit(pushed, self.bench.estimation)
+
+    @cached_property
+    def _undisturbed(self) -> list[Floats]:
+        quiet = [
+            np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints)))
+            for record in self.bench.estimation
+        ]
+        return self._of_each_record(lambda i: self._outputs(i, quiet[i]))
+
+    def responses(self, forces: Sequence[Floats]) -> list[Floats]:
+        """Return by how much forces at the joints change the readings of each record.
+
+        Parameters
+        ----------
+        forces
+            Samples of each record, shape (n_samples, n_joints, n_replicates).
+
+        Returns
+        -------
+        Shape (n_samples, n_outputs, n_replicates) each.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated under them.
+        """
+        return self._changes(forces, None)
+
+    def drawn(self, sources: Sources, n_replicates: int, rng: np.random.Generator) -> list[Floats]:
+        """Return changes of the readings of each record as forces and sensors of these sizes make them.
+
+        Parameters
+        ----------
+        sources
+            Sizes of forces and sensor noise.
+        n_replicates
+            How many.
+        rng
+            Source of randomness.
+
+        Returns
+        -------
+        Shape (n_samples, n_outputs, n_replicates) each.
+
+        Raises
+        ------
+        SimulationError
+            If the model cannot be simulated under them.
+        """
+        forces = [sources.forces(r.n_samples, r.dt, n_replicates, rng) for r in self.bench.estimation]
+        noise = [sources.noise(r.n_samples, n_replicates, rng) for r in self.bench.estimation]
+        return [n + change for n, change in zip(noise, self._changes(forces, noise), strict=True)]
+
+    def _changes(self, forces: Sequence[Floats], noise: Sequence[Floats] | None) -> list[Floats]:
+        quiet = self._undisturbed
+
+        def of_record(index: int) -> Floats:
+            found = [
+                self._outputs(index, own, None if noise is None else noise[index][:, :, i]) - quiet[index]
+                for i, own in enumerate(np.moveaxis(forces[index], 2, 0))
+            ]
+            return np.stack(found, axis=2)
+
+        return self._of_each_record(of_record)
+
+    def _of_each_record(self, one: Callable[[int], Floats]) -> list[Floats]:
+        return self.bench.threads.results(one, [record.n_samples for record in self.bench.estimation])
+
+    def _outputs(self, index: int, force: Floats, noise: Floats | None = None) -> Floats:
+        """Return the readings of a record under forces, shape (n_samples, n_outputs)."""
+        structure, record = self._structure, self.bench.estimation[index]
+        joints = [push(joint.name) for joint in self.fit.structure.rig.mechanism.joints]
+        signals = {**record.signals, **dict(zip(joints, force.T, strict=True))}
+        if noise is not None and record.observed:
+            signals |= self._noisy(record, noise)
+        pushed = replace(record, signals=signals)
+        p = parameter_vector(structure, record_values(structure, self.fit.values, record))
+        state = self.fit.initial_states[index]
+        return simulate_outputs(
+            structure, record_input(structure, pushed), p, state, record.n_samples, _ACCURACY
+        )
+
+    def _noisy(self, record: Record, noise: Floats) -> dict[str, Floats]:
+        names = [signal.name for signal in self.fit.structure.rig.outputs]
+        return {name: record[name] + noise[:, names.index(name)] for name in record.observed}
+
+
+def with_forces(rig: Rig) -> Rig:
+    """Return a rig with a force at every joint; each is an input, see `push`.
+
+    It stands in the joint's own force, so that a sensor which reads that force shows it.
+    """
+    mechanism = rig.mechanism
+    names = tuple(push(joint.name) for joint in mechanism.joints)
+    joints = tuple(
+        replace(joint, force=joint.force - sp.Symbol(push(joint.name), real=True)) for joint in mechanism.joints
+    )
+    return replace(
+        rig,
+        name=f"{rig.name} with forces at its joints",
+        inputs=(*rig.inputs, *(Signal(name, "", "") for name in names)),
+        mechanism=replace(mechanism, inputs=(*mechanism.inputs, *names), joints=joints),
+    )
