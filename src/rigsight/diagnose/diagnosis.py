@@ -29,6 +29,7 @@ from rigsight.diagnose.result import (
     Trace,
 )
 from rigsight.diagnose.task import Task
+from rigsight.diagnose.uncertainty.of_verdict import with_own_errors
 from rigsight.diagnose.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
 from rigsight.diagnose.windows import WINDOW, readings
 from rigsight.diagnose.workbench import Scored, Workbench
@@ -141,6 +142,9 @@ def diagnose(
     diagnosis = _assembled(task, found, notes, scored_on, rng)
     diagnosis = replace(diagnosis, data_quality=found.quality)
     if found.judgement.verdict != "unknown":
+        named = found.judgement.model if diagnosis.effects else found.linear
+        diagnosis = with_own_errors(diagnosis, found.bench, named, seed)
+        say("standard errors")
         return diagnosis
     forces = forces_at_joints(found.bench, found.linear)
     if forces:

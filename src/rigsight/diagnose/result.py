@@ -17,6 +17,7 @@ from rigsight.diagnose.remainder import Remainder
 from rigsight.discover import JointForce, MissingForce
 from rigsight.effects import kind_of
 
+StdMethod = Literal["bootstrap", "formula"]
 Verdict = Literal["effect", "parameters", "none", "unknown"]
 Stage = Literal["before", "reidentified", "after"]
 STAGES: tuple[Stage, ...] = ("before", "reidentified", "after")
@@ -103,6 +104,9 @@ class Candidate:
         Whether the fit converged, and the optimizer's words.
     grounds
         What the probability rests on; None for the equations without an effect.
+    std_method
+        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (see `uncertainty/bootstrap.py`), else the
+        ``"formula"`` of the fit.
     """
 
     effects: tuple[str, ...]
@@ -115,6 +119,7 @@ class Candidate:
     success: bool
     message: str
     grounds: Grounds | None = None
+    std_method: StdMethod = "formula"
 
 
 @dataclass(frozen=True)
@@ -366,6 +371,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
             name: {"value": _number(e.value), "std": _number(e.std), "unit": e.unit}
             for name, e in candidate.parameters.items()
         },
+        "std_method": candidate.std_method,
         "n_fitted": len(candidate.parameters),
         "held_out_share": None if candidate.grounds is None else candidate.grounds.held_out,
         "log_evidence": None if candidate.grounds is None else candidate.grounds.evidence,

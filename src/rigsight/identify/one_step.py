@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.errors import SimulationError
 from rigsight.identify.fit.covariance import propagated_covariance, sandwich_covariance
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
@@ -34,6 +35,11 @@ class OneStep:
         Structure, records, weights.
     result
         Its result, with standard errors.
+
+    Raises
+    ------
+    SimulationError
+        If the derivatives of the readings leave the range of numbers.
     """
 
     def __init__(self, fit: GreyBoxFit, result: FitResult) -> None:
@@ -44,6 +50,8 @@ class OneStep:
         self._error = problem.derivative_error
         self._rows, self._followed = [], []
         for _, derivative in central_sensitivities(problem, theta):
+            if not np.all(np.isfinite(derivative)):
+                raise SimulationError("The derivatives of the fit leave the range of numbers.")
             basis = _basis(derivative[:, n_free:])
             own = derivative[:, :n_free]
             self._followed.append(basis)
@@ -52,11 +60,8 @@ class OneStep:
         inverse = sandwich_covariance(self._bread, self._bread, self._error)
         self._inverse = np.where(np.isfinite(inverse), inverse, 0.0)
 
-    def covariance(self, changes: Sequence[Floats]) -> Floats:
-        """Return the mean product of the steps that changes of the records would cause, as a covariance.
-
-        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, and an error
-        bar that left it out would not reach the truth.
+    def gradients(self, changes: Sequence[Floats]) -> Floats:
+        """Return the projections of changes of the records on the derivatives of the fit, of which `covariance` makes steps.
 
         Parameters
         ----------
@@ -65,9 +70,25 @@ class OneStep:
 
         Returns
         -------
+        Shape (n_free, n_replicates).
+        """
+        return self._gradients(self._stacked(changes))
+
+    def covariance(self, gradients: Floats) -> Floats:
+        """Return the mean product of the steps that changes of the records would cause, as a covariance.
+
+        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, and an error
+        bar that left it out would not reach the truth.
+
+        Parameters
+        ----------
+        gradients
+            Of all changes, see `gradients`, shape (n_free, n_replicates).
+
+        Returns
+        -------
         Shape (n_free, n_free), in units of the parameters, infinite where the records do not determine one.
         """
-        gradients = self._gradients(self._stacked(changes))
         filling = gradients @ gradients.T / gradients.shape[1]
         found = sandwich_covariance(self._bread, filling, self._error)
         return propagated_covariance(found, self._chain)

@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.diagnose.result import StdMethod
 from rigsight.diagnose.uncertainty.replicates import Replicates
 from rigsight.diagnose.uncertainty.sources import FEWEST, SLOWER, Sources, likeliest_sources
 from rigsight.diagnose.workbench import Workbench
@@ -30,10 +30,17 @@ from rigsight.identify import FitResult, OneStep
 Floats = NDArray[np.float64]
 _Shown = Callable[[int, float, int], list[Floats]]
 """What a white force at a joint, of some size, leaves of each record in some draws."""
-StdMethod = Literal["bootstrap", "formula"]
 
 N_REPLICATES = 60
 """Draws: standard errors scatter by 1 / sqrt(2 n), 9 percent."""
+_FEWEST_REPLICATES = 24
+"""Draws along long records: standard errors scatter by 14 percent."""
+_STEPS = 3_500_000
+"""Steps of integration in which more draws than these are simulated: 2 to 3 s. A number of steps, so that draws depend on no clock."""
+_MOST_STEPS = 2_000_000
+"""Of one draw, from which the formula has to do: half a minute for all. A stiff model takes thousands of steps in a sample."""
+_AT_ONCE = 4_000_000
+"""Readings that are kept at a time: 32 MB."""
 _UNIT_DRAWS = 4
 """Draws by which each joint shows: 72 degrees of freedom of each averaged line."""
 _SETTING_DRAWS = 8
@@ -59,7 +66,7 @@ class Uncertainty:
     covariance
         Shape (n_free, n_free), in the order of the fit's `free`.
     method
-        ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces.
+        ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces, or not in reasonable time.
     sources
         The forces and the noise that were drawn, noise in SI units; None for the formula.
     """
@@ -71,7 +78,7 @@ class Uncertainty:
 
 
 def uncertainty_of(
-    bench: Workbench, fit: FitResult, rng: np.random.Generator, n_replicates: int = N_REPLICATES
+    bench: Workbench, fit: FitResult, rng: np.random.Generator, n_replicates: int | None = None
 ) -> Uncertainty:
     """Return the standard errors of a model that was fitted to the bench's estimation records.
 
@@ -84,18 +91,29 @@ def uncertainty_of(
     rng
         Source of randomness.
     n_replicates
-        Draws.
+        Draws; default follows from how many steps of integration one takes.
     """
     by_formula = Uncertainty(dict(fit.standard_errors), fit.covariance, "formula")
     if not (fit.free and fit.residuals and max(r.shape[0] for r in fit.residuals) >= FEWEST):
         return by_formula
-    step = OneStep(bench.problem(fit.structure, bench.estimation), fit)
-    replicates = Replicates(bench, fit)
     try:
+        replicates = Replicates(bench, fit)
+        if replicates.n_steps > _MOST_STEPS:
+            return by_formula
+        wanted = n_replicates or int(
+            np.clip(_STEPS // max(replicates.n_steps, 1), _FEWEST_REPLICATES, N_REPLICATES)
+        )
+        step = OneStep(bench.problem(fit.structure, bench.estimation), fit)
         sources = _sources(bench, fit, step, replicates, rng)
-        covariance = step.covariance(replicates.drawn(sources, n_replicates, rng))
+        n_readings = sum(record.n_samples for record in bench.estimation) * len(bench.rig.outputs)
+        batch = max(1, _AT_ONCE // n_readings)
+        gradients = [
+            step.gradients(replicates.drawn(sources, min(batch, wanted - first), rng))
+            for first in range(0, wanted, batch)
+        ]
     except SimulationError:
         return by_formula
+    covariance = step.covariance(np.hstack(gradients))
     if np.any(np.isnan(covariance)):
         return by_formula
     # What the formula calls undetermined stays so.

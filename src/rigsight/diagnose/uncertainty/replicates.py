@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 import sympy as sp
@@ -30,8 +31,11 @@ from rigsight.simulate import (
     simulate_outputs,
     structure_of_fit,
 )
+from rigsight.simulate.input_hold import HeldInput, hold_input, hold_motion, together
+from rigsight.simulate.prescribed_motion import smoothed_noise
 
 Floats = NDArray[np.float64]
+_Result = TypeVar("_Result")
 
 _ACCURACY = 1e-5
 """Of simulations whose difference is the response: a tenth of what a fit asks for, as the response is small beside the motion."""
@@ -59,12 +63,22 @@ class Replicates:
         return structure_of_fit(pushed, self.bench.estimation)
 
     @cached_property
-    def _undisturbed(self) -> list[Floats]:
-        quiet = [
-            np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints)))
-            for record in self.bench.estimation
-        ]
-        return self._of_each_record(lambda i: self._outputs(i, quiet[i]))
+    def _undisturbed(self) -> list[tuple[Floats, int]]:
+        """Readings of each record without a force, and how many steps of integration they take."""
+
+        def of_record(index: int) -> tuple[Floats, int]:
+            record = self.bench.estimation[index]
+            quiet = np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints)))
+            # Band-limited inputs have two pieces in a sample.
+            taken = np.zeros(2 * record.n_samples, dtype=np.intc)
+            return self._outputs(index, quiet, taken=taken), int(np.sum(taken))
+
+        return self._of_each_record(of_record)
+
+    @property
+    def n_steps(self) -> int:
+        """Steps of integration of one replicate: how long it takes, on any machine."""
+        return sum(steps for _, steps in self._undisturbed)
 
     def responses(self, forces: Sequence[Floats]) -> list[Floats]:
         """Return by how much forces at the joints change the readings of each record.
@@ -111,37 +125,53 @@ class Replicates:
         return [n + change for n, change in zip(noise, self._changes(forces, noise), strict=True)]
 
     def _changes(self, forces: Sequence[Floats], noise: Sequence[Floats] | None) -> list[Floats]:
-        quiet = self._undisturbed
+        undisturbed = self._undisturbed
 
         def of_record(index: int) -> Floats:
+            quiet, _ = undisturbed[index]
             found = [
-                self._outputs(index, own, None if noise is None else noise[index][:, :, i]) - quiet[index]
+                self._outputs(index, own, None if noise is None else noise[index][:, :, i]) - quiet
                 for i, own in enumerate(np.moveaxis(forces[index], 2, 0))
             ]
             return np.stack(found, axis=2)
 
         return self._of_each_record(of_record)
 
-    def _of_each_record(self, one: Callable[[int], Floats]) -> list[Floats]:
+    def _of_each_record(self, one: Callable[[int], _Result]) -> list[_Result]:
         return self.bench.threads.results(one, [record.n_samples for record in self.bench.estimation])
 
-    def _outputs(self, index: int, force: Floats, noise: Floats | None = None) -> Floats:
+    def _outputs(
+        self,
+        index: int,
+        force: Floats,
+        noise: Floats | None = None,
+        taken: NDArray[np.intc] | None = None,
+    ) -> Floats:
         """Return the readings of a record under forces, shape (n_samples, n_outputs)."""
         structure, record = self._structure, self.bench.estimation[index]
         joints = [push(joint.name) for joint in self.fit.structure.rig.mechanism.joints]
         signals = {**record.signals, **dict(zip(joints, force.T, strict=True))}
+        held = record_input(structure, replace(record, signals=signals))
         if noise is not None and record.observed:
-            signals |= self._noisy(record, noise)
-        pushed = replace(record, signals=signals)
+            change = self._observed_noise(record, noise)
+            held = replace(held, coefficients=held.coefficients + change.coefficients)
         p = parameter_vector(structure, record_values(structure, self.fit.values, record))
         state = self.fit.initial_states[index]
-        return simulate_outputs(
-            structure, record_input(structure, pushed), p, state, record.n_samples, _ACCURACY
-        )
+        steps = None if taken is None else taken[: held.n_pieces]
+        return simulate_outputs(structure, held, p, state, record.n_samples, _ACCURACY, steps)
 
-    def _noisy(self, record: Record, noise: Floats) -> dict[str, Floats]:
+    def _observed_noise(self, record: Record, noise: Floats) -> HeldInput:
+        """Return what noise of the sensors changes of all inputs: the motion that an observer follows."""
+        structure = self._structure
         names = [signal.name for signal in self.fit.structure.rig.outputs]
-        return {name: record[name] + noise[:, names.index(name)] for name in record.observed}
+        nothing = hold_input(np.zeros(record.n_samples), record.dt, record.hold)
+        observed = [
+            hold_motion(*smoothed_noise(record[name], noise[:, names.index(name)], record.dt), record.dt)
+            if name in record.observed
+            else nothing
+            for name in structure.observed
+        ]
+        return together([*(nothing for _ in structure.rig.mechanism.inputs), *observed])
 
 
 def with_forces(rig: Rig) -> Rig:
@@ -152,7 +182,8 @@ def with_forces(rig: Rig) -> Rig:
     mechanism = rig.mechanism
     names = tuple(push(joint.name) for joint in mechanism.joints)
     joints = tuple(
-        replace(joint, force=joint.force - sp.Symbol(push(joint.name), real=True)) for joint in mechanism.joints
+        replace(joint, force=joint.force - sp.Symbol(push(joint.name), real=True))
+        for joint in mechanism.joints
     )
     return replace(
         rig,
