@@ -1,7 +1,7 @@
 """Which plants does the coverage study draw? A rig with one effect, forces from outside at its joints, and noisy sensors.
 
-The plant is the accurate integrator, at a quarter of the records' sample time and with forces that a bootstrap does not draw: each
-joint has one of its own corner frequency, which is drawn, and it bends between the samples.
+The plant is the accurate integrator, at a quarter of the records' sample time and with forces that a bootstrap does not draw:
+each joint has one with a corner frequency of its own, which bends between the samples.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     python experiments/coverage/run.py --seed 1 --draws 6
 
-Every effect of the catalogue is drawn on a rig of one mass (`axis`; `running_gear` where the effect needs one), and some on a drive
-train. The true model is fitted from perturbed numbers and from the true ones, and the better fit counts. Each draw is a line of
-``draws_SEED.jsonl``; draws that stand there are not done again. ``--table`` prints the table alone.
+Every effect of the catalogue is drawn on a rig of one mass (`axis`; `running_gear` where the effect needs one), and some on a
+drive train. The true model is fitted from perturbed numbers and from the true ones, and the better fit counts. Each draw is a line
+of ``draws_SEED.jsonl``; draws that stand there are not done again. ``--table`` prints the table alone.
 """
 
 from __future__ import annotations
@@ -121,13 +121,16 @@ def within(rows: Iterable[dict[str, Any]], how: str) -> tuple[float, float, int]
 def table(rows: list[dict[str, Any]]) -> str:
     """Return the table as Markdown."""
     lines = [
-        "| effect | draws | numbers | within 2: formula | bootstrap | larger | width: formula | bootstrap | starts that arrived |",
+        "| effect | draws | numbers | within 2: formula | bootstrap | larger | width: formula | bootstrap | arrived |",
         "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     names = list(dict.fromkeys((r["rig"], r["effect"]) for r in rows))
     groups = [
-        (f"{e} ({rig})" if rig != "axis" else e, [r for r in rows if (r["rig"], r["effect"]) == (rig, e)])
-        for rig, e in names
+        (
+            effect if rig == "axis" else f"{effect} ({rig})",
+            [r for r in rows if (r["rig"], r["effect"]) == (rig, effect)],
+        )
+        for rig, effect in names
     ]
     for name, own in [*groups, ("all", rows)]:
         (before, wide, count), (after, wider, _), (larger, _, _) = (

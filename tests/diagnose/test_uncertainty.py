@@ -1,4 +1,4 @@
-"""Error bars of the bootstrap: those of the formula where that holds, wider and true where a force decides when friction lets go."""
+"""Error bars of the bootstrap: those of the formula where that holds, wider and true where a force decides when friction slips."""
 
 from __future__ import annotations
 

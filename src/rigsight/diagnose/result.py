@@ -105,8 +105,8 @@ class Candidate:
     grounds
         What the probability rests on; None for the equations without an effect.
     std_method
-        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (see `uncertainty/bootstrap.py`), else the
-        ``"formula"`` of the fit.
+        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (`uncertainty/bootstrap.py`), else
+        ``"formula"``, that of the fit.
     """
 
     effects: tuple[str, ...]

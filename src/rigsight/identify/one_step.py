@@ -77,8 +77,8 @@ class OneStep:
     def covariance(self, gradients: Floats) -> Floats:
         """Return the mean product of the steps that changes of the records would cause, as a covariance.
 
-        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, and an error
-        bar that left it out would not reach the truth.
+        Steps are taken about the estimate and not about their mean: a mean other than zero is a bias of the estimate, and an
+        error bar that left it out would not reach the truth.
 
         Parameters
         ----------

@@ -190,8 +190,8 @@ def errors_told(diagnosis: Diagnosis) -> str:
             "its remainder shows (parametric bootstrap)."
         )
     return (
-        "Standard errors from the formula of the fit; this model could not be simulated under random forces. They may be too small "
-        "where a force from outside decides when something sticks or lets go."
+        "Standard errors from the formula of the fit; this model could not be simulated under random forces. They may be too "
+        "small where a force from outside decides when something sticks or lets go."
     )
 
 

@@ -84,9 +84,8 @@ def smoothed_noise(
         Shape (n_samples,) each; velocity per second.
     """
     n = noise.size
-    lines = dct(noise, norm="ortho") / (
-        1.0 + _penalty_kept(np.ascontiguousarray(displacement, dtype=np.float64).tobytes()) * _stiffness(n)
-    )
+    weight = _penalty_kept(np.ascontiguousarray(displacement, dtype=np.float64).tobytes())
+    lines = dct(noise, norm="ortho") / (1.0 + weight * _stiffness(n))
     slopes = -lines * np.pi * np.arange(n) / n
     # The sine transform begins with the first frequency, and the last one of it has no cosine.
     return idct(lines, norm="ortho"), idst(np.append(slopes[1:], 0.0), norm="ortho") / dt

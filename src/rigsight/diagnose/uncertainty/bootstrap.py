@@ -7,9 +7,9 @@ step of the fit makes of it.
 
 References
 ----------
-B. Efron and R. J. Tibshirani, *An Introduction to the Bootstrap* (Chapman and Hall 1993), sections 6.5 and 19.3, for the parametric
-bootstrap and the number of draws. A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application* (Cambridge 1997),
-section 2.7, for one step in the place of a new fit.
+B. Efron and R. J. Tibshirani, *An Introduction to the Bootstrap* (Chapman and Hall 1993), sections 6.5 and 19.3, for the
+parametric bootstrap and the number of draws. A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application*
+(Cambridge 1997), section 2.7, for one step in the place of a new fit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ N_REPLICATES = 60
 _FEWEST_REPLICATES = 24
 """Draws along long records: standard errors scatter by 14 percent."""
 _STEPS = 3_500_000
-"""Steps of integration in which more draws than these are simulated: 2 to 3 s. A number of steps, so that draws depend on no clock."""
+"""Steps of integration in which more draws than these are simulated: 2 to 3 s. A number of steps: draws depend on no clock."""
 _MOST_STEPS = 2_000_000
 """Of one draw, from which the formula has to do: half a minute for all. A stiff model takes thousands of steps in a sample."""
 _AT_ONCE = 4_000_000

@@ -1,4 +1,4 @@
-"""Which standard errors stand beside the numbers of the diagnosed simulation? Those of the bootstrap, where it can be simulated."""
+"""Which standard errors stand beside the numbers of the diagnosed simulation? Those of the bootstrap, if it can be done."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Which forces from outside and which sensor noise leave what a model leaves?
 
 What is left is taken for white noise of each sensor and a force at each joint, which is a sum of white noise and of slower forces
-whose spectra fall above a corner. How each of them shows in each sensor is simulated, initial states and numbers following as they
-do in a fit; how large each is follows from the spectra, as they are likeliest. Friction that holds a mass hides a force, so sizes
+whose spectra fall above a corner. How each of them shows in each sensor is simulated, initial states and numbers following as
+they do in a fit; their sizes are those under which the spectra are likeliest. Friction that holds a mass hides a force, so sizes
 are set right once by simulating what was found.
 
 References
@@ -120,7 +120,9 @@ def likeliest_sources(
     for i in long:
         seen = np.any(left[i] != 0.0, axis=0)
         power = _averaged(_power(left[i][:, :, None]))
-        omega = _averaged(2.0 * np.pi * np.fft.rfftfreq(left[i].shape[0], dts[i])[1:])
+        omega = _averaged(
+            np.asarray(2.0 * np.pi * np.fft.rfftfreq(left[i].shape[0], dts[i])[1:], dtype=np.float64)
+        )
         colors = np.column_stack([_color(omega, corner, dts[i]) for corner in corners])
         own = np.zeros((*power.shape, n_outputs + n_joints * corners.size))
         own[:, np.arange(n_outputs), np.arange(n_outputs)] = 1.0
@@ -140,9 +142,10 @@ def _likeliest(power: Floats, gains: Floats) -> Floats:
     Each update lowers the sum of ``log(expected) + power / expected`` and keeps powers positive.
     """
     size = float(np.mean(power))
-    mean = np.mean(gains, axis=0)
+    mean = np.asarray(np.mean(gains, axis=0), dtype=np.float64)
     shows = mean > 0.0
-    found = np.where(shows, size / np.where(shows, mean, 1.0) / max(np.count_nonzero(shows), 1), 0.0)
+    share = size / max(int(np.count_nonzero(shows)), 1)
+    found = np.where(shows, share / np.where(shows, mean, 1.0), 0.0)
     for _ in range(_ROUNDS):
         expected = gains @ found + _NOTHING * size
         wanted, had = gains.T @ (power / expected**2), gains.T @ (1.0 / expected)
