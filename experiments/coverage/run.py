@@ -3,8 +3,8 @@
     python experiments/coverage/run.py --seed 1 --draws 6
 
 Every effect of the catalogue is drawn on a rig of one mass (`axis`; `running_gear` where the effect needs one), and some on a
-drive train. The true model is fitted from perturbed numbers and from the true ones, and the better fit counts. Each draw is a line
-of ``draws_SEED.jsonl``; draws that stand there are not done again. ``--table`` prints the table alone.
+drive train. The true model is fitted from perturbed numbers and from the true ones, and the better fit counts. Each draw is
+a line of ``draws_SEED.jsonl``; draws that stand there are not done again. ``--table`` prints the table alone.
 """
 
 from __future__ import annotations

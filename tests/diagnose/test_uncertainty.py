@@ -1,4 +1,4 @@
-"""Error bars of the bootstrap: those of the formula where that holds, wider and true where a force decides when friction slips."""
+"""Errors of the bootstrap: those of the formula where it holds, wider and true where a force decides when friction slips."""
 
 from __future__ import annotations
 
@@ -151,8 +151,8 @@ def test_sizes_of_forces_and_noise_are_found_again() -> None:
     true = Sources(np.array([0.002]), np.array([[0.0, 1.0]]), corners)
     force = true.forces(20_000, dt, 1, rng)[:, 0]
     left = shown(force) + true.noise(20_000, 1, rng)[:, :, 0]
-    white = shown(rng.standard_normal((20_000, 4)))[:, None]
-    found = likeliest_sources([left], [[white]], [dt], corners)
+    white = rng.standard_normal((20_000, 4))
+    found = likeliest_sources([left], [[(white, shown(white)[:, None])]], [dt], corners)
     assert found.noise_std == pytest.approx(true.noise_std, rel=0.1)
     assert found.force_std[0, 1] == pytest.approx(1.0, rel=0.2)
     assert found.force_std[0, 0] < 0.3

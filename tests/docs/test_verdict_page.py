@@ -52,6 +52,8 @@ STATED = {
     "main_cause.LARGER_PART": (0.5, "the larger part (half)"),
     "main_cause._SURELY": (0.05, "in 19 of 20 resamplings"),
     "plausibility._AS_GOOD": (1.5, "at most 1.5 times as much"),
+    "uncertainty.bootstrap.N_REPLICATES": (60, "up to 60 times"),
+    "uncertainty.bootstrap._MOST_STEPS": (2_000_000, "more than 2 million steps"),
     "second_cause._OTHER_FORM": (0.5, "from half of the gain on"),
     "verdict._HALF": (0.5, "at least half of the re-identified gap closed"),
     "in_catalogue._ODDS_OUTSIDE_ONE": (0.25, "1 : 4 against one effect"),

@@ -28,8 +28,8 @@ from rigsight.errors import SimulationError
 from rigsight.identify import FitResult, OneStep
 
 Floats = NDArray[np.float64]
-_Shown = Callable[[int, float, int], list[Floats]]
-"""What a white force at a joint, of some size, leaves of each record in some draws."""
+_Shown = list[tuple[Floats, Floats]]
+"""A white force along each record and what it leaves, shapes (n_samples, n_draws) and (n_samples, n_outputs, n_draws)."""
 
 N_REPLICATES = 60
 """Draws: standard errors scatter by 1 / sqrt(2 n), 9 percent."""
@@ -42,7 +42,7 @@ _MOST_STEPS = 2_000_000
 _AT_ONCE = 4_000_000
 """Readings that are kept at a time: 32 MB."""
 _UNIT_DRAWS = 4
-"""Draws by which each joint shows: 72 degrees of freedom of each averaged line."""
+"""Draws by which each joint shows: what a force shows beside a linear response is averaged over them."""
 _SETTING_DRAWS = 8
 """Draws by which sizes are set right."""
 _FIRST = 1e-3
@@ -136,27 +136,28 @@ def _sources(
     typical = 1.0 / bench.scales["time"]
     corners = np.array([np.inf, *(slower * typical for slower in SLOWER)])
 
-    def shown(joint: int, size: float, n_draws: int) -> list[Floats]:
-        """Return what white forces of one size at a joint leave."""
+    def shown(joint: int, size: float, n_draws: int) -> _Shown:
+        """Return white forces of one size at a joint and what they leave, by record."""
         forces = [np.zeros((r.n_samples, n_joints, n_draws)) for r in records]
         for own in forces:
             own[:, joint] = size * rng.standard_normal((own.shape[0], n_draws))
-        return step.left(replicates.responses(forces))
+        left = step.left(replicates.responses(forces))
+        return [(force[:, joint], rest) for force, rest in zip(forces, left, strict=True)]
 
     whole = _mean_square(left)
     responses = []
     for joint in range(n_joints):
         size = _size_at(joint, bench, shown, whole)
         if size == 0.0:
-            responses.append([np.zeros((*own.shape, 1)) for own in left])
+            responses.append([(np.ones((own.shape[0], 1)), np.zeros((*own.shape, 1))) for own in left])
         else:
-            responses.append([own / size for own in shown(joint, size, _UNIT_DRAWS)])
+            responses.append(shown(joint, size, _UNIT_DRAWS))
     found = likeliest_sources(left, responses, [r.dt for r in records], corners)
     found = Sources(found.noise_std * noise, found.force_std, corners)
     return found.with_forces_times(_set_right(found, noise, whole, step, replicates, rng))
 
 
-def _size_at(joint: int, bench: Workbench, shown: _Shown, whole: float) -> float:
+def _size_at(joint: int, bench: Workbench, shown: Callable[[int, float, int], _Shown], whole: float) -> float:
     """Return the white force at a joint that would leave about all that is left; 0 where it shows in no sensor.
 
     In small steps of size: friction that holds the mass hides a small force.
@@ -164,7 +165,7 @@ def _size_at(joint: int, bench: Workbench, shown: _Shown, whole: float) -> float
     name = bench.rig.mechanism.joints[joint].name
     size = _FIRST * bench.scales[f"force@{name}"]
     for _ in range(_SIZING_ROUNDS):
-        reached = _mean_square(shown(joint, size, 1))
+        reached = _mean_square([left for _, left in shown(joint, size, 1)])
         if not reached > 0.0:
             return 0.0
         factor = float(np.sqrt(whole / reached))

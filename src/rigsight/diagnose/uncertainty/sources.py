@@ -24,11 +24,12 @@ from scipy.signal.windows import tukey
 
 Floats = NDArray[np.float64]
 
-SLOWER = (1.0, 0.1)
+SLOWER = (1.0, 0.1, 0.01)
 """Corners of forces that are not white, in units of the rig's typical angular frequency: at the resonance a force with the first
-corner is half as strong as below it; the second one is slow against all that the rig does. What lies between is a sum of them."""
+corner is half as strong as below it; the last one is nearly constant in most records. What lies between is a sum of them."""
 _AVERAGED = 9
-"""Lines that are averaged: 18 degrees of freedom, a scatter of a third."""
+"""Lines that are averaged: 18 degrees of freedom, a scatter of a third. The first ones, where a slow force stands, are averaged
+over as many as lie below them."""
 _TAPER = 0.1
 """Share of a record that is faded in and out: 10 percent is usual, so that slow errors do not leak into fast ones."""
 FEWEST = 4 * _AVERAGED
@@ -84,7 +85,7 @@ def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> 
 
 def likeliest_sources(
     left: Sequence[Floats],
-    of_forces: Sequence[Sequence[Floats]],
+    of_forces: Sequence[Sequence[tuple[Floats, Floats]]],
     dts: Sequence[float],
     corners: Floats,
 ) -> Sources:
@@ -96,8 +97,8 @@ def likeliest_sources(
         What a model leaves of each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout where
         it was not measured.
     of_forces
-        What white forces of variance 1 at each joint leave of each record, in the same units, shape (n_samples, n_outputs,
-        n_replicates); outer sequence over joints.
+        White forces at each joint, shape (n_samples, n_replicates), and what they leave of each record in the same units, shape
+        (n_samples, n_outputs, n_replicates); outer sequence over joints.
     dts
         Sample time of each record [s].
     corners
@@ -116,30 +117,37 @@ def likeliest_sources(
     if not long:
         raise ValueError("No record is long enough for a spectrum.")
     n_outputs, n_joints = left[0].shape[1], len(of_forces)
-    powers, gains = [], []
+    powers, gains, weights = [], [], []
     for i in long:
         seen = np.any(left[i] != 0.0, axis=0)
-        power = _averaged(_power(left[i][:, :, None]))
-        omega = _averaged(
-            np.asarray(2.0 * np.pi * np.fft.rfftfreq(left[i].shape[0], dts[i])[1:], dtype=np.float64)
-        )
+        power = _power(left[i][:, :, None])
+        omega = 2.0 * np.pi * np.arange(power.shape[0]) / (left[i].shape[0] * dts[i])
         colors = np.column_stack([_color(omega, corner, dts[i]) for corner in corners])
         own = np.zeros((*power.shape, n_outputs + n_joints * corners.size))
         own[:, np.arange(n_outputs), np.arange(n_outputs)] = 1.0
         for joint in range(n_joints):
-            response = _averaged(_power(of_forces[joint][i]))
+            force, response = of_forces[joint][i]
+            # The power that was drawn and not the expected one: a linear response then has no scatter.
+            gain = _power(response) / _power(force[:, None, :])
             columns = slice(n_outputs + joint * corners.size, n_outputs + (joint + 1) * corners.size)
-            own[:, :, columns] = response[:, :, None] * colors[:, None, :]
-        powers.append(power[:, seen].ravel())
-        gains.append(own[:, seen].reshape(-1, own.shape[2]))
-    found = np.sqrt(_likeliest(np.concatenate(powers), np.concatenate(gains)))
+            own[:, :, columns] = gain[:, :, None] * colors[:, None, :]
+        starts = _starts(power.shape[0])
+        counts = np.diff([*starts, power.shape[0]]).astype(np.float64)
+        powers.append((np.add.reduceat(power[:, seen], starts) / counts[:, None]).ravel())
+        gains.append(
+            (np.add.reduceat(own[:, seen], starts) / counts[:, None, None]).reshape(-1, own.shape[2])
+        )
+        # The mean has one degree of freedom, any other line two.
+        counts[0] -= 0.5
+        weights.append(np.repeat(counts, np.count_nonzero(seen)))
+    found = np.sqrt(_likeliest(np.concatenate(powers), np.concatenate(gains), np.concatenate(weights)))
     return Sources(found[:n_outputs], found[n_outputs:].reshape(n_joints, corners.size), corners)
 
 
-def _likeliest(power: Floats, gains: Floats) -> Floats:
+def _likeliest(power: Floats, gains: Floats, weights: Floats) -> Floats:
     """Return the powers of sources, shape (n_sources,), under which averaged lines, shape (n,), are likeliest.
 
-    Each update lowers the sum of ``log(expected) + power / expected`` and keeps powers positive.
+    Each update lowers the weighted sum of ``log(expected) + power / expected`` and keeps powers positive.
     """
     size = float(np.mean(power))
     mean = np.asarray(np.mean(gains, axis=0), dtype=np.float64)
@@ -148,23 +156,26 @@ def _likeliest(power: Floats, gains: Floats) -> Floats:
     found = np.where(shows, share / np.where(shows, mean, 1.0), 0.0)
     for _ in range(_ROUNDS):
         expected = gains @ found + _NOTHING * size
-        wanted, had = gains.T @ (power / expected**2), gains.T @ (1.0 / expected)
+        wanted, had = gains.T @ (weights * power / expected**2), gains.T @ (weights / expected)
         found = np.where(shows, found * np.sqrt(wanted / np.where(had > 0.0, had, 1.0)), 0.0)
     return np.asarray(found)
 
 
 def _power(columns: Floats) -> Floats:
-    """Return the power of each line but the mean over replicates, shape (n_lines, n_outputs); white noise has its variance."""
+    """Return the power of each line, averaged over replicates, shape (n_lines, n_outputs); white noise has its variance."""
     n = columns.shape[0]
     window = tukey(n, _TAPER)
-    lines = np.abs(np.fft.rfft(columns * window[:, None, None], axis=0)[1:]) ** 2 / np.sum(window**2)
+    lines = np.abs(np.fft.rfft(columns * window[:, None, None], axis=0)) ** 2 / np.sum(window**2)
     return np.asarray(np.mean(lines, axis=2))
 
 
-def _averaged(lines: Floats) -> Floats:
-    """Return the means of adjacent lines; those that make no whole group at the end are left out."""
-    count = lines.shape[0] // _AVERAGED
-    return np.asarray(np.mean(lines[: count * _AVERAGED].reshape(count, _AVERAGED, *lines.shape[1:]), axis=1))
+def _starts(n_lines: int) -> list[int]:
+    """Return where groups of adjacent lines begin, each as long as what lies below it up to a limit."""
+    starts, edge = [0], 1
+    while edge < n_lines:
+        starts.append(edge)
+        edge += min(edge, _AVERAGED)
+    return starts
 
 
 def _color(omega: Floats, corner: float, dt: float) -> Floats:
