@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from rigsight.diagnose.candidates.basins import in_lowest_basins
 from rigsight.diagnose.candidates.first_look import (
     LOOK_ACCURACY,
     Look,
@@ -104,7 +105,8 @@ def fit_candidates(
         return scored
 
     models = list(bench.threads.side_by_side(one, looks))
-    refined = with_a_mean_that_is_needed(bench, refine(bench, [*known, *models]))
+    refined = in_lowest_basins(bench, refine(bench, [*known, *models]))
+    refined = with_a_mean_that_is_needed(bench, refined)
     late = {m.effects[0].at for m in refined if m.effects[0].measured_late is not None and not _shift(m)}
     return [model for model in refined if not (_shift(model) > 0.0 and model.effects[0].at in late)]
 
