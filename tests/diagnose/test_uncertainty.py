@@ -49,8 +49,9 @@ def test_it_is_the_formula_on_a_linear_rig_with_white_noise() -> None:
     found = uncertainty_of(bench, fit, np.random.default_rng(0), 200)
     assert found.method == "bootstrap"
     ratios = [found.std[name] / fit.standard_errors[name] for name in fit.free]
-    # 200 draws scatter by 5 %, the formula's smoothed spectrum by some more.
-    assert ratios == pytest.approx([1.0] * len(ratios), abs=0.25)
+    # 200 draws scatter by 5 %. Sizes of forces are not negative, so that by chance a little is found where there is none.
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.15)
+    assert 0.8 < min(ratios) < max(ratios) < 1.4
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([found.std[name] for name in fit.free])
 
 
@@ -108,33 +109,34 @@ def test_what_the_records_do_not_determine_stays_undetermined() -> None:
     assert all(np.isfinite(found.std[name]) for name in fit.free[1:])
 
 
-def test_an_observer_has_errors_of_the_size_that_fits_scatter_by() -> None:
-    """A cart without a spring: what an observer leaves depends on its bandwidth, and so do the errors."""
-    values, errors = [], []
-    for seed in range(8):
-        bench, fit = _followed(AXIS, seed)
+@pytest.mark.parametrize(("noise", "force"), [(1e-3, 0.0), (1e-5, 0.02)])
+def test_an_observer_has_errors_of_the_size_that_fits_scatter_by(noise: float, force: float) -> None:
+    """A cart without a spring: an observer follows noise too, and its own errors die away."""
+    off, errors = [], []
+    for seed in range(10):
+        bench, fit = _followed(AXIS, noise, force, seed)
         found = uncertainty_of(bench, fit, np.random.default_rng(0))
         assert found.method == "bootstrap"
-        values.append(fit.values["m"])
+        off.append(fit.values["m"] - 1.0)
         errors.append(found.std["m"])
-    # Eight draws tell their spread to a quarter.
-    assert 0.5 < np.median(errors) / np.std(values, ddof=1) < 2.0
+    # Ten draws tell their spread to a quarter.
+    assert 0.6 < np.median(errors) / np.sqrt(np.mean(np.square(off))) < 1.7
 
 
-def _followed(rig: Rig, seed: int) -> tuple[Workbench, FitResult]:
+def _followed(rig: Rig, noise: float, force: float, seed: int) -> tuple[Workbench, FitResult]:
     rng, t = np.random.default_rng(seed), DT * np.arange(N)
     own = {**VALUES, "k": 0.0}
     records = []
     for _ in range(2):
         u = sum(0.3 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.4, 4.0, 0.3))
         asked = Record("run", DT, {"u": np.asarray(u)}, {}, hold="foh")
-        pushed = asked.with_signals(u=u + 0.02 * colored((N,), np.inf, rng))
-        x = simulate(compose(rig), own, pushed)["x"] + rng.normal(scale=1e-5, size=N)
+        pushed = asked.with_signals(u=u + force * colored((N,), np.inf, rng))
+        x = simulate(compose(rig), own, pushed)["x"] + rng.normal(scale=noise, size=N)
         records.append(replace(asked.with_signals(x=x), observed={"x": 5.0}))
     runs = tuple(records)
     scales = characteristic_scales(rig, runs, own)
     held = frozenset({"k", "x_off", "force_off"})
-    bench = Workbench(rig, runs, runs, runs, scales, {"x": 1e-5}, held, own)
+    bench = Workbench(rig, runs, runs, runs, scales, {"x": noise}, held, own)
     structure = bench.composed()
     return bench, bench.problem(structure, runs).fit(own, ["m", "d"])
 
@@ -152,7 +154,9 @@ def test_sizes_of_forces_and_noise_are_found_again() -> None:
     force = true.forces(20_000, dt, 1, rng)[:, 0]
     left = shown(force) + true.noise(20_000, 1, rng)[:, :, 0]
     white = rng.standard_normal((20_000, 4))
-    found = likeliest_sources([left], [[(white, shown(white)[:, None])]], [dt], corners)
+    found = likeliest_sources(
+        [left], [[(white, white[:, None])]], [[(white, shown(white)[:, None])]], [dt], corners
+    )
     assert found.noise_std == pytest.approx(true.noise_std, rel=0.1)
     assert found.force_std[0, 1] == pytest.approx(1.0, rel=0.2)
     assert found.force_std[0, 0] < 0.3

@@ -144,6 +144,14 @@ def _sources(
         left = step.left(replicates.responses(forces))
         return [(force[:, joint], rest) for force, rest in zip(forces, left, strict=True)]
 
+    def heard(sensor: int) -> _Shown:
+        """Return white noise of a sensor, in units of its size, and what it leaves, by record."""
+        unit = [np.zeros((r.n_samples, noise.size, _UNIT_DRAWS)) for r in records]
+        for own in unit:
+            own[:, sensor] = rng.standard_normal((own.shape[0], _UNIT_DRAWS))
+        rests = step.left(replicates.with_noise([own * noise[:, None] for own in unit]))
+        return [(own[:, sensor], rest) for own, rest in zip(unit, rests, strict=True)]
+
     whole = _mean_square(left)
     responses = []
     for joint in range(n_joints):
@@ -152,9 +160,11 @@ def _sources(
             responses.append([(np.ones((own.shape[0], 1)), np.zeros((*own.shape, 1))) for own in left])
         else:
             responses.append(shown(joint, size, _UNIT_DRAWS))
-    found = likeliest_sources(left, responses, [r.dt for r in records], corners)
+    found = likeliest_sources(
+        left, [heard(i) for i in range(noise.size)], responses, [r.dt for r in records], corners
+    )
     found = Sources(found.noise_std * noise, found.force_std, corners)
-    return found.with_forces_times(_set_right(found, noise, whole, step, replicates, rng))
+    return found.with_forces_times(_set_right(found, whole, step, replicates, rng))
 
 
 def _size_at(joint: int, bench: Workbench, shown: Callable[[int, float, int], _Shown], whole: float) -> float:
@@ -177,7 +187,6 @@ def _size_at(joint: int, bench: Workbench, shown: Callable[[int, float, int], _S
 
 def _set_right(
     found: Sources,
-    noise: Floats,
     whole: float,
     step: OneStep,
     replicates: Replicates,
@@ -185,7 +194,8 @@ def _set_right(
 ) -> float:
     """Return the factor of the forces with which draws leave as much as the model does."""
     drawn = _mean_square(step.left(replicates.drawn(found, _SETTING_DRAWS, rng)))
-    own = float(np.mean((found.noise_std / noise) ** 2))
+    heard = [found.noise(r.n_samples, _SETTING_DRAWS, rng) for r in replicates.bench.estimation]
+    own = _mean_square(step.left(replicates.with_noise(heard)))
     wanted, reached = whole - own, drawn - own
     if min(wanted, reached) <= _SHOWS * whole:
         return 1.0

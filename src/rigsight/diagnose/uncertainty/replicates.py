@@ -81,7 +81,7 @@ class Replicates:
         return sum(steps for _, steps in self._undisturbed)
 
     def responses(self, forces: Sequence[Floats]) -> list[Floats]:
-        """Return by how much forces at the joints change the readings of each record.
+        """Return by how much forces at the joints change what is left of each record.
 
         Parameters
         ----------
@@ -97,10 +97,24 @@ class Replicates:
         SimulationError
             If the model cannot be simulated under them.
         """
-        return self._changes(forces, None)
+        return self._of_each_record(lambda i: self._response(i, forces[i], None))
+
+    def with_noise(self, noise: Sequence[Floats]) -> list[Floats]:
+        """Return by how much noise of the sensors changes what is left of each record: itself, less what an observer makes of it.
+
+        Parameters
+        ----------
+        noise
+            Samples of each record, shape (n_samples, n_outputs, n_replicates).
+
+        Returns
+        -------
+        As of `responses`, which tells the errors too.
+        """
+        return self._of_each_record(lambda i: self._changed(i, None, noise[i]))
 
     def drawn(self, sources: Sources, n_replicates: int, rng: np.random.Generator) -> list[Floats]:
-        """Return changes of the readings of each record as forces and sensors of these sizes make them.
+        """Return changes of what is left of each record as forces and sensors of these sizes make them.
 
         Parameters
         ----------
@@ -122,20 +136,25 @@ class Replicates:
         """
         forces = [sources.forces(r.n_samples, r.dt, n_replicates, rng) for r in self.bench.estimation]
         noise = [sources.noise(r.n_samples, n_replicates, rng) for r in self.bench.estimation]
-        return [n + change for n, change in zip(noise, self._changes(forces, noise), strict=True)]
+        return self._of_each_record(lambda i: self._changed(i, forces[i], noise[i]))
 
-    def _changes(self, forces: Sequence[Floats], noise: Sequence[Floats] | None) -> list[Floats]:
-        undisturbed = self._undisturbed
+    def _changed(self, index: int, force: Floats | None, noise: Floats) -> Floats:
+        record = self.bench.estimation[index]
+        if force is None:
+            if not record.observed:
+                return noise
+            force = np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints), noise.shape[2]))
+        # What is left is the reading less its prediction. A force moves the reading; an observer's prediction follows the noise.
+        sign = -1.0 if record.observed else 1.0
+        return noise + sign * self._response(index, force, noise)
 
-        def of_record(index: int) -> Floats:
-            quiet, _ = undisturbed[index]
-            found = [
-                self._outputs(index, own, None if noise is None else noise[index][:, :, i]) - quiet
-                for i, own in enumerate(np.moveaxis(forces[index], 2, 0))
-            ]
-            return np.stack(found, axis=2)
-
-        return self._of_each_record(of_record)
+    def _response(self, index: int, force: Floats, noise: Floats | None) -> Floats:
+        quiet, _ = self._undisturbed[index]
+        found = [
+            self._outputs(index, own, None if noise is None else noise[:, :, i]) - quiet
+            for i, own in enumerate(np.moveaxis(force, 2, 0))
+        ]
+        return np.stack(found, axis=2)
 
     def _of_each_record(self, one: Callable[[int], _Result]) -> list[_Result]:
         return self.bench.threads.results(one, [record.n_samples for record in self.bench.estimation])

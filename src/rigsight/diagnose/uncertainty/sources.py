@@ -85,6 +85,7 @@ def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> 
 
 def likeliest_sources(
     left: Sequence[Floats],
+    of_noise: Sequence[Sequence[tuple[Floats, Floats]]],
     of_forces: Sequence[Sequence[tuple[Floats, Floats]]],
     dts: Sequence[float],
     corners: Floats,
@@ -96,6 +97,9 @@ def likeliest_sources(
     left
         What a model leaves of each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout where
         it was not measured.
+    of_noise
+        White noise of each sensor, shape (n_samples, n_replicates), and what it leaves of each record, shape (n_samples,
+        n_outputs, n_replicates), both in units of the noise; outer sequence over sensors.
     of_forces
         White forces at each joint, shape (n_samples, n_replicates), and what they leave of each record in the same units, shape
         (n_samples, n_outputs, n_replicates); outer sequence over joints.
@@ -124,11 +128,10 @@ def likeliest_sources(
         omega = 2.0 * np.pi * np.arange(power.shape[0]) / (left[i].shape[0] * dts[i])
         colors = np.column_stack([_color(omega, corner, dts[i]) for corner in corners])
         own = np.zeros((*power.shape, n_outputs + n_joints * corners.size))
-        own[:, np.arange(n_outputs), np.arange(n_outputs)] = 1.0
+        for sensor in range(n_outputs):
+            own[:, :, sensor] = _gain(*of_noise[sensor][i])
         for joint in range(n_joints):
-            force, response = of_forces[joint][i]
-            # The power that was drawn and not the expected one: a linear response then has no scatter.
-            gain = _power(response) / _power(force[:, None, :])
+            gain = _gain(*of_forces[joint][i])
             columns = slice(n_outputs + joint * corners.size, n_outputs + (joint + 1) * corners.size)
             own[:, :, columns] = gain[:, :, None] * colors[:, None, :]
         starts = _starts(power.shape[0])
@@ -167,6 +170,11 @@ def _power(columns: Floats) -> Floats:
     window = tukey(n, _TAPER)
     lines = np.abs(np.fft.rfft(columns * window[:, None, None], axis=0)) ** 2 / np.sum(window**2)
     return np.asarray(np.mean(lines, axis=2))
+
+
+def _gain(drawn: Floats, left: Floats) -> Floats:
+    """Return the power of each line over that which was drawn and not the expected one: a linear response then has no scatter."""
+    return np.asarray(_power(left) / _power(drawn[:, None, :]))
 
 
 def _starts(n_lines: int) -> list[int]:
