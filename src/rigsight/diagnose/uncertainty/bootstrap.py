@@ -129,7 +129,8 @@ def _sources(
 ) -> Sources:
     """Return the forces and the noise that leave what the model leaves."""
     names = [signal.name for signal in fit.structure.rig.outputs]
-    noise = np.array([bench.noise[name] for name in names])
+    # What no record holds has no floor; its residuals are left out.
+    noise = np.array([bench.noise.get(name, 1.0) for name in names])
     records = bench.estimation
     left = [np.nan_to_num(own) / noise for own in fit.residuals]
     n_joints = len(fit.structure.rig.mechanism.joints)
