@@ -53,6 +53,21 @@ TOLERANCES = {
     "_MAX_HANKEL_ROWS": "memory",
     "SCHEMA_VERSION": "no number of a diagnosis",
     "_STEEPEST": "resolution of a bootstrap",
+    "_SEED": "of starts",
+    "_STREAM": "of random numbers",
+    "_AT_ONCE": "memory",
+    "_UNIT_DRAWS": "draws of a bootstrap",
+    "_SETTING_DRAWS": "draws of a bootstrap",
+    "_FIRST": "start of a search",
+    "_SIZING_ROUNDS": "of a search",
+    "_MOST_GROWN": "bounds of a search",
+    "_MOST_CHANGED": "bounds of a search",
+    "_SHOWS": "what chance alone would tell",
+    "_ROUNDS": "of an optimizer",
+    "_NOTHING": "bounds of a search",
+    "_AVERAGED": "lines of a spectrum that are averaged",
+    "FEWEST": "lines that a spectrum needs",
+    "SLOWER": "discretization",
 }
 
 

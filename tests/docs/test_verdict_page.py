@@ -61,6 +61,12 @@ STATED = (
     ("trust.correlated", 0.99, "correlation above 0.99"),
     ("trust.window_periods", 2.0, "two at least"),
     ("trust.periods_alone", 15.0, "fifteen where parts"),
+    ("verdict.exact", 1.03, "more than 1.03 floors"),
+    ("search.basin_models", 3, "the three nearest"),
+    ("search.basin_starts", 6, "from six places"),
+    ("search.basin_spread", 0.3, "some 30 % off"),
+    ("search.replicates", 60, "up to 60 times"),
+    ("search.most_replicate_steps", 2_000_000, "more than 2 million steps"),
     ("notes.advised_amplitudes", (0.3, 1.0, 1.5), "0.3, 1 and 1.5 times the largest input"),
 )
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from rigsight.simulate.prescribed_motion import smooth_motion
+from rigsight.simulate.prescribed_motion import _penalty, smooth_motion, smoothed_noise
 
 DT = 0.01
 
@@ -57,3 +57,14 @@ def test_the_ends_of_a_motion_are_known_nearly_as_well_as_its_middle(frequency: 
         ends = np.concatenate([error[:3], error[-3:]])
         ratios.append(float(np.sqrt(np.mean(ends**2)) / np.std(error[100:-100])))
     assert np.median(ratios) < 3.0
+
+
+def test_noise_moves_a_spline_as_another_spline_of_that_smoothness_says() -> None:
+    rng, dt, n = np.random.default_rng(3), 0.01, 2000
+    motion = np.sin(5.0 * dt * np.arange(n)) + 1e-3 * rng.standard_normal(n)
+    noise = 1e-5 * rng.standard_normal(n)
+    spline = make_smoothing_spline(np.arange(float(n)), noise, lam=_penalty(motion / np.std(motion)))
+    index, inside = np.arange(float(n)), slice(100, -100)
+    expected = spline(index), spline.derivative()(index) / dt
+    for told, change in zip(smoothed_noise(motion, noise, dt), expected, strict=True):
+        assert np.std((told - change)[inside]) < 0.05 * np.std(change[inside])

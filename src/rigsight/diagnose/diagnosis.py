@@ -27,6 +27,7 @@ from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.trust.trust import trust
+from rigsight.diagnose.uncertainty.of_verdict import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import remainder_of
@@ -131,6 +132,9 @@ def diagnose(
     say("trust in the numbers")
     diagnosis = replace(diagnosis, data_quality=found.quality, trust=_trust(task, found))
     if found.judgement.verdict != "unknown":
+        named = found.judgement.model if diagnosis.effects else found.reidentified
+        diagnosis = with_own_errors(diagnosis, found.context, named, seed)
+        say("standard errors")
         return diagnosis
     forces = forces_at_joints(found.context, found.reidentified)
     if forces:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import Remainder
 from rigsight.discover import JointForce, MissingForce
 from rigsight.effects import kind_of
+
+StdMethod = Literal["bootstrap", "formula"]
 
 SCHEMA_VERSION = 1
 
@@ -87,6 +89,9 @@ class Candidate:
         Whether the fit converged, and the optimizer's words.
     grounds
         What the probability rests on; None for the equations without an effect.
+    std_method
+        Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (`uncertainty/bootstrap.py`), else
+        ``"formula"``, that of the fit.
     """
 
     effects: tuple[str, ...]
@@ -99,6 +104,7 @@ class Candidate:
     success: bool
     message: str
     grounds: Grounds | None = None
+    std_method: StdMethod = "formula"
 
 
 @dataclass(frozen=True)
@@ -274,6 +280,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
             name: {"value": _number(e.value), "std": _number(e.std), "unit": e.unit}
             for name, e in candidate.parameters.items()
         },
+        "std_method": candidate.std_method,
         "n_fitted": len(candidate.parameters),
         "ranking_share": None if candidate.grounds is None else candidate.grounds.share,
         "held_out_share": None if candidate.grounds is None else candidate.grounds.held_out,

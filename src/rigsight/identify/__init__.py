@@ -30,6 +30,7 @@ from rigsight.identify.joint import JointFit as JointFit
 from rigsight.identify.joint import KindFit as KindFit
 from rigsight.identify.joint import RecordResidual as RecordResidual
 from rigsight.identify.joint import fit_jointly as fit_jointly
+from rigsight.identify.one_step import OneStep as OneStep
 from rigsight.identify.record_offsets import OFFSETS_MEND as OFFSETS_MEND
 from rigsight.identify.record_offsets import DifferingMeans as DifferingMeans
 from rigsight.identify.record_offsets import differing_means as differing_means
@@ -69,6 +70,7 @@ __all__ = [
     "JointFit",
     "KindFit",
     "LoopArea",
+    "OneStep",
     "OpenFactor",
     "PhysicalEstimates",
     "RecordDerivatives",

@@ -98,7 +98,7 @@ def answers_to_states(fit: GreyBoxFit, result: FitResult) -> list[Floats]:
     -------
     Shape (n_readings, n_states + n_offsets) each, per unit of a coordinate of the search.
     """
-    return [answers for _, answers in _sensitivities(*_place(fit, result, result.values, ()))]
+    return [answers for _, answers in central_sensitivities(*place_of_fit(fit, result, result.values, ()))]
 
 
 class _Model:
@@ -106,10 +106,10 @@ class _Model:
 
     def __init__(self, fit: GreyBoxFit, result: FitResult, names: Sequence[str]) -> None:
         self._fit, self._result = fit, result
-        problem, theta = _place(fit, result, result.values, names)
+        problem, theta = place_of_fit(fit, result, result.values, names)
         n, slopes = len(names), problem.coordinates.jacobian(theta[: len(names)])
         self._residuals, self._followed, self.rows = [], [], []
-        for residual, derivative in _sensitivities(problem, theta):
+        for residual, derivative in central_sensitivities(problem, theta):
             states = derivative[:, n:]
             length = np.linalg.norm(states, axis=0)
             basis = orth(states[:, length > 0.0] / length[length > 0.0], rcond=_FOLLOWED)
@@ -120,7 +120,7 @@ class _Model:
 
     def change(self, values: Mapping[str, float]) -> float:
         """Return the length of the change of all weighted outputs when parameters take other values."""
-        problem, theta = _place(self._fit, self._result, values, ())
+        problem, theta = place_of_fit(self._fit, self._result, values, ())
         total = 0.0
         for (moved, _), residual, basis in zip(
             problem.sensitivities(theta), self._residuals, self._followed, strict=True
@@ -130,7 +130,7 @@ class _Model:
         return float(np.sqrt(total))
 
 
-def _place(
+def place_of_fit(
     fit: GreyBoxFit, result: FitResult, values: Mapping[str, float], free: Sequence[str]
 ) -> tuple[Problem, Floats]:
     """Return the problem and the coordinates of parameter values, with the initial states and steps of a result."""
@@ -143,7 +143,7 @@ def _place(
     return problem, theta
 
 
-def _sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:
+def central_sensitivities(problem: Problem, theta: Floats) -> list[tuple[Floats, Floats]]:
     """Return residuals and derivatives per record; where they are differences, central ones.
 
     One-sided differences err by their step times the curvature: where nothing moves, that looks like information.

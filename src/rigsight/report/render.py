@@ -101,6 +101,7 @@ def render_report(
             outputs=[sections.output_label(diagnosis, output) for output in diagnosis.gap],
             parameters=sections.parameter_rows(diagnosis, known),
             trust=trust_view(diagnosis),
+            errors_told=sections.errors_told(diagnosis),
             equations=equation_groups(diagnosis, known),
             amplitude_figures=amplitude_figures(diagnosis, responses),
             loops=loop_figures(diagnosis),

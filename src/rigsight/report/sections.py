@@ -183,6 +183,22 @@ def parameter_rows(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> list[
     ]
 
 
+def errors_told(diagnosis: Diagnosis) -> str:
+    """Return in a sentence where the standard errors of the numbers come from; empty where no number was fitted."""
+    candidate = named_candidate(diagnosis)
+    if candidate is None or not candidate.parameters or diagnosis.verdict not in ("effect", "parameters"):
+        return ""
+    if candidate.std_method == "bootstrap":
+        return (
+            "Standard errors from simulations of this model under random forces from outside and sensor noise, of the size that "
+            "its remainder shows (parametric bootstrap)."
+        )
+    return (
+        "Standard errors from the formula of the fit; this model could not be simulated under random forces. They may be too "
+        "small where a force from outside decides when something sticks or lets go."
+    )
+
+
 def _parameter_row(name: str, estimate: Estimate, parameter: Parameter | None) -> ParameterRow:
     remark = "" if math.isfinite(estimate.std) else UNDETERMINED
     description = parameter.description if parameter else ""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from functools import lru_cache
 from hashlib import sha256
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
+from scipy.fft import dct, idct, idst
 from scipy.interpolate import make_smoothing_spline
 from scipy.optimize import minimize_scalar
 
@@ -61,6 +62,41 @@ def smooth_motion(
     return values, slopes / dt
 
 
+def smoothed_noise(
+    displacement: NDArray[np.float64], noise: NDArray[np.float64], dt: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return by how much noise beside a measured displacement moves its smoothing spline, as smoothed as without the noise.
+
+    In cosines, of which each is smoothed by itself; a hundred times as quick as another spline, and the same but for the ends.
+
+    Parameters
+    ----------
+    displacement
+        Shape (n_samples,).
+    noise
+        Small beside what the displacement has of the same kind, shape (n_samples,).
+    dt
+        Sample time [s].
+
+    Returns
+    -------
+    displacement, velocity
+        Shape (n_samples,) each; velocity per second.
+    """
+    n = noise.size
+    weight = _penalty_kept(np.ascontiguousarray(displacement, dtype=np.float64).tobytes())
+    lines = dct(noise, norm="ortho") / (1.0 + weight * _stiffness(n))
+    slopes = -lines * np.pi * np.arange(n) / n
+    # The sine transform begins with the first frequency, and the last one of it has no cosine.
+    return idct(lines, norm="ortho"), idst(np.append(slopes[1:], 0.0), norm="ortho") / dt
+
+
+@lru_cache(maxsize=64)
+def _penalty_kept(content: bytes) -> float:
+    samples = np.frombuffer(content, dtype=np.float64)
+    return _penalty(continued(samples / (float(np.std(samples)) or 1.0), _BEYOND))
+
+
 def _spline(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     scale = float(np.std(samples)) or 1.0
     # A smoothing spline is straight at its ends, and no motion is: they lie beyond those of the record.
@@ -78,8 +114,7 @@ def _penalty(samples: NDArray[np.float64]) -> float:
     On equally spaced samples a cosine transform makes the smoothing spline diagonal (but for its ends), so that each trial costs
     one sum; scipy's own choice takes seconds per record. The eigenvalues are those of the cubic spline.
     """
-    phase = np.pi * np.arange(samples.size) / samples.size
-    stiffness = (2.0 - 2.0 * np.cos(phase)) ** 2 * 3.0 / (2.0 + np.cos(phase))
+    stiffness = _stiffness(samples.size)
     power = dct(samples - _end_slopes(samples), norm="ortho") ** 2
 
     def score(logarithm: float) -> float:
@@ -90,6 +125,12 @@ def _penalty(samples: NDArray[np.float64]) -> float:
     best = int(np.argmin([score(trial) for trial in trials]))
     around = trials[max(best - 1, 0)], trials[min(best + 1, _TRIALS - 1)]
     return float(np.exp(minimize_scalar(score, bounds=around, method="bounded").x))
+
+
+def _stiffness(n: int) -> NDArray[np.float64]:
+    """Return the squared curvature of each cosine of a cubic spline with unit power, shape (n,)."""
+    phase = np.pi * np.arange(n) / n
+    return np.asarray((2.0 - 2.0 * np.cos(phase)) ** 2 * 3.0 / (2.0 + np.cos(phase)))
 
 
 def _end_slopes(samples: NDArray[np.float64]) -> NDArray[np.float64]:

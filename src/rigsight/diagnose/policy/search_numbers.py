@@ -373,3 +373,55 @@ class SearchNumbers:
         "budget",
         "Evaluations of a fit with another hold or shift.",
     )
+    basin_models: int = number(
+        3,
+        "budget",
+        (
+            "Nearest models that are also fitted from elsewhere; a farther one is named only if these "
+            "are lost."
+        ),
+    )
+    basin_starts: int = number(
+        6,
+        "budget",
+        ("Starts of each."),
+    )
+    basin_spread: float = number(
+        0.3,
+        "measured",
+        ("Standard deviation of the logarithms of an effect's numbers at these starts."),
+        set_by="two rigs of the coverage study, seed 1: half of such starts led to the right basin",
+    )
+    basin_evaluations: int = number(
+        15,
+        "budget",
+        ("Evaluations from such a start."),
+    )
+    basin_finish_evaluations: int = number(
+        60,
+        "budget",
+        ("Evaluations of the fit in a lower basin."),
+    )
+    replicates: int = number(
+        60,
+        "budget",
+        ("Draws of a bootstrap: standard errors scatter by 1 / sqrt(2 n), 9 percent."),
+    )
+    fewest_replicates: int = number(
+        24,
+        "budget",
+        ("Draws along long records: standard errors scatter by 14 percent."),
+    )
+    replicate_steps: int = number(
+        3_500_000,
+        "budget",
+        (
+            "Steps of integration in which more draws than these are simulated: 2 to 3 s. A number of "
+            "steps: draws depend on no clock."
+        ),
+    )
+    most_replicate_steps: int = number(
+        2_000_000,
+        "budget",
+        ("Steps of one draw from which the formula has to do: a stiff model takes thousands in a sample."),
+    )

@@ -13,6 +13,7 @@ import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.diagnose.search.first_look import (
     LOOK_ACCURACY,
     FirstLook,
@@ -82,7 +83,8 @@ def fit_candidates(
         return scored
 
     models = list(context.threads.side_by_side(one, looks))
-    refined = with_a_mean_that_is_needed(context, refine(context, [*known, *models]))
+    refined = in_lowest_basins(context, refine(context, [*known, *models]))
+    refined = with_a_mean_that_is_needed(context, refined)
     late = {m.effects[0].at for m in refined if m.effects[0].measured_late is not None and not _shift(m)}
     return [model for model in refined if not (_shift(model) > 0.0 and model.effects[0].at in late)]
 

@@ -1,0 +1,212 @@
+"""Standard errors by a parametric bootstrap: the fitted model is simulated with forces from outside and noise of its sensors.
+
+The formula takes what is left for noise of a certain spectrum beside the readings. A force from outside is more than that where
+it decides when friction lets a mass go, when play is crossed or a stop is met: it moves the very events from which the numbers
+were read. So many draws of what disturbs the rig are put through the model with its effects, and each is what one Gauss-Newton
+step of the fit makes of it.
+
+References
+----------
+B. Efron and R. J. Tibshirani, *An Introduction to the Bootstrap* (Chapman and Hall 1993), sections 6.5 and 19.3, for the
+parametric bootstrap and the number of draws. A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application*
+(Cambridge 1997), section 2.7, for one step in the place of a new fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.policy import SEARCH
+from rigsight.diagnose.result import StdMethod
+from rigsight.diagnose.uncertainty.replicates import Replicates
+from rigsight.diagnose.uncertainty.sources import FEWEST, SLOWER, Sources, likeliest_sources
+from rigsight.errors import SimulationError
+from rigsight.identify import FitResult, OneStep
+
+Floats = NDArray[np.float64]
+_Shown = list[tuple[Floats, Floats]]
+"""A white force along each record and what it leaves, shapes (n_samples, n_draws) and (n_samples, n_outputs, n_draws)."""
+
+_AT_ONCE = 4_000_000
+"""Readings that are kept at a time: 32 MB."""
+_UNIT_DRAWS = 4
+"""Draws by which each joint shows: what a force shows beside a linear response is averaged over them."""
+_SETTING_DRAWS = 8
+"""Draws by which sizes are set right."""
+_FIRST = 1e-3
+"""Part of what is left that a force of the first size shows, which tells which size would leave all of it."""
+_SIZING_ROUNDS, _MOST_GROWN = 4, 100.0
+"""In how many steps, of which factor at most, a first size grows: a tenth of a billionth of what is left can be reached."""
+_MOST_CHANGED = 10.0
+"""Factor by which sizes of forces are set right at most."""
+_SHOWS = 0.05
+"""Share of the power that forces must leave above the noise for their sizes to be set right: less is told by chance."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard errors of a fitted model.
+
+    Attributes
+    ----------
+    std
+        By name of the fitted parameters, infinite where the records do not determine one.
+    covariance
+        Shape (n_free, n_free), in the order of the fit's `free`.
+    method
+        ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces, or not in reasonable time.
+    sources
+        The forces and the noise that were drawn, noise in SI units; None for the formula.
+    """
+
+    std: dict[str, float]
+    covariance: Floats
+    method: StdMethod
+    sources: Sources | None = None
+
+
+def uncertainty_of(
+    context: FitContext, fit: FitResult, rng: np.random.Generator, n_replicates: int | None = None
+) -> Uncertainty:
+    """Return the standard errors of a model that was fitted to the context's estimation records.
+
+    Parameters
+    ----------
+    context
+        Records, scales and noise.
+    fit
+        The model.
+    rng
+        Source of randomness.
+    n_replicates
+        Draws; default follows from how many steps of integration one takes.
+    """
+    by_formula = Uncertainty(dict(fit.standard_errors), fit.covariance, "formula")
+    if not (fit.free and fit.residuals and max(r.shape[0] for r in fit.residuals) >= FEWEST):
+        return by_formula
+    try:
+        replicates = Replicates(context, fit)
+        if replicates.n_steps > SEARCH.most_replicate_steps:
+            return by_formula
+        wanted = n_replicates or int(
+            np.clip(
+                SEARCH.replicate_steps // max(replicates.n_steps, 1),
+                SEARCH.fewest_replicates,
+                SEARCH.replicates,
+            )
+        )
+        step = OneStep(context.problem(fit.structure, context.estimation), fit)
+        sources = _sources(context, fit, step, replicates, rng)
+        n_readings = sum(record.n_samples for record in context.estimation) * len(context.rig.outputs)
+        batch = max(1, _AT_ONCE // n_readings)
+        gradients = [
+            step.gradients(replicates.drawn(sources, min(batch, wanted - first), rng))
+            for first in range(0, wanted, batch)
+        ]
+    except SimulationError:
+        return by_formula
+    covariance = step.covariance(np.hstack(gradients))
+    if np.any(np.isnan(covariance)):
+        return by_formula
+    # What the formula calls undetermined stays so.
+    unknown = np.isinf(np.diag(fit.covariance))
+    covariance[unknown, :] = covariance[:, unknown] = 0.0
+    covariance[unknown, unknown] = np.inf
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return Uncertainty(dict(zip(fit.free, map(float, errors), strict=True)), covariance, "bootstrap", sources)
+
+
+def _sources(
+    context: FitContext, fit: FitResult, step: OneStep, replicates: Replicates, rng: np.random.Generator
+) -> Sources:
+    """Return the forces and the noise that leave what the model leaves."""
+    names = [signal.name for signal in fit.structure.rig.outputs]
+    # What no record holds has no floor; its residuals are left out.
+    noise = np.array([context.noise.get(name, 1.0) for name in names])
+    records = context.estimation
+    left = [np.nan_to_num(own) / noise for own in fit.residuals]
+    n_joints = len(fit.structure.rig.mechanism.joints)
+    typical = 1.0 / context.scales["time"]
+    corners = np.array([np.inf, *(slower * typical for slower in SLOWER)])
+
+    def shown(joint: int, size: float, n_draws: int) -> _Shown:
+        """Return white forces of one size at a joint and what they leave, by record."""
+        forces = [np.zeros((r.n_samples, n_joints, n_draws)) for r in records]
+        for own in forces:
+            own[:, joint] = size * rng.standard_normal((own.shape[0], n_draws))
+        left = step.left(replicates.responses(forces))
+        return [(force[:, joint], rest) for force, rest in zip(forces, left, strict=True)]
+
+    def heard(sensor: int) -> _Shown:
+        """Return white noise of a sensor, in units of its size, and what it leaves, by record."""
+        unit = [np.zeros((r.n_samples, noise.size, _UNIT_DRAWS)) for r in records]
+        for own in unit:
+            own[:, sensor] = rng.standard_normal((own.shape[0], _UNIT_DRAWS))
+        rests = step.left(replicates.with_noise([own * noise[:, None] for own in unit]))
+        return [(own[:, sensor], rest) for own, rest in zip(unit, rests, strict=True)]
+
+    whole = _mean_square(left)
+    responses = []
+    for joint in range(n_joints):
+        size = _size_at(joint, context, shown, whole)
+        if size == 0.0:
+            responses.append([(np.ones((own.shape[0], 1)), np.zeros((*own.shape, 1))) for own in left])
+        else:
+            responses.append(shown(joint, size, _UNIT_DRAWS))
+    found = likeliest_sources(
+        left, [heard(i) for i in range(noise.size)], responses, [r.dt for r in records], corners
+    )
+    found = Sources(found.noise_std * noise, found.force_std, corners)
+    return found.with_forces_times(_set_right(found, whole, step, replicates, rng))
+
+
+def _size_at(
+    joint: int, context: FitContext, shown: Callable[[int, float, int], _Shown], whole: float
+) -> float:
+    """Return the white force at a joint that would leave about all that is left; 0 where it shows in no sensor.
+
+    In small steps of size: friction that holds the mass hides a small force.
+    """
+    name = context.rig.mechanism.joints[joint].name
+    size = _FIRST * context.scales[f"force@{name}"]
+    for _ in range(_SIZING_ROUNDS):
+        reached = _mean_square([left for _, left in shown(joint, size, 1)])
+        if not reached > 0.0:
+            return 0.0
+        factor = float(np.sqrt(whole / reached))
+        size *= min(factor, _MOST_GROWN)
+        if factor < 2.0:
+            break
+    return size
+
+
+def _set_right(
+    found: Sources,
+    whole: float,
+    step: OneStep,
+    replicates: Replicates,
+    rng: np.random.Generator,
+) -> float:
+    """Return the factor of the forces with which draws leave as much as the model does."""
+    drawn = _mean_square(step.left(replicates.drawn(found, _SETTING_DRAWS, rng)))
+    heard = [found.noise(r.n_samples, _SETTING_DRAWS, rng) for r in replicates.context.estimation]
+    own = _mean_square(step.left(replicates.with_noise(heard)))
+    wanted, reached = whole - own, drawn - own
+    if min(wanted, reached) <= _SHOWS * whole:
+        return 1.0
+    return float(np.clip(np.sqrt(wanted / reached), 1.0 / _MOST_CHANGED, _MOST_CHANGED))
+
+
+def _mean_square(left: Sequence[Floats]) -> float:
+    """Return the mean square of what is left where it was measured; outputs that were not are 0 throughout."""
+    total, count = 0.0, 0
+    for own in left:
+        seen = np.any(own != 0.0, axis=tuple(i for i in range(own.ndim) if i != 1))
+        total += float(np.sum(own**2))
+        count += int(np.count_nonzero(seen)) * own.size // own.shape[1]
+    return total / max(count, 1)

@@ -1,0 +1,71 @@
+"""A fit of friction that ended in a wrong basin is taken to the lowest one; a right one, and one that is good enough, stay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+import rigsight.diagnose.candidates.basins as basins
+from rigsight.diagnose.candidates.basins import in_lowest_basins
+from rigsight.diagnose.workbench import Scored, Workbench
+
+from rigsight.effects import Effect, effect_named
+from rigsight.identify import characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+from rigsight.simulate import compose, simulate
+
+DT, N, NOISE = 0.01, 2000, 2e-5
+STRIBECK = effect_named("stribeck_friction")
+TRUE = {
+    "gain": 1.0,
+    "m": 0.076,
+    "d": 0.041,
+    "k": 1.74,
+    "x_off": 0.0,
+    "force_off": 0.0,
+    "T_c": 1.6e-3,
+    "T_s": 2.8e-3,
+    "w_s": 0.013,
+}
+
+
+@pytest.fixture(scope="module")
+def bench() -> Workbench:
+    rng, t, records = np.random.default_rng(4), DT * np.arange(N), []
+    for number in range(3):
+        u = sum(4e-3 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.1, 1.6, 0.13))
+        asked = Record(f"run {number}", DT, {"u": np.asarray(u)}, {}, hold="foh")
+        x = simulate(compose(AXIS, (STRIBECK,)), TRUE, asked)["x"]
+        records.append(asked.with_signals(x=x + rng.normal(scale=NOISE, size=N)))
+    runs = tuple(records)
+    scales = characteristic_scales(AXIS, runs, TRUE)
+    return Workbench(AXIS, runs, runs, runs, scales, {"x": NOISE}, frozenset(), TRUE)
+
+
+def fitted(bench: Workbench, effect: Effect, start: Mapping[str, float], evaluations: int = 60) -> Scored:
+    structure = bench.composed((effect,))
+    problem = bench.problem(structure, bench.estimation)
+    fit = problem.fit(start, bench.free_parameters(structure), max_evaluations=evaluations)
+    return bench.score((effect,), fit)
+
+
+def test_a_fit_that_stopped_elsewhere_is_taken_to_the_lowest_basin(bench: Workbench) -> None:
+    stopped = fitted(bench, STRIBECK, {**TRUE, "T_c": 1e-3, "T_s": 5e-3, "w_s": 0.05}, 2)
+    assert stopped.excess > 2.0
+    (found,) = in_lowest_basins(bench, [stopped])
+    assert found.excess < 1.05
+    assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)
+
+
+def test_a_fit_at_the_floor_is_left_alone(bench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = fitted(bench, STRIBECK, TRUE)
+    monkeypatch.setattr(basins, "_lowest", None)
+    assert in_lowest_basins(bench, [model])[0] is model
+
+
+def test_a_wrong_effect_keeps_the_only_basin_that_it_has(bench: Workbench) -> None:
+    model = fitted(bench, effect_named("cubic_stiffness"), {**TRUE, "k_3": 0.1})
+    assert model.excess > 2.0
+    assert in_lowest_basins(bench, [model])[0] is model
