@@ -1,7 +1,7 @@
 """Fit the calibration of probabilities to the table of training trials, and write it into the package: `make calibrate`.
 
-Two logistic models with a ridge (scikit-learn), and the threshold of the sets by cross-conformal prediction: each trial's
-probability comes from models that were fitted without its tenth of the table.
+Two logistic models with a ridge (scikit-learn), and the threshold of the sets by leave-one-out conformal prediction: each trial's
+probability comes from models that were fitted without it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from sklearn.linear_model import LogisticRegression
-from sklearn.model_selection import StratifiedKFold
+from sklearn.model_selection import LeaveOneOut
 from table import is_judgeable, read_table
 
 import rigsight.diagnose.verdict
@@ -22,7 +22,6 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict.calibration import FILE
 
 TARGET = Path(rigsight.diagnose.verdict.__file__).parent / FILE
-FOLDS = 10
 DIGITS = 4
 LISTED = ("log_left", "log_gap", "more_effects", "inadequate", "lower_bound", "unknown", "no_effect")
 """Figures that tell whether the cause is among the models tried."""
@@ -50,8 +49,7 @@ def calibrated(trials: Sequence[TrainingTrial]) -> Calibration:
 def probabilities_unseen(trials: Sequence[TrainingTrial]) -> np.ndarray:
     """Return the probability on the true cause from models fitted without the trial, shape (n_trials,)."""
     found = np.empty(len(trials))
-    causes = [trial.cause for trial in trials]
-    for rest, own in StratifiedKFold(FOLDS, shuffle=True, random_state=0).split(causes, causes):
+    for rest, own in LeaveOneOut().split(found):
         model = _fitted([trials[i] for i in rest], 0.0)
         found[own] = [probability_of_truth(model, trials[i]) for i in own]
     return found

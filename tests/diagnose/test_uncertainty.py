@@ -95,7 +95,7 @@ def test_a_model_that_cannot_be_simulated_under_forces_keeps_the_formula(
 
 def test_a_model_that_takes_too_long_keeps_the_formula(monkeypatch: pytest.MonkeyPatch) -> None:
     bench, fit = fitted((), {}, 1e-4, 0.0, np.inf, 1)
-    monkeypatch.setattr(bootstrap, "_MOST_STEPS", 10)
+    monkeypatch.setattr(bootstrap, "SEARCH", replace(SEARCH, most_replicate_steps=10))
     assert uncertainty_of(bench, fit, np.random.default_rng(0)).method == "formula"
 
 

@@ -384,7 +384,7 @@ class SearchNumbers:
     basin_starts: int = number(
         6,
         "budget",
-        ("Starts of each."),
+        ("Starts of each of them, drawn about its fit."),
     )
     basin_spread: float = number(
         0.3,
