@@ -17,7 +17,11 @@ from pathlib import Path
 
 from rigsight.effects import CATALOGUE
 
-CONTAINED = {parent for effect in CATALOGUE for parent in effect.parents} | {"free_play"}
+CONTAINED = {parent for effect in CATALOGUE for parent in effect.parents} | {
+    "free_play",
+    "asymmetric_stiffness",
+}
+"""Parents, free play (an end stop without a spring inside), and an asymmetric spring (a cubic one under a constant force)."""
 EQUAL_ON_ONE_SENSOR = {"input_delay", "sensor_delay", "actuator_lag", "sensor_lag", "time_shift"}
 
 
