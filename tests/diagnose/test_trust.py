@@ -141,6 +141,15 @@ def test_a_stiffness_that_drifts_from_record_to_record_differs_with_time() -> No
     assert all(number(found, name).stable for name in ("m", "d"))
 
 
+def test_wider_errors_of_the_bootstrap_widen_those_by_group() -> None:
+    records = axis_records((1.0,) * 4, by_record=[{"k": 100.0 + 0.8 * i} for i in range(4)])
+    context = context_of(AXIS, records, VALUES, {"x": NOISE})
+    model = fitted(context, (), {})
+    wider = {name: 1000.0 * error for name, error in model.fit.standard_errors.items()}
+    assert not trust(context, model, records, VALUES).stable
+    assert trust(context, model, records, VALUES, wider).stable
+
+
 def test_a_stiffness_without_order_is_something_not_recorded() -> None:
     found = asked(axis_records((1.0,) * 5, by_record=[{"k": k} for k in (100.0, 102.0, 99.5, 101.5, 99.0)]))
     assert number(found, "k").pattern is Pattern.RECORD

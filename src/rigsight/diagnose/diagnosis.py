@@ -25,7 +25,6 @@ from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, LikelyCauses, OutputGap
 from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.predictability import growth_of_disturbances
-from rigsight.diagnose.trust.result import Trust
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.of_verdict import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
@@ -129,12 +128,16 @@ def diagnose(
             "as one law, and other laws of its kind fit equally well: they are not named."
         )
     diagnosis = _assembled(task, found, notes, scored_on, rng)
-    say("trust in the numbers")
-    diagnosis = replace(diagnosis, data_quality=found.quality, trust=_trust(task, found))
+    diagnosis = replace(diagnosis, data_quality=found.quality)
+    named = found.judgement.model if diagnosis.effects else found.reidentified
     if found.judgement.verdict != "unknown":
-        named = found.judgement.model if diagnosis.effects else found.reidentified
         diagnosis = with_own_errors(diagnosis, found.context, named, seed)
         say("standard errors")
+    own = next(candidate for candidate in diagnosis.candidates if candidate.effects == named.names)
+    std = {name: estimate.std for name, estimate in own.parameters.items()}
+    diagnosis = replace(diagnosis, trust=trust(found.context, named, task.records, task.constants, std))
+    say("trust in the numbers")
+    if found.judgement.verdict != "unknown":
         return diagnosis
     forces = forces_at_joints(found.context, found.reidentified)
     if forces:
@@ -149,12 +152,6 @@ def diagnose(
         ),
         joint_forces=forces,
     )
-
-
-def _trust(task: Task, found: Examination) -> Trust:
-    """Return how far the numbers can be trusted: with the effects of the verdict, else of the re-identified equations."""
-    model = found.judgement.model if found.judgement.verdict == "effect" else found.reidentified
-    return trust(found.context, model, task.records, task.constants)
 
 
 def _least_left(found: Examination) -> float:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as t_distribution
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
@@ -47,7 +48,11 @@ class _Way:
 
 
 def trust(
-    context: FitContext, model: Scored, records: Sequence[Record], constants: Mapping[str, float]
+    context: FitContext,
+    model: Scored,
+    records: Sequence[Record],
+    constants: Mapping[str, float],
+    std: Mapping[str, float] | None = None,
 ) -> Trust:
     """Return how far the numbers of a model can be trusted.
 
@@ -61,6 +66,9 @@ def trust(
         Whole ones, in the order of the campaign.
     constants
         Of the campaign.
+    std
+        Standard errors of the numbers by the bootstrap, where there are any. Where they exceed those of the formula, errors
+        by group are wider by the same factor: a force from outside moves the events from which numbers are read.
     """
     if not model.fit.free:
         return Trust(_NOTHING_FITTED)
@@ -68,7 +76,11 @@ def trust(
     if found is None:
         return Trust(_NOT_SIMULATED)
     along = orders(context.rig, records, constants)
-    seen = views(found, [record.name for record in records], along)
+    factors = _wider(model, std or {})
+    seen = {
+        kind: view.widened(factors)
+        for kind, view in views(found, [record.name for record in records], along).items()
+    }
     open_numbers = _left_open(model)
     asked = [
         []
@@ -100,6 +112,14 @@ def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) 
         return numbers
     told = meaning(Pattern.AMPLITUDE, Role.DRIVE, -directions.pop())
     return tuple(replace(n, points_to=told) if told and n in moved and not n.stable else n for n in numbers)
+
+
+def _wider(model: Scored, std: Mapping[str, float]) -> NDArray[np.float64]:
+    """Return by which factor the bootstrap's standard errors exceed the formula's, at least 1, shape (n_free,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        formula = np.array([model.fit.standard_errors[name] for name in model.fit.free])
+        ratios = np.array([std.get(name, 0.0) for name in model.fit.free]) / formula
+    return np.where((ratios > 1.0) & np.isfinite(ratios), ratios, 1.0)
 
 
 def _left_open(model: Scored) -> tuple[str, ...]:

@@ -67,6 +67,15 @@ class View:
             np.array([estimate.freedom[index] for estimate in self.found]),
         )
 
+    def widened(self, factors: Floats) -> View:
+        """Return the view with standard errors of each number larger by a factor, shape (n_free,)."""
+
+        def wider(estimate: Estimates) -> Estimates:
+            return replace(estimate, variances=estimate.variances * factors**2)
+
+        apart = None if self.apart is None else wider(self.apart)
+        return replace(self, found=tuple(map(wider, self.found)), apart=apart)
+
 
 def views(of: Pieces, records: Sequence[str], orders: Sequence[Order]) -> dict[str, View]:
     """Return every view that the records allow, by its kind.
