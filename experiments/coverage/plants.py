@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from rigsight.diagnose.places.probes import push
 
 from rigsight.blind.any_rig_campaign import DT, DURATION, Run, draw_runs
 from rigsight.blind.any_rig_numbers import draw_numbers, draw_offsets
 from rigsight.blind.strength import draw_shape, sized
 from rigsight.blind.waveforms import Disturbance, low_pass_noise
 from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.pushes.probes import push
 from rigsight.diagnose.uncertainty.replicates import with_forces
 from rigsight.effects import Effect
 from rigsight.errors import SimulationError

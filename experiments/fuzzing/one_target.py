@@ -26,7 +26,7 @@ with atheris.instrument_imports(include=[*_INSTRUMENTED, *_LIBRARIES.get(sys.arg
     import oracle
     import targets
 
-    from rigsight.records import isolated_reader, reader_process
+    from rigsight.records.formats import isolated_reader, reader_process
 
     for _reader in ("hdf5", "matlab", "matlab_hdf5", "mdf", "parquet", "tdms", "uff"):
         __import__(f"rigsight.records.read_{_reader}")

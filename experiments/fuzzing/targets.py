@@ -22,7 +22,8 @@ import seeds
 from declarations import DECLARATIONS, effect_of
 
 from rigsight.errors import InputError
-from rigsight.records import channel_file, read_record
+from rigsight.records import read_record
+from rigsight.records.formats import channel_file
 from rigsight.records.formats.channel import ChannelFile
 from rigsight.rigs import RIGS
 from rigsight.workflow.blind_bench.external import ExternalBench
@@ -115,7 +116,7 @@ def read_in_this_process() -> None:
 
     def reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
         opened: Callable[[Path], Iterator[ChannelFile]] = getattr(
-            import_module(f"rigsight.records.read_{kind}"), f"open_{kind}"
+            import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}"
         )
         return contextlib.contextmanager(opened)
 

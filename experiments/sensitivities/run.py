@@ -29,9 +29,9 @@ from rigsight.simulate import (
     FittedRecord,
     choose_substeps,
     compose,
-    kernel_cache,
     record_input,
 )
+from rigsight.simulate.compiled import kernel_cache
 from rigsight.simulate.compiled.compiler import c_compilers, library
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import KernelEquations, kernel_source
