@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
-GENERATED = {"effects/index.md", "reference/index.md"}
+GENERATED = {"effects/index.md", "reference/index.md", "verdict_numbers.md"}
 PUT_IN_WHERE_IT_EXISTS = {"blind.md"}
 
 
