@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-import rigsight.diagnose.candidates.basins as basins
-from rigsight.diagnose.candidates.basins import in_lowest_basins
-from rigsight.diagnose.workbench import Scored, Workbench
 
+import rigsight.diagnose.search.basins as basins
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.search.basins import in_lowest_basins
 from rigsight.effects import Effect, effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.records import Record
@@ -32,7 +32,7 @@ TRUE = {
 
 
 @pytest.fixture(scope="module")
-def bench() -> Workbench:
+def bench() -> FitContext:
     rng, t, records = np.random.default_rng(4), DT * np.arange(N), []
     for number in range(3):
         u = sum(4e-3 * np.sin(2.0 * np.pi * f * t + rng.uniform(0.0, 6.0)) for f in np.arange(0.1, 1.6, 0.13))
@@ -41,31 +41,31 @@ def bench() -> Workbench:
         records.append(asked.with_signals(x=x + rng.normal(scale=NOISE, size=N)))
     runs = tuple(records)
     scales = characteristic_scales(AXIS, runs, TRUE)
-    return Workbench(AXIS, runs, runs, runs, scales, {"x": NOISE}, frozenset(), TRUE)
+    return FitContext(AXIS, runs, runs, runs, scales, {"x": NOISE}, frozenset(), TRUE)
 
 
-def fitted(bench: Workbench, effect: Effect, start: Mapping[str, float], evaluations: int = 60) -> Scored:
+def fitted(bench: FitContext, effect: Effect, start: Mapping[str, float], evaluations: int = 60) -> Scored:
     structure = bench.composed((effect,))
     problem = bench.problem(structure, bench.estimation)
     fit = problem.fit(start, bench.free_parameters(structure), max_evaluations=evaluations)
     return bench.score((effect,), fit)
 
 
-def test_a_fit_that_stopped_elsewhere_is_taken_to_the_lowest_basin(bench: Workbench) -> None:
+def test_a_fit_that_stopped_elsewhere_is_taken_to_the_lowest_basin(bench: FitContext) -> None:
     stopped = fitted(bench, STRIBECK, {**TRUE, "T_c": 1e-3, "T_s": 5e-3, "w_s": 0.05}, 2)
-    assert stopped.excess > 2.0
+    assert stopped.error_over_noise > 2.0
     (found,) = in_lowest_basins(bench, [stopped])
-    assert found.excess < 1.05
+    assert found.error_over_noise < 1.05
     assert found.fit.values["T_s"] == pytest.approx(TRUE["T_s"], rel=0.02)
 
 
-def test_a_fit_at_the_floor_is_left_alone(bench: Workbench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_at_the_floor_is_left_alone(bench: FitContext, monkeypatch: pytest.MonkeyPatch) -> None:
     model = fitted(bench, STRIBECK, TRUE)
     monkeypatch.setattr(basins, "_lowest", None)
     assert in_lowest_basins(bench, [model])[0] is model
 
 
-def test_a_wrong_effect_keeps_the_only_basin_that_it_has(bench: Workbench) -> None:
+def test_a_wrong_effect_keeps_the_only_basin_that_it_has(bench: FitContext) -> None:
     model = fitted(bench, effect_named("cubic_stiffness"), {**TRUE, "k_3": 0.1})
-    assert model.excess > 2.0
+    assert model.error_over_noise > 2.0
     assert in_lowest_basins(bench, [model])[0] is model
