@@ -52,12 +52,15 @@ DT, N_SAMPLES = 2e-3, 2000
 EDGE = 60
 """Samples at either end of an element's record in which the smoothed motion still feels the end."""
 LAWS = {*JOINT_LAWS, *DRIVE_LAWS, *SENSOR_LAWS, *LATERAL_LAWS}
-PAIRS = [
-    (name, effect)
-    for name in NUMBERS
-    for effect in candidates_on(RIGS[name], CATALOGUE)
-    if kind_of(effect.name) in LAWS
-]
+# The last of its places on each rig: other places of one rig repeat the law, and all of them would take two minutes.
+PAIRS = list(
+    {
+        (name, kind_of(effect.name)): (name, effect)
+        for name in NUMBERS
+        for effect in candidates_on(RIGS[name], CATALOGUE)
+        if kind_of(effect.name) in LAWS
+    }.values()
+)
 
 
 def waveforms(name: str) -> list[Waveform]:
