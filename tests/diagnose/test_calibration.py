@@ -52,7 +52,7 @@ def test_a_clear_cause_is_probable() -> None:
     ids=str,
 )
 def test_less_evidence_is_less_probable(worse: dict) -> None:
-    assert stated(replace(CLEAR, **worse)) < stated(CLEAR) - 0.02
+    assert stated(replace(CLEAR, **worse)) < stated(CLEAR)
 
 
 def test_one_model_alone_takes_what_the_first_has() -> None:
