@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from rigsight.effects.symbols import v
 from rigsight.simulate.kinks import FrozenStructure, freeze, is_zero
 from rigsight.simulate.printing.c import limited
 from rigsight.simulate.structure import TIME, Structure, input_symbols
@@ -60,7 +61,10 @@ def equilibrium(
     state = np.zeros(len(structure.states))
     state[list(given)] = list(given.values())
     n_steps = PATH_STEPS if balance.remembers else 1
-    state = _reached(balance, p, 0.0 * inputs, state, given, with_friction=False)
+    without = np.array(p, dtype=np.float64)
+    for index, null in balance.one_sided.items():
+        without[index] = null
+    state = _reached(balance, without, 0.0 * inputs, state, given, with_friction=False)
     if np.any(inputs != 0.0):
         for step in range(1, n_steps + 1):
             state = _reached(balance, p, inputs * (step / n_steps), state, given, with_friction=True)
@@ -83,6 +87,8 @@ class _Balance:
         Number of joints with dry friction.
     remembers
         Whether there are states of hysteresis, which follow the way and not the forces.
+    one_sided
+        Null values, by index among the parameters, of friction that is larger one way: with no sign it would still push.
     """
 
     rates: Callable[..., Any]
@@ -90,6 +96,7 @@ class _Balance:
     unknown: tuple[int, ...]
     n_frictions: int
     remembers: bool
+    one_sided: Mapping[int, float]
 
 
 def _reached(
@@ -192,7 +199,25 @@ def _balance_of(key: _Key) -> _Balance:
         unknown=(*range(n), *range(2 * n, len(states))),
         n_frictions=len(frozen.frictions),
         remembers=remembers,
+        one_sided=_one_sided(structure),
     )
+
+
+def _one_sided(structure: Structure) -> dict[int, float]:
+    """Return where the parameters of friction stand that is larger one way, each with the value at which it vanishes."""
+    place = {name: i for i, name in enumerate(structure.names)}
+    found: dict[int, float] = {}
+    for effect in structure.effects:
+        if effect.torque is None:
+            continue
+        signs = {atom for atom in effect.torque.atoms(sp.sign) if atom.args[0] == v}
+        push = effect.torque.xreplace(dict.fromkeys(signs, sp.Integer(0)))
+        numbers = {sp.Symbol(p.name, real=True) for p in effect.parameters}
+        if signs and push != 0 and push.free_symbols <= numbers:
+            for p in effect.parameters:
+                if p.null is not None:
+                    found[place[structure.parameter_name(effect, p.name)]] = p.null
+    return found
 
 
 def _moved(structure: Structure, before: Sequence[sp.Symbol]) -> dict[sp.Expr, sp.Expr]:
