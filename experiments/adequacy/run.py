@@ -3,7 +3,7 @@
     python experiments/adequacy/run.py --seed 2 --trials 80
 
 Each trial of the small blind bench (disturbed, noisy, one mass) gives two models: the hidden effects fitted from their true
-numbers, and the re-identified equations without them. Writes results.md and p_values.png beside this file.
+numbers, and the re-identified equations without them. Writes results.md beside this file and docs/images/p_values.png.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def draw_picture(rows: list[Row]) -> None:
     axes.step(p, (1 + np.arange(p.size)) / p.size, where="post", label="true models")
     axes.set(xlabel="p-value", ylabel="share below", xlim=(0, 1), ylim=(0, 1))
     axes.legend(frameon=False)
-    figure.savefig(HERE / "p_values.png", dpi=120)
+    figure.savefig(HERE.parents[1] / "docs/images/p_values.png", dpi=120)
     plt.close(figure)
 
 
