@@ -30,8 +30,8 @@ def policy_page() -> str:
         parts += [
             f"## {title}\n",
             f"{len(numbers)} numbers.\n",
-            "| number | value | kind | why | set by |",
-            "|---|---|---|---|---|",
+            "| number | value | kind | why |",
+            "|---|---|---|---|",
         ]
         parts += [_row(number) for number in numbers]
         parts.append("")
@@ -40,7 +40,8 @@ def policy_page() -> str:
 
 def _row(number: Stated) -> str:
     kind = f"**{number.kind}**" if number.kind == "assumption" else number.kind
-    return f"| `{number.name}` | {_told(number.value)} | {kind} | {number.reason} | {number.set_by} |"
+    why = f"{number.reason} Set by: {number.set_by}." if number.set_by else number.reason
+    return f"| `{number.name}` | {_told(number.value)} | {kind} | {why} |"
 
 
 def _told(value: float | tuple[float, ...]) -> str:
