@@ -147,7 +147,9 @@ def test_wider_errors_of_the_bootstrap_widen_those_by_group() -> None:
     model = fitted(context, (), {})
     wider = {name: 1000.0 * error for name, error in model.fit.standard_errors.items()}
     assert not trust(context, model, records, VALUES).stable
-    assert trust(context, model, records, VALUES, wider).stable
+    found = trust(context, model, records, VALUES, wider)
+    assert found.stable
+    assert {number.name: number.std for number in found.parameters} == wider
 
 
 def test_a_stiffness_without_order_is_something_not_recorded() -> None:

@@ -76,7 +76,8 @@ def trust(
     if found is None:
         return Trust(_NOT_SIMULATED)
     along = orders(context.rig, records, constants)
-    factors = _wider(model, std or {})
+    errors = {**model.fit.standard_errors, **(std or {})}
+    factors = _wider(model, errors)
     seen = {
         kind: view.widened(factors)
         for kind, view in views(found, [record.name for record in records], along).items()
@@ -92,7 +93,7 @@ def trust(
     allowed = [[next(p_values) for _ in of_number] for of_number in asked]
     own = roles(context.rig, _effect_parameters(model))
     numbers = tuple(
-        _number(model, i, seen, asked[i], allowed[i], along, own.get(name, Role.OTHER))
+        _number(model, i, errors[name], seen, asked[i], allowed[i], along, own.get(name, Role.OTHER))
         for i, name in enumerate(found.free)
     )
     numbers = _of_the_drive(numbers, own)
@@ -118,7 +119,7 @@ def _wider(model: Scored, std: Mapping[str, float]) -> NDArray[np.float64]:
     """Return by which factor the bootstrap's standard errors exceed the formula's, at least 1, shape (n_free,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         formula = np.array([model.fit.standard_errors[name] for name in model.fit.free])
-        ratios = np.array([std.get(name, 0.0) for name in model.fit.free]) / formula
+        ratios = np.array([std[name] for name in model.fit.free]) / formula
     return np.where((ratios > 1.0) & np.isfinite(ratios), ratios, 1.0)
 
 
@@ -158,6 +159,7 @@ def _told(view: View, index: int) -> Spread | None:
 def _number(
     model: Scored,
     index: int,
+    std: float,
     seen: Mapping[str, View],
     asked: Sequence[_Asked],
     p_values: Sequence[float],
@@ -183,7 +185,7 @@ def _number(
         name=name,
         unit=unit,
         value=value,
-        std=model.fit.standard_errors[name],
+        std=std,
         of_effect=role is Role.EFFECT,
         groups=groups,
         p_value=min(p_values, default=1.0),
