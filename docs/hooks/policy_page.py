@@ -8,9 +8,11 @@ from rigsight.diagnose.policy.number import Stated, stated
 _SECTIONS = (
     ("What decides a verdict and its probability", POLICY.verdict),
     ("What is told about records and numbers", POLICY.notes),
+    ("Over which stretch a model is compared", POLICY.horizon),
     ("How far is searched", POLICY.search),
     ("How finely the gap is mapped", POLICY.maps),
     ("Can the numbers be trusted?", POLICY.trust),
+    ("How many draws a standard error rests on", POLICY.bootstrap),
 )
 
 

@@ -48,11 +48,21 @@ def test_a_clear_cause_is_probable() -> None:
 
 @pytest.mark.parametrize(
     "worse",
-    [{"first_share": 0.5}, {"left": 5.0, "adequate": False}, {"gap": 1.3}, {"verdict": "unknown"}],
+    [
+        {"first_share": 0.5},
+        {"left": 5.0, "adequate": False},
+        {"gap": 1.3},
+        {"verdict": "unknown", "left": 5.0, "adequate": False},
+    ],
     ids=str,
 )
 def test_less_evidence_is_less_probable(worse: dict) -> None:
-    assert stated(replace(CLEAR, **worse)) < stated(CLEAR)
+    assert stated(replace(CLEAR, **worse)) < stated(CLEAR) - 0.02
+
+
+def test_of_an_unknown_cause_the_nearest_model_is_less_probable_than_if_it_were_named() -> None:
+    far = replace(CLEAR, left=5.0, adequate=False)
+    assert stated(replace(far, verdict="unknown")) < stated(far) - 0.02
 
 
 def test_one_model_alone_takes_what_the_first_has() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import rigsight.diagnose.uncertainty.bootstrap as bootstrap
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.policy import SEARCH
+from rigsight.diagnose.policy import BOOTSTRAP
 from rigsight.diagnose.uncertainty.bootstrap import uncertainty_of
 from rigsight.diagnose.uncertainty.sources import Sources, colored, likeliest_sources
 from rigsight.effects import Effect, effect_named
@@ -75,7 +75,7 @@ def test_the_same_seed_draws_the_same() -> None:
     assert one.std == same.std
     assert one.std != other.std
     assert list(one.std.values()) == pytest.approx(
-        list(other.std.values()), rel=5.0 / np.sqrt(2.0 * SEARCH.replicates)
+        list(other.std.values()), rel=5.0 / np.sqrt(2.0 * BOOTSTRAP.replicates)
     )
 
 
@@ -95,7 +95,7 @@ def test_a_model_that_cannot_be_simulated_under_forces_keeps_the_formula(
 
 def test_a_model_that_takes_too_long_keeps_the_formula(monkeypatch: pytest.MonkeyPatch) -> None:
     bench, fit = fitted((), {}, 1e-4, 0.0, np.inf, 1)
-    monkeypatch.setattr(bootstrap, "SEARCH", replace(SEARCH, most_replicate_steps=10))
+    monkeypatch.setattr(bootstrap, "BOOTSTRAP", replace(BOOTSTRAP, most_replicate_steps=10))
     assert uncertainty_of(bench, fit, np.random.default_rng(0)).method == "formula"
 
 

@@ -17,7 +17,7 @@ STATED = (
     ("verdict.refutes_rest", 0.7, "less than 0.7 of a floor"),
     ("verdict.larger_part", 0.5, "at least half (a hold)"),
     ("notes.nearly_all", 0.8, "four fifths (a shift)"),
-    ("search.piece", 4.0, "in pieces of four periods"),
+    ("horizon.piece", 4.0, "in pieces of four periods"),
     ("verdict.larger_part", 0.5, "at least half the share of the best one"),
     ("search.near", 25.0, "within five times the RMS of the best"),
     ("search.promising", 9.0, "within three times the RMS of the best"),
@@ -65,8 +65,8 @@ STATED = (
     ("search.basin_models", 3, "the three nearest"),
     ("search.basin_starts", 6, "from six places"),
     ("search.basin_spread", 0.3, "some 30 % off"),
-    ("search.replicates", 60, "up to 60 times"),
-    ("search.most_replicate_steps", 2_000_000, "more than 2 million steps"),
+    ("bootstrap.replicates", 60, "up to 60 times"),
+    ("bootstrap.most_replicate_steps", 2_000_000, "more than 2 million steps"),
     ("notes.advised_amplitudes", (0.3, 1.0, 1.5), "0.3, 1 and 1.5 times the largest input"),
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,10 @@ from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.task import Task
-from rigsight.diagnose.fitting.windows import WINDOW, readings
+from rigsight.diagnose.fitting.windows import readings
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
-from rigsight.diagnose.location.trace import Trace
+from rigsight.diagnose.location.trace import traces_of
 from rigsight.diagnose.noise.detection import AT_REST
 from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
@@ -171,7 +171,7 @@ def _assembled(
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else reidentified)
     noise = {floor.output: floor for floor in floors}
     measured = _measured(rig, context.scoring)
-    traces = _traces(task, context, before, reidentified, after)
+    traces = traces_of(context, before, reidentified, after)
     scored = [trace for trace in traces if trace.role == scored_on]
     at_floor = {name: noise[name].std / float(np.std(values)) for name, values in measured.items()}
     gap = {
@@ -350,58 +350,3 @@ def _candidate(
         message=model.fit.message,
         grounds=grounds,
     )
-
-
-def _traces(
-    task: Task, context: FitContext, before: Scored, reidentified: Scored, after: Scored
-) -> tuple[Trace, ...]:
-    """Return measured and simulated outputs of all records, those that score first, windows joined again."""
-    scored = _joined(task.rig, context.scoring, before.residuals, reidentified.residuals, after.residuals)
-    if context.scoring == context.estimation:
-        return scored
-    fitted = _joined(
-        task.rig, context.estimation, before.fit.residuals, reidentified.fit.residuals, after.fit.residuals
-    )
-    return (*scored, *fitted)
-
-
-def _joined(
-    rig: Rig,
-    records: Sequence[Record],
-    before: Sequence[NDArray[np.float64]],
-    reidentified: Sequence[NDArray[np.float64]],
-    after: Sequence[NDArray[np.float64]],
-) -> tuple[Trace, ...]:
-    names = [signal.name for signal in rig.outputs]
-    groups: dict[str, list[int]] = {}
-    for index, record in enumerate(records):
-        groups.setdefault(record.name.split(WINDOW)[0], []).append(index)
-    traces = []
-    for name, indices in groups.items():
-        parts = [records[i] for i in indices]
-        first = parts[0]
-        measured = {n: readings(parts, n)[name] for n in names if n in first}
-
-        def simulated(
-            residuals: Sequence[NDArray[np.float64]],
-            indices: Sequence[int] = indices,
-            measured: Mapping[str, NDArray[np.float64]] = measured,
-        ) -> dict[str, NDArray[np.float64]]:
-            joined = np.concatenate([residuals[i] for i in indices])
-            return {n: measured[n] - joined[:, names.index(n)] for n in measured}
-
-        traces.append(
-            Trace(
-                record=name,
-                role=first.role,
-                kind=first.kind,
-                amplitude=first.amplitude,
-                t=np.concatenate([p.t for p in parts]),
-                inputs={s.name: np.concatenate([p[s.name] for p in parts]) for s in rig.inputs},
-                measured=measured,
-                before=simulated(before),
-                reidentified=simulated(reidentified),
-                after=simulated(after),
-            )
-        )
-    return tuple(traces)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.constant_force import known_constant_forces
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.windows import cut, shown_by
-from rigsight.diagnose.policy import SEARCH
+from rigsight.diagnose.policy import HORIZON
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.identify import DEFAULT_ACCURACY, FitMemory, FitResult, GreyBoxFit, IdleThreads
@@ -132,12 +132,12 @@ class FitContext:
     @cached_property
     def look_in_pieces(self) -> tuple[tuple[Record, ...], ...]:
         """Pieces of each of the liveliest stretches: a model that is far off stays in step with the motion in them."""
-        return tuple(self.cut_in_pieces([record], SEARCH.piece) for record in self.look)
+        return tuple(self.cut_in_pieces([record], HORIZON.piece) for record in self.look)
 
     def cut_in_pieces(self, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
         """Cut records into pieces of so many periods of the rig, longer where they would be too many."""
         duration = sum(record.n_samples * record.dt for record in records)
-        most = SEARCH.most_pieces / max(1, len(self.rig.mechanism.free))
+        most = HORIZON.most_pieces / max(1, len(self.rig.mechanism.free))
         return cut(records, max(periods * self.period, duration * len(self.look) / len(records) / most))
 
     def problem(
@@ -251,7 +251,7 @@ class FitContext:
         if roughly:
             rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
             result = rough.fit(
-                fit.values, [], max_evaluations=SEARCH.rough_evaluations_of_rig, tolerance=_ROUGH_ACCURACY
+                fit.values, [], max_evaluations=HORIZON.rough_evaluations_of_rig, tolerance=_ROUGH_ACCURACY
             )
         else:
             result = self.problem(fit.structure, self.scoring).fit(fit.values, [])
@@ -288,7 +288,7 @@ def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
         if all(is_constant(record[signal.name]) for signal in rig.inputs):
             energy = np.cumsum(np.diff(record[output]) ** 2)
             stop = max(
-                SEARCH.fewest_in_motion, int(np.searchsorted(energy, SEARCH.died_away * energy[-1])) + 1
+                HORIZON.fewest_in_motion, int(np.searchsorted(energy, HORIZON.died_away * energy[-1])) + 1
             )
         cut_off.append(record.slice(0, min(stop, record.n_samples)))
     return tuple(cut_off)

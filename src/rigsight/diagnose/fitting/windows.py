@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.observer import Observer, sensors_of_motion
-from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.policy import HORIZON, VERDICT
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.prescribed_motion import smooth_motion
@@ -69,13 +69,13 @@ class Windowing:
     def _edges(self, record: Record, cycles: int) -> list[int]:
         output = next(name for name in self.noise if name in record)
         deviation = record[output] - np.median(record[output])
-        size = SEARCH.crossing_above_noise * self.noise[output]
+        size = HORIZON.crossing_above_noise * self.noise[output]
         sides = np.flatnonzero(np.abs(deviation) > size)
         above = deviation[sides] > 0.0
         crossings = sides[1:][above[1:] & ~above[:-1]]
         edges = [0]
         for crossing in map(int, crossings[cycles - 1 :: cycles]):
-            if min(crossing - edges[-1], record.n_samples - crossing) >= SEARCH.fewest_window_samples:
+            if min(crossing - edges[-1], record.n_samples - crossing) >= HORIZON.fewest_window_samples:
                 edges.append(crossing)
         return [*edges, record.n_samples]
 
@@ -115,9 +115,9 @@ def window_length(rig: Rig, records: Sequence[Record]) -> float:
     dt = max(record.dt for record in records)
     longest = max(record.n_samples * record.dt for record in records)
     wished = max(
-        SEARCH.window_periods * typical_period(rig, records),
-        SEARCH.window_samples * dt,
-        longest / SEARCH.most_windows,
+        HORIZON.window_periods * typical_period(rig, records),
+        HORIZON.window_samples * dt,
+        longest / HORIZON.most_windows,
     )
     return min(wished, longest)
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.windows import WINDOW, readings
+from rigsight.records.record import Record
+from rigsight.rigs import Rig
 
 Stage = Literal["before", "reidentified", "after"]
 STAGES: tuple[Stage, ...] = ("before", "reidentified", "after")
@@ -47,3 +52,64 @@ class Trace:
         """Return measured minus simulated of a stage, shape (n_samples,)."""
         simulated = {"before": self.before, "reidentified": self.reidentified, "after": self.after}[stage]
         return np.asarray(self.measured[output] - simulated[output], dtype=np.float64)
+
+
+def traces_of(context: FitContext, before: Scored, reidentified: Scored, after: Scored) -> tuple[Trace, ...]:
+    """Return measured and simulated outputs of all records, those that score first, windows joined again.
+
+    Parameters
+    ----------
+    context
+        Records as they were fitted and scored.
+    before, reidentified, after
+        The model of each stage.
+    """
+    scored = _joined(context.rig, context.scoring, before.residuals, reidentified.residuals, after.residuals)
+    if context.scoring == context.estimation:
+        return scored
+    fitted = _joined(
+        context.rig, context.estimation, before.fit.residuals, reidentified.fit.residuals, after.fit.residuals
+    )
+    return (*scored, *fitted)
+
+
+def _joined(
+    rig: Rig,
+    records: Sequence[Record],
+    before: Sequence[NDArray[np.float64]],
+    reidentified: Sequence[NDArray[np.float64]],
+    after: Sequence[NDArray[np.float64]],
+) -> tuple[Trace, ...]:
+    names = [signal.name for signal in rig.outputs]
+    groups: dict[str, list[int]] = {}
+    for index, record in enumerate(records):
+        groups.setdefault(record.name.split(WINDOW)[0], []).append(index)
+    traces = []
+    for name, indices in groups.items():
+        parts = [records[i] for i in indices]
+        first = parts[0]
+        measured = {n: readings(parts, n)[name] for n in names if n in first}
+
+        def simulated(
+            residuals: Sequence[NDArray[np.float64]],
+            indices: Sequence[int] = indices,
+            measured: Mapping[str, NDArray[np.float64]] = measured,
+        ) -> dict[str, NDArray[np.float64]]:
+            joined = np.concatenate([residuals[i] for i in indices])
+            return {n: measured[n] - joined[:, names.index(n)] for n in measured}
+
+        traces.append(
+            Trace(
+                record=name,
+                role=first.role,
+                kind=first.kind,
+                amplitude=first.amplitude,
+                t=np.concatenate([p.t for p in parts]),
+                inputs={s.name: np.concatenate([p[s.name] for p in parts]) for s in rig.inputs},
+                measured=measured,
+                before=simulated(before),
+                reidentified=simulated(reidentified),
+                after=simulated(after),
+            )
+        )
+    return tuple(traces)

@@ -1,32 +1,36 @@
 """Every number of a diagnosis that is no numerical tolerance, in one frozen object, each with its reason.
 
-The page on verdicts (`docs/verdict_numbers.md`) is generated from it.
+The documentation's page "The numbers of a diagnosis" is made from it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from rigsight.diagnose.policy.bootstrap_numbers import BootstrapNumbers
+from rigsight.diagnose.policy.horizon_numbers import HorizonNumbers
 from rigsight.diagnose.policy.map_numbers import MapNumbers
 from rigsight.diagnose.policy.note_numbers import NoteNumbers
 from rigsight.diagnose.policy.search_numbers import SearchNumbers
 from rigsight.diagnose.policy.trust_numbers import TrustNumbers
 from rigsight.diagnose.policy.verdict_numbers import VerdictNumbers
 
-__all__ = ["MAPS", "NOTES", "POLICY", "SEARCH", "TRUST", "VERDICT", "Policy"]
+__all__ = ["BOOTSTRAP", "HORIZON", "MAPS", "NOTES", "POLICY", "SEARCH", "TRUST", "VERDICT", "Policy"]
 
 
 @dataclass(frozen=True)
 class Policy:
-    """What decides, what is told, how far is searched, how finely the gap is mapped, and what numbers are asked."""
+    """What decides, what is told, how far is searched, how finely the gap is mapped, and how numbers are asked and weighed."""
 
     verdict: VerdictNumbers = field(default_factory=VerdictNumbers)
     notes: NoteNumbers = field(default_factory=NoteNumbers)
+    horizon: HorizonNumbers = field(default_factory=HorizonNumbers)
     search: SearchNumbers = field(default_factory=SearchNumbers)
     maps: MapNumbers = field(default_factory=MapNumbers)
     trust: TrustNumbers = field(default_factory=TrustNumbers)
+    bootstrap: BootstrapNumbers = field(default_factory=BootstrapNumbers)
 
 
 POLICY = Policy()
 VERDICT, NOTES, SEARCH, MAPS = POLICY.verdict, POLICY.notes, POLICY.search, POLICY.maps
-TRUST = POLICY.trust
+HORIZON, TRUST, BOOTSTRAP = POLICY.horizon, POLICY.trust, POLICY.bootstrap

@@ -11,91 +11,6 @@ from rigsight.diagnose.policy.number import number
 class SearchNumbers:
     """How far is searched? Each field carries its reason."""
 
-    observer_close: float = number(
-        6.0,
-        "assumption",
-        (
-            "Bandwidth of the closest observer, in units of the typical frequency of the velocity: the harmonics "
-            "of friction that turns with the velocity still show."
-        ),
-    )
-    observer_loose: float = number(
-        0.1,
-        "assumption",
-        "The same of the loosest: errors add up for ten periods.",
-    )
-    observer_step: float = number(
-        2.0,
-        "budget",
-        "Factor from one observer to the next.",
-    )
-    observer_sampling: float = number(
-        0.2,
-        "convention",
-        "Largest bandwidth times sample time: a closer observer follows the noise of single samples.",
-    )
-    clear_gap: float = number(
-        10.0,
-        "convention",
-        "Gap, in units of the noise floor, that shows its cause.",
-    )
-    piece: float = number(
-        4.0,
-        "assumption",
-        (
-            "Length of a piece, in periods of the rig, with initial states of its own: a model that is far off "
-            "stays in step with the motion for about as long."
-        ),
-        set_by="drawn rigs with play of a few widths: half to two periods did worse",
-    )
-    most_pieces: int = number(
-        40,
-        "budget",
-        "Pieces of all records for each degree of freedom: every piece has initial states of its own.",
-    )
-    died_away: float = number(
-        0.99,
-        "convention",
-        (
-            "Share of the squared steps of an output after which a free motion is smaller than a tenth of what it "
-            "was."
-        ),
-    )
-    fewest_in_motion: int = number(
-        100,
-        "convention",
-        "Samples of a free motion that are kept at least.",
-    )
-    rough_evaluations_of_rig: int = number(
-        8,
-        "budget",
-        "Evaluations of the rig's equations with other start values.",
-    )
-    window_periods: float = number(
-        10.0,
-        "assumption",
-        "Length of a window in typical periods, where a rig drifts and no sensor shows its motion.",
-    )
-    window_samples: int = number(
-        100,
-        "convention",
-        "Samples of such a window at least.",
-    )
-    most_windows: int = number(
-        40,
-        "budget",
-        "Such windows of a record at most.",
-    )
-    fewest_window_samples: int = number(
-        60,
-        "convention",
-        "Samples of a window of cycles at least.",
-    )
-    crossing_above_noise: float = number(
-        3.0,
-        "convention",
-        "Deviation from the middle, in units of the noise, from which a crossing of it is one of the motion.",
-    )
     predictability_draws: int = number(
         4,
         "budget",
@@ -384,44 +299,21 @@ class SearchNumbers:
     basin_starts: int = number(
         6,
         "budget",
-        ("Starts of each of them, drawn about its fit."),
+        "Starts of each of them, drawn about its fit.",
     )
     basin_spread: float = number(
         0.3,
         "measured",
-        ("Standard deviation of the logarithms of an effect's numbers at these starts."),
+        "Standard deviation of the logarithms of an effect's numbers at these starts.",
         set_by="two rigs of the coverage study, seed 1: half of such starts led to the right basin",
     )
     basin_evaluations: int = number(
         15,
         "budget",
-        ("Evaluations from such a start."),
+        "Evaluations from such a start.",
     )
     basin_finish_evaluations: int = number(
         60,
         "budget",
-        ("Evaluations of the fit in a lower basin."),
-    )
-    replicates: int = number(
-        60,
-        "budget",
-        ("Draws of a bootstrap: standard errors scatter by 1 / sqrt(2 n), 9 percent."),
-    )
-    fewest_replicates: int = number(
-        24,
-        "budget",
-        ("Draws along long records: standard errors scatter by 14 percent."),
-    )
-    replicate_steps: int = number(
-        3_500_000,
-        "budget",
-        (
-            "Steps of integration in which more draws than these are simulated: 2 to 3 s. A number of "
-            "steps: draws depend on no clock."
-        ),
-    )
-    most_replicate_steps: int = number(
-        2_000_000,
-        "budget",
-        ("Steps of one draw from which the formula has to do: a stiff model takes thousands in a sample."),
+        "Evaluations of the fit in a lower basin.",
     )

@@ -11,7 +11,7 @@ from rigsight.diagnose.fitting.observer import Observer, followed_sensors
 from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
 from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing, typical_period, window_length
-from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.policy import HORIZON, VERDICT
 from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.errors import SimulationError
@@ -28,7 +28,7 @@ def brings_back(task: Task) -> bool:
     typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
     motion, values = task.rig.motion, start_values_of(task)
     numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
-    return bool(np.min(np.abs(np.roots(numbers))) >= SEARCH.observer_loose * typical)
+    return bool(np.min(np.abs(np.roots(numbers))) >= HORIZON.observer_loose * typical)
 
 
 def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[Windowing, dict[str, float]]:
@@ -59,7 +59,8 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[W
         return Windowing(window_length(task.rig, task.estimation)), dict.fromkeys(noise, 1.0)
     typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
     bandwidth = min(
-        SEARCH.observer_close * typical, SEARCH.observer_sampling / max(record.dt for record in task.records)
+        HORIZON.observer_close * typical,
+        HORIZON.observer_sampling / max(record.dt for record in task.records),
     )
     values: Mapping[str, float] | None = None
     while True:
@@ -68,12 +69,12 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[W
         reidentified = reidentify(context, values or context.start)
         amplified = noise_of_following(context, reidentified.fit)
         shows = (
-            reidentified.error_over_noise >= SEARCH.clear_gap and max(amplified.values()) <= VERDICT.at_floor
+            reidentified.error_over_noise >= HORIZON.clear_gap and max(amplified.values()) <= VERDICT.at_floor
         )
-        if shows or bandwidth <= SEARCH.observer_loose * typical:
+        if shows or bandwidth <= HORIZON.observer_loose * typical:
             return windowing, {name: max(1.0, factor) for name, factor in amplified.items()}
         values = reidentified.fit.values if reidentified.residuals else None
-        bandwidth = max(bandwidth / SEARCH.observer_step, SEARCH.observer_loose * typical)
+        bandwidth = max(bandwidth / HORIZON.observer_step, HORIZON.observer_loose * typical)
 
 
 def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.diagnose.fitting.fit_context import FitContext
-from rigsight.diagnose.policy import SEARCH
+from rigsight.diagnose.policy import BOOTSTRAP
 from rigsight.diagnose.result import StdMethod
 from rigsight.diagnose.uncertainty.replicates import Replicates
 from rigsight.diagnose.uncertainty.sources import FEWEST, SLOWER, Sources, likeliest_sources
@@ -91,13 +91,13 @@ def uncertainty_of(
         return by_formula
     try:
         replicates = Replicates(context, fit)
-        if replicates.n_steps > SEARCH.most_replicate_steps:
+        if replicates.n_steps > BOOTSTRAP.most_replicate_steps:
             return by_formula
         wanted = n_replicates or int(
             np.clip(
-                SEARCH.replicate_steps // max(replicates.n_steps, 1),
-                SEARCH.fewest_replicates,
-                SEARCH.replicates,
+                BOOTSTRAP.replicate_steps // max(replicates.n_steps, 1),
+                BOOTSTRAP.fewest_replicates,
+                BOOTSTRAP.replicates,
             )
         )
         step = OneStep(context.problem(fit.structure, context.estimation), fit)
