@@ -146,31 +146,40 @@ def _wave_parameters() -> tuple[Parameter, ...]:
     )
 
 
-SMOOTH_SPRING = Effect(
-    name="smooth_spring",
-    place=Place.DYNAMICS,
-    summary="A second spring whose stiffness is a smooth random function of the deflection.",
-    parameters=(
-        _strength_of("its stiffness", "force x^-1", 0.5, 1.0),
-        Parameter("reach", "deflection over which it changes", "x", starts=(0.3,)),
-        *_wave_parameters(),
-    ),
-    energy=Energy.CONSERVATIVE,
-    signature=Signature(GainTrend.RISES, even_harmonics=True),
-    torque=_strength * x * sp.exp(_waves(x / _reach)),
+def _smooth(
+    name: str, summary: str, argument: sp.Symbol, unit: str, dimension: str, energy: Energy
+) -> Effect:
+    """Return a law that is proportional to one quantity at every size, with a factor that is a smooth random function of it."""
+    return Effect(
+        name=name,
+        place=Place.DYNAMICS,
+        summary=summary,
+        parameters=(
+            _strength_of("factor at the middle of its waves", dimension, 0.5, 1.0),
+            Parameter("reach", "over which the factor changes", unit, starts=(0.3,)),
+            *_wave_parameters(),
+        ),
+        energy=energy,
+        signature=Signature(GainTrend.RISES, even_harmonics=True),
+        torque=_strength * argument * sp.exp(_waves(argument / _reach)),
+    )
+
+
+SMOOTH_SPRING = _smooth(
+    "smooth_spring",
+    "A second spring whose stiffness is a smooth random function of the deflection.",
+    x,
+    "x",
+    "force x^-1",
+    Energy.CONSERVATIVE,
 )
-SMOOTH_DAMPING = Effect(
-    name="smooth_damping",
-    place=Place.DYNAMICS,
-    summary="A second damper whose resistance is a smooth random function of the speed.",
-    parameters=(
-        _strength_of("its resistance", "force time x^-1", 0.5, 1.0),
-        Parameter("reach", "speed over which it changes", "x time^-1", starts=(0.3,)),
-        *_wave_parameters(),
-    ),
-    energy=Energy.DISSIPATIVE,
-    signature=Signature(GainTrend.RISES, even_harmonics=True),
-    torque=_strength * v * sp.exp(_waves(v / _reach)),
+SMOOTH_DAMPING = _smooth(
+    "smooth_damping",
+    "A second damper whose resistance is a smooth random function of the speed.",
+    v,
+    "x time^-1",
+    "force time x^-1",
+    Energy.DISSIPATIVE,
 )
 
 UNLIKE_THE_CATALOGUE: tuple[Effect, ...] = (
