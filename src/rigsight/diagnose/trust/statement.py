@@ -54,11 +54,9 @@ def statement(
         if number.pattern is Pattern.UNKNOWN and number.name not in left_open
     ]
     if open_numbers:
-        verb = "is" if len(open_numbers) == 1 else "are"
-        where = "no two groups of records" if n_records > 1 else "no part of the record"
-        sentences.append(
-            f"{_listed(open_numbers)} {verb} determined by {where} alone, and could not be compared."
-        )
+        it = "it" if len(open_numbers) == 1 else "them"
+        where = "no two groups of records determine" if n_records > 1 else "no part of the record determines"
+        sentences.append(f"{_listed(open_numbers)} could not be compared: {where} {it} alone.")
     if n_records == 1:
         sentences.append(_ONE_RECORD)
     return " ".join([*sentences, *(pair.text for pair in pairs[: TRUST.pairs_told])])
