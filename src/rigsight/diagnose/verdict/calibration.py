@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
+from scipy.special import expit
+
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict.judgement import Verdict
 
@@ -152,7 +154,7 @@ def _logistic(coefficients: Mapping[str, float], figures: Mapping[str, float]) -
     told = sum(
         value * (1.0 if name == "intercept" else figures[name]) for name, value in coefficients.items()
     )
-    return 1.0 / (1.0 + math.exp(-told))
+    return float(expit(told))
 
 
 def _in_proportion(total: float, shares: Sequence[float]) -> list[float]:
