@@ -16,7 +16,7 @@ from sklearn.model_selection import LeaveOneOut
 from table import is_judgeable, read_table
 
 import rigsight.diagnose.verdict
-from rigsight.blind.training_trial import TrainingTrial
+from rigsight.blind.scoring.training_trial import TrainingTrial
 from rigsight.diagnose import Calibration
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.verdict.calibration import FILE

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from rigsight.blind.training_trial import TrainingTrial
+from rigsight.blind.scoring.training_trial import TrainingTrial
 from rigsight.diagnose import Situation
 
 FILE = Path(__file__).parent / "trials.csv"

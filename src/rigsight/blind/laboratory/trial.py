@@ -21,7 +21,7 @@ from rigsight.blind.laboratory.subjects import (
     laboratory_subject_of,
 )
 from rigsight.blind.laboratory.surroundings import GAPS, LEAST_BESIDE, draw_surroundings
-from rigsight.blind.score import SEVERAL
+from rigsight.blind.scoring.score import SEVERAL
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import SimulationError
 from rigsight.records import Record

@@ -14,7 +14,7 @@ from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.rigs import AXIS
 
-from .test_chance import NOISE, RIG, measured
+from .test_sensitive_motion import NOISE, RIG, measured
 
 TRUTH = {**RIG, "g": 1.35e-4, "u_0": 0.1}
 PAIR = (effect_named("backlash"), effect_named("input_dead_zone"))

@@ -11,7 +11,7 @@ import pytest
 from rigsight.diagnose import Task, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search import pairs as grow
+from rigsight.diagnose.search import pairs as pair_search
 from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.pairs import grown, refit_singles
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
@@ -125,10 +125,10 @@ def test_second_effects_are_not_tried_beside_one_that_explains_nothing(
         beside.extend(parent.names)
         return []
 
-    monkeypatch.setattr(grow, "with_one_more", tried)
-    monkeypatch.setattr(grow, "refine", lambda _, pairs: pairs)
+    monkeypatch.setattr(pair_search, "with_one_more", tried)
+    monkeypatch.setattr(pair_search, "refine", lambda _, pairs: pairs)
     forms = SimpleNamespace(partners=lambda parent, effects: effects)
-    grow.grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms)
+    pair_search.grown(None, singles, [nothing, spring], VERDICT.at_floor, 9.0, forms)
     assert beside == ["power_law_stiffness"]
 
 

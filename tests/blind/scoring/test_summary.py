@@ -7,7 +7,15 @@ from collections.abc import Callable
 import pytest
 
 from rigsight.blind import Outcome, ParameterError, WithheldError, summary
-from rigsight.blind.summary import ALL, WRONG_PLACE, confusion, held_out, pairs, parameters, reliability
+from rigsight.blind.scoring.summary import (
+    ALL,
+    WRONG_PLACE,
+    confusion,
+    held_out,
+    pairs,
+    parameters,
+    reliability,
+)
 
 Like = Callable[..., Outcome]
 

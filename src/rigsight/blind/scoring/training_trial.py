@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
-from rigsight.blind.score import BY_PLACE_SCHEMA, effects_at_places, needed_effects
+from rigsight.blind.scoring.score import BY_PLACE_SCHEMA, effects_at_places, needed_effects
 from rigsight.diagnose import Situation, Verdict
 
 Cause = Literal["first", "listed", "outside"]

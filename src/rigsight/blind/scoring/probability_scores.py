@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit, log_expit, logit
 
-from rigsight.blind.score import FAILED, Outcome
-from rigsight.blind.shares import mean, share_of
+from rigsight.blind.scoring.score import FAILED, Outcome
+from rigsight.blind.scoring.shares import mean, share_of
 
 ALL = "all"
 LEAST_PROBABILITY = 1e-3

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from rigsight.blind.goals import figures, laboratory_figures, targets
 from rigsight.blind.laboratory.subjects import CONDITIONS
-from rigsight.blind.parameter_errors import OF_RIG, ParameterError
-from rigsight.blind.probability_scores import log_score, probability_scores
-from rigsight.blind.score import FAILED, SEVERAL, Outcome, WithheldError
-from rigsight.blind.shares import mean, median, quantile, share_of
+from rigsight.blind.scoring.goals import figures, laboratory_figures, targets
+from rigsight.blind.scoring.parameter_errors import OF_RIG, ParameterError
+from rigsight.blind.scoring.probability_scores import log_score, probability_scores
+from rigsight.blind.scoring.score import FAILED, SEVERAL, Outcome, WithheldError
+from rigsight.blind.scoring.shares import mean, median, quantile, share_of
 
 ALL = "all"
 """Of the conditions together."""

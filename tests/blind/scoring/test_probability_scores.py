@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rigsight.blind.probability_scores import (
+from rigsight.blind.scoring.probability_scores import (
     LEAST_PROBABILITY,
     log_score,
     probability_scores,

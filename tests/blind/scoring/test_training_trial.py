@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.blind.training_trial import training_trial
+from rigsight.blind.scoring.training_trial import training_trial
 
 
 def candidate(share: float | None, left: float, *effects: str) -> dict:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigsight.blind import Outcome, WithheldError
-from rigsight.blind.goals import GOALS, LABORATORY_GOALS, figures, targets
+from rigsight.blind.scoring.goals import GOALS, LABORATORY_GOALS, figures, targets
 
 Like = Callable[..., Outcome]
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rigsight.blind.parameter_errors import ParameterError, parameter_errors
+from rigsight.blind.scoring.parameter_errors import ParameterError, parameter_errors
 from rigsight.blind.subjects import TIERS
 from rigsight.effects import AT
 from rigsight.errors import InputError

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rigsight.blind.parameter_errors import parameter_errors
+from rigsight.blind.scoring.parameter_errors import parameter_errors
 from rigsight.effects import effect_named
 from rigsight.rigs import AXIS, RIGS, RUNNING_GEAR
 from rigsight.simulate import compose

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rigsight.blind.probability_scores import log_score
-from rigsight.blind.score import Outcome
-from rigsight.blind.shares import mean, mean_interval, median, median_interval, share_of
+from rigsight.blind.scoring.probability_scores import log_score
+from rigsight.blind.scoring.score import Outcome
+from rigsight.blind.scoring.shares import mean, mean_interval, median, median_interval, share_of
 from rigsight.blind.subjects import TIERS
 
 _LARGE_GAP = TIERS["clear"][0]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rigsight.blind.shares import Share, mean_interval, median, median_interval, quantile
+from rigsight.blind.scoring.shares import Share, mean_interval, median, median_interval, quantile
 
 
 def test_the_wilson_interval_of_nine_in_ten() -> None:
