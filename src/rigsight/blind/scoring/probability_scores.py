@@ -40,8 +40,8 @@ def scores_of(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Return the scores of one group of outcomes.
 
     ``log_score`` and ``brier`` are of the probability on the truth and on what was stated; ``slope`` and its standard error are
-    of the logistic regression of what came true on the log odds of what was stated: 1 is honest, less is boasting, more is too
-    modest. It is None where all came true, or nothing did.
+    of the logistic regression of what came true on the log odds of what was stated: 1 is calibrated, less is
+    overconfident, more is underconfident. It is None where all came true, or nothing did.
     """
     stated = np.array([o.stated for o in outcomes])
     true = np.array([o.stated_is_true for o in outcomes], dtype=bool)
