@@ -51,9 +51,9 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         ]
     parts += [
         "## Is a stated probability kept?",
-        _table(["Stated, mean", "Right", "Trials", "95 % interval"], views.reliability_rows(content)),
-        "By stratum. The slope is that of the logistic regression of what came true on the stated log odds: 1 is calibrated, less is "
-        "overconfident. The likely causes of a diagnosis are to hold the truth in 90 %.",
+        _table(["Stated, mean", "True", "Trials", "95 % interval"], views.reliability_rows(content)),
+        "By stratum. The slope is that of the logistic regression of what came true on the stated log odds: 1 is calibrated, "
+        "less is overconfident. The likely causes of a diagnosis are to hold the truth in 90 %.",
         _table(["Stratum", *views.SCORE_HEADS], views.score_rows(content)),
         "## Errors on withheld records",
         "In noise floors, from the model and the input alone, by kind and amplitude of the record; of all trials but those from "
