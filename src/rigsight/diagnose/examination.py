@@ -22,6 +22,7 @@ from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms, beyond_disturbance, with_parts
 from rigsight.diagnose.search.horizon import brings_back, preparing, windowing_of
+from rigsight.diagnose.search.joint_starts import with_joint_starts
 from rigsight.diagnose.search.one_law import split_distinguishable
 from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.pairs import grown, refit_singles
@@ -162,7 +163,7 @@ def examine(
         in_windows = _explained(cut, cut.singles, at_floor)
     checks = Checks(models.context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
     if not in_windows:
-        pairs = _grown(models, effects, forms, checks if lower_bound else None, ready)
+        pairs = _grown(models, effects, forms, checks, lower_bound, ready)
         models = replace(models, singles=refit_singles(models.context, models.singles, pairs))
         if windowing.whole and not is_predictable(models.context, models.reidentified, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
@@ -173,14 +174,14 @@ def examine(
     if cut is not None and in_windows:
         models = cut
     context, before, reidentified = models.context, models.before, models.reidentified
-    pairs, imitations = split_distinguishable(pairs, models.singles, allowed)
+    if in_windows:
+        checks = Checks(context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
+    pairs, imitations = split_distinguishable(pairs, models.singles, allowed, checks.is_adequate)
     best_single = min(
         contenders(models.singles), key=lambda model: model.error_over_noise, default=reidentified
     )
     evidence = Evidence(context, reidentified, best_single)
-    if in_windows:
-        checks = Checks(context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
-    else:
+    if not in_windows:
         stand = beyond_disturbance(evidence, models.singles, forms.with_own_evidence(models.singles, pairs))
         pairs = with_parts(stand, pairs)
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
@@ -305,7 +306,8 @@ def _grown(
     models: _Singly,
     effects: Sequence[Effect],
     forms: OtherForms,
-    of_unknown_noise: Checks | None,
+    checks: Checks,
+    lower_bound: bool,
     prepare: Prepare | None,
 ) -> list[Scored]:
     """Return models of two and three effects where a single effect leaves something to explain.
@@ -313,13 +315,16 @@ def _grown(
     Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
     """
     is_excused = False
-    if of_unknown_noise is not None and models.singles:
+    if lower_bound and models.singles:
         best = min(models.singles, key=lambda model: model.error_over_noise)
         is_excused = best.error_over_noise <= VERDICT.at_lower_bound
-        if is_excused and of_unknown_noise.is_adequate(best):
+        if is_excused and checks.is_adequate(best):
             return []
     worthwhile = models.reidentified.error_over_noise / VERDICT.worthwhile
     pairs = grown(models.context, models.singles, effects, VERDICT.at_floor, worthwhile, forms, prepare)
+    pairs = with_joint_starts(
+        models.context, models.reidentified, pairs, models.singles, effects, checks.is_adequate, prepare
+    )
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
 
 

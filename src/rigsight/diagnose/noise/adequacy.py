@@ -184,18 +184,20 @@ class Checks:
         self._at_floor = at_floor
         self._allowed = allowed
         self._rng = rng
-        self._known: dict[tuple[str, ...], Adequacy] = {}
+        self._known: dict[tuple[tuple[str, ...], float], Adequacy] = {}
 
     def of(self, model: Scored) -> Adequacy:
         """Return what a model's remainder goes with."""
-        if model.names not in self._known:
+        # A model may be fitted on, and then leaves something else.
+        own = model.names, model.fit.cost
+        if own not in self._known:
             significance = (
                 VERDICT.significance if model.error_over_noise <= self._allowed else VERDICT.against_a_floor
             )
             # Noise that only motion makes is no reason to say that nothing is missing.
             steady = not model.effects and model.error_over_noise > self._at_floor
-            self._known[model.names] = adequacy(self._context, model, self._rng, significance, steady)
-        return self._known[model.names]
+            self._known[own] = adequacy(self._context, model, self._rng, significance, steady)
+        return self._known[own]
 
     def is_adequate(self, model: Scored) -> bool:
         """Return True where nothing contradicts that it is noise and disturbance."""

@@ -157,6 +157,11 @@ class SearchNumbers:
         "budget",
         "Most promising pairs that are looked at from the fit of the second effect as well.",
     )
+    joint_starts: int = number(
+        18,
+        "budget",
+        "Starts of a pair of which no effect starts from a fit of its own, drawn where there are more.",
+    )
     most_added_steps: int = number(
         4,
         "budget",

@@ -81,6 +81,7 @@ def alternatives(answers: Answers) -> Iterator[tuple[str, str, Floats]]:
     for sensor in (s.name for s in rig.outputs):
         yield f"reading of {sensor}", sensor, _readings_of(answers, sensor)
         yield f"change of {sensor}", sensor, _changes_of(answers, sensor)
+        yield f"time, at {sensor}", sensor, _shown(answers, sensor, _course(answers))
     if len(answers.records) > 1:
         for name in answers.free:
             yield f"{BY_RECORD}{name}", "", _by_record(answers, answers.to_parameter(name))

@@ -8,7 +8,7 @@ fit had stopped short (seeds 3 to 8, `experiments/blind_small`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import sympy as sp
 
@@ -20,11 +20,15 @@ from rigsight.rigs import Rig
 
 
 def split_distinguishable(
-    pairs: Sequence[Scored], singles: Sequence[Scored], allowed: float
+    pairs: Sequence[Scored],
+    singles: Sequence[Scored],
+    allowed: float,
+    is_adequate: Callable[[Scored], bool],
 ) -> tuple[list[Scored], list[Scored]]:
     """Return the pairs that compete, and those that are one law and come near the floor as another form of it would.
 
-    Such a pair competes only where it reaches the floor and no single effect comes near it.
+    Such pairs compete only where no single effect comes near the floor and the best of them leaves noise and disturbance: what
+    only imitates a law leaves something that goes with the motion.
 
     Parameters
     ----------
@@ -32,14 +36,16 @@ def split_distinguishable(
         Scored models.
     allowed
         What a named cause may leave, in units of the noise floor.
+    is_adequate
+        Says whether what a model leaves is noise and disturbance.
     """
     best = min((model.error_over_noise for model in singles), default=float("inf"))
-    competing: list[Scored] = []
-    imitations: list[Scored] = []
-    for pair in pairs:
-        stands = not _has_one_law(pair) or (pair.error_over_noise <= VERDICT.exact and best > allowed)
-        (competing if stands else imitations).append(pair)
-    return competing, imitations
+    of_one_law = [pair for pair in pairs if _has_one_law(pair)]
+    if not of_one_law:
+        return list(pairs), []
+    if best > allowed and is_adequate(min(of_one_law, key=lambda pair: pair.error_over_noise)):
+        return list(pairs), []
+    return [pair for pair in pairs if pair not in of_one_law], of_one_law
 
 
 def _has_one_law(model: Scored) -> bool:

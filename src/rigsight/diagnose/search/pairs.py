@@ -19,6 +19,7 @@ from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
+from rigsight.diagnose.search.late_shifts import without_late_shifts
 from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.diagnose.search.third_effect import with_a_third, with_relatives
@@ -123,10 +124,25 @@ def grown(
         for pair in pairs
         if pair.error_over_noise <= allowed or any(set(pair.names) < own for own in of_triples)
     ]
-    return [
-        replace(model, effects=tuple(sorted(model.effects, key=lambda effect: alone[effect.name])))
-        for model in (*pairs, *triples)
-    ]
+    return larger_first(without_late_shifts([*pairs, *triples]), singles)
+
+
+def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:
+    """Return models with the effect first that explains more by itself.
+
+    Parameters
+    ----------
+    models
+        Of several effects.
+    singles
+        Every effect alone, fitted and scored.
+    """
+    alone = {model.names[0]: model.error_over_noise for model in singles}
+
+    def left(effect: Effect) -> float:
+        return alone.get(effect.name, np.inf)
+
+    return [replace(model, effects=tuple(sorted(model.effects, key=left))) for model in models]
 
 
 def _half_closed(left: float) -> float:

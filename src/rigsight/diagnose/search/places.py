@@ -30,8 +30,8 @@ class Search:
         All of them, the most suspected first; empty on a rig with one motion, where each kind of effect has one place.
     effects
         Candidates that are looked at.
-    most
-        Largest share of the squared remainder that a push takes away.
+    shares
+        Share of the squared remainder that the best push of an effect takes away, by its name.
     starts
         Own values of an effect with which its push takes most away, by its name.
     others
@@ -40,9 +40,14 @@ class Search:
 
     places: tuple[SuspectedPlace, ...]
     effects: tuple[Effect, ...]
-    most: float
+    shares: Mapping[str, float]
     starts: Mapping[str, Mapping[str, float]]
     others: tuple[Effect, ...] = ()
+
+    @property
+    def most(self) -> float:
+        """Largest share of the squared remainder that a push takes away."""
+        return max(self.shares.values(), default=0.0)
 
 
 def search_places(context: FitContext, model: Scored, effects: Sequence[Effect]) -> Search:
@@ -62,12 +67,13 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]
     # One mass shows in seconds what goes with its motion; what tells joints apart may stand in one of the records.
     suspects = Lineup(context, model, liveliest=context.rig.has_one_motion).suspects(pushing)
-    most = max((suspect.share for suspect in suspects), default=0.0)
+    own_shares = {suspect.effect.name: suspect.share for suspect in suspects}
+    most = max(own_shares.values(), default=0.0)
     starts = {suspect.effect.name: suspect.values for suspect in suspects if suspect.values}
     if context.rig.has_one_motion:
-        promising = _promising(effects, suspects)
+        promising = _promising(effects, own_shares)
         return Search(
-            (), promising, most, starts, tuple(effect for effect in effects if effect not in promising)
+            (), promising, own_shares, starts, tuple(effect for effect in effects if effect not in promising)
         )
     shares = _by_place(context, suspects)
     places = sorted(
@@ -77,13 +83,16 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
     looked_at = {place.name for place in places if place.looked_at}
     first = [e for e in effects if _stands_for_itself(e) or context.rig.acts_at(e) in looked_at]
     return Search(
-        tuple(places), tuple(first), most, starts, tuple(effect for effect in effects if effect not in first)
+        tuple(places),
+        tuple(first),
+        own_shares,
+        starts,
+        tuple(effect for effect in effects if effect not in first),
     )
 
 
-def _promising(effects: Sequence[Effect], suspects: Sequence[Suspect]) -> tuple[Effect, ...]:
+def _promising(effects: Sequence[Effect], shares: Mapping[str, float]) -> tuple[Effect, ...]:
     """Return the effects whose push takes away enough, those that no push tells of, and the simpler ones that they start from."""
-    shares = {suspect.effect.name: suspect.share for suspect in suspects}
     enough = VERDICT.larger_part * max(shares.values(), default=0.0)
     found = [effect for effect in effects if shares.get(effect.name, enough) >= enough]
     parents = {name for effect in found for name in effect.parents}

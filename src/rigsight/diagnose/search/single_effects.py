@@ -22,6 +22,7 @@ from rigsight.diagnose.search.first_look import (
     mean_square,
     widened,
 )
+from rigsight.diagnose.search.late_shifts import without_late_shifts
 from rigsight.diagnose.search.starts import restart_values, sized, start_values
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
@@ -84,9 +85,7 @@ def fit_candidates(
 
     models = list(context.threads.side_by_side(one, looks))
     refined = in_lowest_basins(context, refine(context, [*known, *models]))
-    refined = with_a_mean_that_is_needed(context, refined)
-    late = {m.effects[0].at for m in refined if m.effects[0].measured_late is not None and not _shift(m)}
-    return [model for model in refined if not (_shift(model) > 0.0 and model.effects[0].at in late)]
+    return without_late_shifts(with_a_mean_that_is_needed(context, refined))
 
 
 def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> Scored:
@@ -102,12 +101,6 @@ def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> S
     known = context.constant_forces_beside(look.effects)
     begin = replace(base, values={**start, **base.values, **faint, **known})
     return _fitted(context, look.effects, structure, look.free, (begin,), promising=False)
-
-
-def _shift(model: Scored) -> float:
-    """Return the time by which a single effect shifts a record: late it is what a late sensor shows as well [s]."""
-    (effect,), fit = model.effects, model.fit
-    return sum(fit.structure.values_of(effect, fit.values).values()) if effect.shifts_the_record else 0.0
 
 
 def with_a_mean_that_is_needed(context: FitContext, models: Sequence[Scored]) -> list[Scored]:

@@ -43,6 +43,8 @@ _CHECKSUM_SIZE = 64
 
 _kernels: dict[str, Kernel] = {}
 _by_identity: dict[int, tuple[Structure, str]] = {}
+_texts: dict[int, tuple[Structure, str]] = {}
+"""C texts of structures that were asked for and have no kernel here yet: printing one takes some 20 ms."""
 _lock = threading.Lock()
 _made: dict[str, threading.Lock] = {}
 """Who makes a kernel; another one may be compiled at the same time."""
@@ -93,13 +95,14 @@ def kernel_of(structure: Structure) -> Kernel:
         if known is not None:
             return known
         # Threads write texts one after the other, which takes no longer: this is all Python. Compilers run side by side.
-        text = kernel_source(structure)
+        text = _text(structure)
         key = hashlib.sha256(text.encode()).hexdigest()
         own = _made.setdefault(key, threading.Lock())
     with own:
         if key not in _kernels:
             _kernels[key] = Kernel(_library_file(text), structure)
         _by_identity[id(structure)] = (structure, key)
+        _texts.pop(id(structure), None)
         return _kernels[key]
 
 
@@ -112,8 +115,15 @@ def compiled(structure: Structure) -> bool:
     """Return True if this machine holds the machine code of a structure's kernels already."""
     if _loaded(structure) is not None:
         return True
-    text = kernel_source(structure)
+    text = _text(structure)
     return any(_sound(_path(text, compiler)) for compiler in c_compilers())
+
+
+def _text(structure: Structure) -> str:
+    known = _texts.get(id(structure))
+    if known is None or known[0] is not structure:
+        known = _texts[id(structure)] = (structure, kernel_source(structure))
+    return known[1]
 
 
 def _library_file(text: str) -> Path:

@@ -1,0 +1,126 @@
+"""Where the best pair still leaves something: does a relative of it explain more, if both effects start from their own guesses?
+
+Pairs are grown from a single effect that was fitted alone. Where that fit had to bend far for what a second effect does, the
+second one starts in the wrong place and a relative of it, which is easier to find, wins. Here no fit of a single effect is a
+start: the equations are those without an effect, and each of the two has its declared numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.policy import SEARCH, VERDICT
+from rigsight.diagnose.search.first_look import looked_from, widened
+from rigsight.diagnose.search.one_more_effect import Prepare
+from rigsight.diagnose.search.pairs import larger_first
+from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.single_effects import finished, followed, refine
+from rigsight.diagnose.search.starts import start_values
+from rigsight.effects import Effect
+from rigsight.identify import FitResult
+
+_SEED = 0
+"""Starts are the same for equal pairs: a diagnosis depends on its records alone."""
+
+
+def with_joint_starts(
+    context: FitContext,
+    reidentified: Scored,
+    models: Sequence[Scored],
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    is_adequate: Callable[[Scored], bool],
+    prepare: Prepare | None = None,
+) -> list[Scored]:
+    """Return the models of several effects, with those relatives of the best pair that explain more than it does.
+
+    Parameters
+    ----------
+    context
+        Records, scales and noise.
+    reidentified
+        The equations without an effect.
+    models
+        Of several effects, fitted and scored.
+    singles
+        Every effect alone, fitted and scored.
+    effects
+        Candidates.
+    is_adequate
+        Says whether what a model leaves is noise and disturbance: then no other pair is looked for.
+    prepare
+        Called with the structures that are about to be looked at, to compile them side by side.
+    """
+    best = _plainest_of_the_best(models)
+    if best is None or len(best.effects) != 2 or best.error_over_noise <= VERDICT.exact or is_adequate(best):
+        return list(models)
+    alone = {model.names[0]: model for model in singles if model.residuals}
+    relatives = list(_relatives(context, best, alone, effects))
+    if prepare is not None:
+        prepare([context.simplest(two) for two in relatives])
+    looks = list(
+        context.threads.side_by_side(
+            lambda two: looked_from(
+                context, two, context.simplest(two), _starts(context, two, reidentified.fit)
+            ),
+            relatives,
+        )
+    )
+    promising = sorted(widened(context, looks), key=lambda look: look.cost)[: SEARCH.most_finished]
+    found = [
+        finished(context, followed(context, look, promising=True, finish=False))
+        for look in promising
+        if look.cost < SEARCH.near_the_best * best.fit.cost
+    ]
+    better = [m for m in refine(context, found) if m.error_over_noise < best.error_over_noise]
+    new = {frozenset(model.names) for model in better}
+    return [*larger_first(better, singles), *(m for m in models if frozenset(m.names) not in new)]
+
+
+def _plainest_of_the_best(models: Sequence[Scored]) -> Scored | None:
+    lowest = min((model.error_over_noise for model in models), default=np.inf)
+    near = [m for m in models if m.error_over_noise <= SEARCH.alike_pairs * lowest]
+    return min(near, key=lambda model: (model.n_free, model.error_over_noise), default=None)
+
+
+def _relatives(
+    context: FitContext, pair: Scored, alone: Mapping[str, Scored], effects: Sequence[Effect]
+) -> Iterator[tuple[Effect, Effect]]:
+    """Yield the pair, and those with another effect at the place of one of the two.
+
+    One whose push explains about as much beside the other effect; where a force with memory is replaced any other one too, as
+    what such a force does depends on its inner numbers, at which a push stands still.
+    """
+    yield pair.effects[0], pair.effects[1]
+    for kept, replaced in (pair.effects, pair.effects[::-1]):
+        if kept.name not in alone:
+            continue
+        place = context.rig.acts_at(replaced)
+        instead = [
+            e for e in context.offered(effects) if context.rig.acts_at(e) == place and e not in pair.effects
+        ]
+        shares = search_places(context, alone[kept.name], [replaced, *instead]).shares
+        enough = VERDICT.larger_part * max(shares.values(), default=0.0)
+        yield from (
+            (kept, e) for e in instead if shares.get(e.name, 0.0) >= enough or (e.states and replaced.states)
+        )
+
+
+def _starts(context: FitContext, two: tuple[Effect, Effect], base: FitResult) -> list[dict[str, float]]:
+    """Return values of all parameters: any declared numbers of the one with any of the other, a draw of them where they are many."""
+    first, structure = context.simplest(two[:1]), context.simplest(two)
+    found = [
+        values
+        for start in start_values(context, first, two[0], base, {})
+        for values in start_values(
+            context, structure, two[1], replace(base, values=start, structure=first), {}
+        )
+    ]
+    if len(found) <= SEARCH.joint_starts:
+        return found
+    drawn = np.random.default_rng(_SEED).choice(len(found), SEARCH.joint_starts, replace=False)
+    return [found[i] for i in np.sort(drawn)]
