@@ -32,10 +32,11 @@ def test_above_a_lower_bound_a_pair_must_reach_it(
 ) -> None:
     found = [scored(PAIR, error_over_noise=pair)]
     monkeypatch.setattr(examination, "grown", lambda *_: found)
+    monkeypatch.setattr(examination, "with_joint_starts", lambda _context, _without, pairs, *_: pairs)
     reidentified = scored((), error_over_noise=40.0)
     models = SimpleNamespace(
         context=None, singles=[scored(SINGLE, error_over_noise=single)], reidentified=reidentified
     )
-    checks = None if adequate is None else SimpleNamespace(is_adequate=lambda _: adequate)
-    kept = examination._grown(models, [], None, checks, None)
+    checks = SimpleNamespace(is_adequate=lambda _: adequate)
+    kept = examination._grown(models, [], None, checks, adequate is not None, None)
     assert kept == (found if competes else [])

@@ -35,6 +35,12 @@ def test_noise_does_not_run_away() -> None:
     assert np.max(np.abs(continued(noise, 100))) < 3.0 * np.max(np.abs(noise))
 
 
+def test_the_size_of_a_signal_is_no_matter() -> None:
+    """A model that runs away moves by 1e200 and more: squares of that are no numbers."""
+    signal = tones(T[60:-60])
+    np.testing.assert_allclose(continued(1e250 * signal, 60), 1e250 * continued(signal, 60), rtol=1e-6)
+
+
 def test_slopes_of_a_sampled_analog_signal_are_right_to_its_last_sample() -> None:
     """A reflection of the samples at the end made the last slope wrong by several percent of the largest."""
     inside = T[60:-60]

@@ -141,6 +141,24 @@ def test_the_joint_is_told(train: Any) -> None:
     assert found.agreements[0].place == "load_bearing"
 
 
+def test_a_sensor_that_drifts_is_told_though_another_one_stands_still(train: Any) -> None:
+    """A disturbance wanders too, but moves both sensors: what one of them alone shows is its own."""
+    rig, drift = RIGS["drive_train"], 10.0 * train.noise
+    records = [
+        r.with_signals(load_angle=r["load_angle"] + drift * np.linspace(-1.0, 1.0, r.n_samples))
+        for r in train.records([], {})
+    ]
+    estimation = tuple(r for r in records if r.role == "estimation")
+    scoring = tuple(r for r in records if r.role == "validation")
+    scales = characteristic_scales(rig, estimation, train.values)
+    noise = {signal.name: train.noise for signal in rig.outputs}
+    context = FitContext(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
+    found = asked(context, reidentify(context, train.values))
+    assert not found.adequate
+    assert found.agreements[0].what == "time, at load_angle"
+    assert found.place == "load_angle"
+
+
 def test_what_stands_in_a_few_stretches_is_no_noise() -> None:
     context = axis_bench()
     record = context.scoring[0]

@@ -28,23 +28,38 @@ def test_one_law_is_told_from_two(scored, effects: tuple[str, ...], one: bool) -
 
 
 @pytest.mark.parametrize(
-    ("effects", "left", "single", "stays"),
+    ("effects", "leaves_noise", "single", "stays"),
     [
-        (SPRINGS, 1.0, 5.0, True),
-        (SPRINGS, 1.06, 5.0, False),
-        (SPRINGS, 1.0, 1.1, False),
-        (UNLIKE, 1.06, 5.0, True),
-        (UNLIKE, 1.0, 1.1, True),
+        (SPRINGS, True, 5.0, True),
+        (SPRINGS, False, 5.0, False),
+        (SPRINGS, True, 1.1, False),
+        (UNLIKE, False, 5.0, True),
+        (UNLIKE, True, 1.1, True),
     ],
 )
-def test_a_pair_of_one_law_must_be_exact_and_needed(
-    scored, effects: tuple[str, ...], left: float, single: float, stays: bool
+def test_a_pair_of_one_law_must_leave_noise_and_be_needed(
+    scored, effects: tuple[str, ...], leaves_noise: bool, single: float, stays: bool
 ) -> None:
-    pair = scored(effects, error_over_noise=left)
+    pair = scored(effects, error_over_noise=1.04)
     kept, imitations = split_distinguishable(
-        [pair], [scored((effects[0],), error_over_noise=single)], allowed=1.15
+        [pair], [scored((effects[0],), error_over_noise=single)], 1.15, lambda _: leaves_noise
     )
     assert (kept, imitations) == (([pair], []) if stays else ([], [pair]))
+
+
+def test_the_best_pair_of_one_law_is_asked_for_all(scored) -> None:
+    near, far = scored(SPRINGS, error_over_noise=1.02), scored(SPRINGS, error_over_noise=1.4)
+    asked = []
+
+    def leaves_noise(model) -> bool:
+        asked.append(model)
+        return True
+
+    kept, _ = split_distinguishable(
+        [far, near], [scored(SPRINGS[:1], error_over_noise=5.0)], 1.15, leaves_noise
+    )
+    assert kept == [far, near]
+    assert asked == [near]
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)

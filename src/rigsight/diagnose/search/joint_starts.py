@@ -111,7 +111,7 @@ def _relatives(
 
 
 def _starts(context: FitContext, two: tuple[Effect, Effect], base: FitResult) -> list[dict[str, float]]:
-    """Return values of all parameters: any declared numbers of the one with any of the other, a draw of them where they are many."""
+    """Return values of all parameters: any declared numbers of one with any of the other; a draw of them where they are many."""
     first, structure = context.simplest(two[:1]), context.simplest(two)
     found = [
         values

@@ -1,6 +1,6 @@
 """Which time shifts say the same as a late sensor?
 
-A reading that is late by its time base and one that is late by its sensor obey one equation; only an early one is a shift for sure.
+A reading that is late by its time base and one that is late by its sensor obey one equation; only an early one is surely a shift.
 """
 
 from __future__ import annotations

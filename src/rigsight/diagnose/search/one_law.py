@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 import sympy as sp
 
 from rigsight.diagnose.fitting.fit_context import Scored
-from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Rig
