@@ -37,7 +37,7 @@ def _is_late(effect: Effect) -> bool:
     return effect.measured_late is not None and not effect.shifts_the_record
 
 
-def _but(model: Scored, effect: Effect) -> tuple[frozenset[str], str]:
+def _but(model: Scored, effect: Effect) -> tuple[frozenset[str], str | None]:
     """Return the names of the other effects, and where this one acts."""
     return frozenset(model.names) - {effect.name}, effect.at
 

@@ -104,16 +104,29 @@ def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> S
 
 
 def with_a_mean_that_is_needed(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return single effects without those whose mean force nothing asks for.
+    """Return the models without those whose mean force nothing asks for.
 
-    An effect with a mean force, and a plainer one beside a constant force, are the same equation. Where the plainer one leaves
-    the constant forces where they are known to be, it is the whole of it.
+    An effect with a mean force, and a plainer one beside a constant force, are the same equation. Where the plainer one, beside
+    the same others, leaves the constant forces where they are known to be, it is the whole of it.
+
+    Parameters
+    ----------
+    context
+        Says which constant forces are known.
+    models
+        Of one or several effects, fitted and scored.
     """
-    alone = {model.names: model.fit for model in models}
+    fits = {frozenset(model.names): model.fit for model in models}
 
     def is_needed(model: Scored) -> bool:
         held = context.constant_forces_beside(model.effects)
-        plainer = [alone[name,] for name in model.effects[0].parents if (name,) in alone]
+        plainer = [
+            fit
+            for effect in model.effects
+            if effect.holds_constant_force
+            for parent in effect.parents
+            if (fit := fits.get(frozenset(model.names) - {effect.name} | {parent})) is not None
+        ]
         return not held or not plainer or any(_moves(context, fit, held) for fit in plainer)
 
     return [model for model in models if is_needed(model)]
