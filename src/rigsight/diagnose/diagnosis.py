@@ -216,6 +216,7 @@ def _assembled(
         where=where,
         ambiguous_with=tuple(rivals),
         likely=likely,
+        error_of_choice=ranking.error_of_choice if np.isfinite(ranking.error_of_choice) else None,
         candidates=candidates,
         gap=gap,
         noise_floors=floors,

@@ -173,6 +173,9 @@ class Diagnosis:
         What it leaves above them; None as above.
     likely
         The causes that the records leave open.
+    error_of_choice
+        What models chosen by some stretches of the scored records leave of the others, in units of the noise floor; None where no
+        model with an effect could be scored.
     trust
         Whether the numbers of the verdict's model are the same in every record, at every amplitude and in shorter windows; None
         where that was not asked.
@@ -205,6 +208,7 @@ class Diagnosis:
     adequate: bool | None = None
     remainder: Remainder | None = None
     likely: LikelyCauses = field(default_factory=LikelyCauses)
+    error_of_choice: float | None = None
     trust: Trust | None = None
 
     def to_json(self) -> dict[str, Any]:
@@ -224,6 +228,7 @@ class Diagnosis:
                 "effects": [list(effects) for effects in self.likely.sets],
                 "outside": self.likely.outside,
             },
+            "error_of_choice": None if self.error_of_choice is None else _number(self.error_of_choice),
             "candidates": [_candidate(candidate) for candidate in self.candidates],
             "gap": {
                 output: {

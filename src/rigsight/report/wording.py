@@ -309,5 +309,11 @@ def basis_sentence(diagnosis: Diagnosis) -> str:
     elif diagnosis.bandwidth is not None:
         windows = f", of models that follow the measured motion up to {diagnosis.bandwidth:.3g} rad/s"
     if diagnosis.scored_on == "validation":
-        return f"Errors are those of validation records, which were not fitted{windows}."
+        chosen = ""
+        if diagnosis.verdict == "effect" and diagnosis.error_of_choice is not None:
+            chosen = (
+                " They also chose the model: a choice by some stretches of them leaves "
+                f"{diagnosis.error_of_choice:.3g} times the noise floor in the others."
+            )
+        return f"Errors are those of validation records, which were not fitted{windows}.{chosen}"
     return f"There is no validation record: errors are those of the fitted records{windows}, and too good."

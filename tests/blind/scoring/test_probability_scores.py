@@ -68,7 +68,7 @@ def test_sets_are_counted_where_there_are_any(outcome_like, wrong_outcome) -> No
     assert scores["set_size"] == pytest.approx(2.0)
 
 
-def test_strata_are_kinds_designs_and_rigs_with_several_places(outcome_like, wrong_outcome) -> None:
+def test_strata_are_verdicts_kinds_designs_and_rigs_with_several_places(outcome_like, wrong_outcome) -> None:
     scores = probability_scores(
         [outcome_like(), outcome_like(kind="pair", looked_at=True), wrong_outcome(verdict="failed", named=())]
     )
@@ -79,5 +79,22 @@ def test_strata_are_kinds_designs_and_rigs_with_several_places(outcome_like, wro
         "kind: single",
         "one place",
         "several places",
+        "verdict: one effect",
     ]
     assert scores["all"]["count"] == 2, "a diagnosis that failed states nothing"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named", "stratum"),
+    [
+        ("effect", ("backlash",), "one effect"),
+        ("effect", ("backlash", "coulomb_friction"), "several effects"),
+        ("unknown", (), "unknown"),
+        ("none", (), "none or parameters"),
+        ("parameters", (), "none or parameters"),
+    ],
+)
+def test_the_stratum_of_a_verdict_is_known_without_the_key(
+    outcome_like, verdict: str, named: tuple[str, ...], stratum: str
+) -> None:
+    assert f"verdict: {stratum}" in probability_scores([outcome_like(verdict=verdict, named=named)])

@@ -183,3 +183,20 @@ def test_evidence_decides_between_models_whose_errors_tell_little(scored, white)
     assert ranking.order[0] is true
     assert ranking.tied == ()
     assert rank(models, np.ones(1), rng, criterion=lambda _: 0.0).tied == (true,)
+
+
+def test_what_chose_a_model_does_not_report_its_error(scored) -> None:
+    """Of twenty models that are alike the luckiest is chosen; on stretches that did not choose, its luck is gone."""
+    rng = np.random.default_rng(3)
+    swelling = np.repeat(np.exp(0.5 * rng.standard_normal((20, 40))), N // 40, axis=1)
+    noise = rng.standard_normal((20, N)) * swelling
+    models = [scored(("cubic_stiffness",), own, n_free=5) for own in noise]
+    ranking = ranked(*models)
+    expected = np.sqrt(np.mean(noise**2))
+    assert ranking.order[0].error_over_noise < 0.95 * expected
+    assert ranking.error_of_choice > 1.03 * ranking.order[0].error_over_noise
+
+
+def test_one_model_is_chosen_by_nothing(scored, white) -> None:
+    ranking = ranked(scored(("cubic_stiffness",), white, n_free=5))
+    assert ranking.error_of_choice == pytest.approx(ranking.order[0].error_over_noise, rel=0.01)

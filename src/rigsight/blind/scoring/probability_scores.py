@@ -26,14 +26,25 @@ LEAST_PROBABILITY = 1e-3
 
 
 def probability_scores(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
-    """Return the scores of all outcomes and of each stratum: by kind of subject, design, and rigs with several places."""
+    """Return the scores of all outcomes and of each stratum: by verdict, kind of subject, design, and rigs with several places.
+
+    Probabilities can be calibrated in strata that a diagnosis knows of, as those by verdict. By what is hidden they cannot: of
+    causes from outside less comes true than is stated, as nobody knows that they are.
+    """
     stating = [o for o in outcomes if o.verdict != FAILED]
     strata: dict[str, list[Outcome]] = {ALL: stating}
     for found in stating:
+        strata.setdefault(f"verdict: {_verdict(found)}", []).append(found)
         strata.setdefault(f"kind: {found.kind}", []).append(found)
         strata.setdefault(f"design: {found.design}", []).append(found)
         strata.setdefault("one place" if found.looked_at is None else "several places", []).append(found)
     return {name: scores_of(strata[name]) for name in sorted(strata, key=lambda n: (n != ALL, n))}
+
+
+def _verdict(found: Outcome) -> str:
+    if found.verdict == "effect":
+        return "one effect" if len(found.named) == 1 else "several effects"
+    return found.verdict if found.verdict == "unknown" else "none or parameters"
 
 
 def scores_of(outcomes: Sequence[Outcome]) -> dict[str, Any]:

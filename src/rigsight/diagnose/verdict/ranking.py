@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -48,12 +49,16 @@ class Ranking:
         Models whose held-out error cannot be told from the chosen one's.
     grounds
         What each probability rests on, in the same order.
+    error_of_choice
+        What the model that wins in a resampling leaves of the stretches that were not drawn, in units of the noise floor, root
+        mean square of all resamplings: what has chosen a model does not report its error. Not a number where none was drawn.
     """
 
     order: tuple[Scored, ...]
     probabilities: tuple[float, ...]
     tied: tuple[Scored, ...]
     grounds: tuple[Grounds, ...]
+    error_of_choice: float = math.nan
 
 
 def rank(
@@ -86,7 +91,8 @@ def rank(
 
     References
     ----------
-    H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap.
+    H. R. Kuensch, Ann. Statist. 17 (1989) 1217, for the block bootstrap. B. Efron and R. Tibshirani, J. Am. Stat. Assoc. 92
+    (1997) 548, for errors on what was not drawn.
     """
     usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
     failed = [m for m in models if m not in usable]
@@ -125,7 +131,8 @@ def rank(
     plain = tie & (n_effects == plainest)
     lowest = np.min(np.where(plain, resampled, np.inf), axis=1, keepdims=True)
     ahead = plain & (resampled <= lowest * (1.0 + fine))
-    wins = np.mean((1.0 - VERDICT.hint) * _shared(tie, prior) + VERDICT.hint * _shared(ahead, prior), axis=0)
+    won = (1.0 - VERDICT.hint) * _shared(tie, prior) + VERDICT.hint * _shared(ahead, prior)
+    wins = np.mean(won, axis=0)
     evidence = _evidence_of(usable, errors / best, criterion)
     weights = _tempered(evidence) if evidence_counts else np.ones(len(usable))
     likelihood = (wins + VERDICT.negligible * np.exp(-VERDICT.fall * (errors / best - 1.0))) * weights
@@ -149,7 +156,17 @@ def rank(
             *(Grounds(float(probabilities[i]), float(wins[i]), evidence[i]) for i in order),
             *(Grounds(0.0, 0.0, None) for _ in failed),
         ),
+        error_of_choice=_error_of_choice(squares, draws, np.argmax(won * weights, axis=1)),
     )
+
+
+def _error_of_choice(
+    squares: NDArray[np.float64], draws: NDArray[np.int64], winners: NDArray[np.int64]
+) -> float:
+    """Return the error of each resampling's winner on the blocks that are not in it, root mean square."""
+    left_out = np.ones((draws.shape[0], squares.shape[0]), dtype=bool)
+    np.put_along_axis(left_out, draws, values=False, axis=1)
+    return float(np.sqrt(np.mean(squares[:, winners].T[left_out]))) if left_out.any() else math.nan
 
 
 def _evidence_of(
