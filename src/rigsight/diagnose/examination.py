@@ -321,11 +321,30 @@ def _grown(
         if is_excused and checks.is_adequate(best):
             return []
     worthwhile = models.reidentified.error_over_noise / VERDICT.worthwhile
-    pairs = grown(models.context, models.singles, effects, VERDICT.at_floor, worthwhile, forms, prepare)
+    pairs = grown(
+        models.context,
+        models.singles,
+        effects,
+        _nothing_left(models.singles, checks, lower_bound),
+        worthwhile,
+        forms,
+        prepare,
+    )
     pairs = with_joint_starts(
         models.context, models.reidentified, pairs, models.singles, effects, checks.is_adequate, prepare
     )
     return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
+
+
+def _nothing_left(singles: Sequence[Scored], checks: Checks, lower_bound: bool) -> float:
+    """Return the error, in units of the noise floor, up to which no second effect is asked for.
+
+    A floor is known to a few percent. Within these the remainder of the best effect tells whether it is noise.
+    """
+    best = min(singles, key=lambda model: model.error_over_noise, default=None)
+    if lower_bound or best is None or not VERDICT.exact < best.error_over_noise <= VERDICT.at_floor:
+        return VERDICT.at_floor
+    return VERDICT.at_floor if checks.is_adequate(best) else VERDICT.exact
 
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:

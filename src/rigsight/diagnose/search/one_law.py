@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import sympy as sp
 
 from rigsight.diagnose.fitting.fit_context import Scored
+from rigsight.diagnose.policy import VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.effects import symbols as canonical
 from rigsight.rigs import Rig
@@ -26,8 +27,8 @@ def split_distinguishable(
 ) -> tuple[list[Scored], list[Scored]]:
     """Return the pairs that compete, and those that are one law and come near the floor as another form of it would.
 
-    Such pairs compete only where no single effect comes near the floor and the best of them leaves noise and disturbance: what
-    only imitates a law leaves something that goes with the motion.
+    Such pairs compete only where no single effect comes near the floor and the best of them reaches it, or leaves noise and
+    disturbance: what only imitates a law leaves something that goes with the motion.
 
     Parameters
     ----------
@@ -42,7 +43,8 @@ def split_distinguishable(
     of_one_law = [pair for pair in pairs if _has_one_law(pair)]
     if not of_one_law:
         return list(pairs), []
-    if best > allowed and is_adequate(min(of_one_law, key=lambda pair: pair.error_over_noise)):
+    nearest = min(of_one_law, key=lambda pair: pair.error_over_noise)
+    if best > allowed and (nearest.error_over_noise <= VERDICT.exact or is_adequate(nearest)):
         return list(pairs), []
     return [pair for pair in pairs if pair not in of_one_law], of_one_law
 

@@ -118,7 +118,7 @@ def grown(
     n_finished = sum(pair.error_over_noise <= SEARCH.alike_pairs * last for pair in pairs)
     pairs = [*(finished(context, pair) for pair in pairs[:n_finished]), *pairs[n_finished:]]
     pairs = refine(context, pairs)
-    triples = with_a_third(context, usable, pairs, effects, at_floor, forms, prepare)
+    triples = with_a_third(context, usable, pairs, effects, forms, prepare)
     nearest = min((pair.error_over_noise for pair in pairs), default=np.inf)
     triples = [triple for triple in triples if triple.error_over_noise <= _half_closed(nearest)]
     if triples:

@@ -27,7 +27,6 @@ def with_a_third(
     singles: Sequence[Scored],
     pairs: Sequence[Scored],
     effects: Sequence[Effect],
-    at_floor: float,
     forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
@@ -41,8 +40,6 @@ def with_a_third(
         Fitted and scored.
     effects
         Candidates for the third place.
-    at_floor
-        Held-out error in units of the noise floor at which nothing is left to explain.
     forms
         Says what other forms of the two would explain.
     prepare
@@ -52,7 +49,7 @@ def with_a_third(
     alone = min((model.error_over_noise for model in singles), default=np.inf)
     if (
         best is None
-        or best.error_over_noise <= at_floor
+        or best.error_over_noise <= VERDICT.at_floor
         or not best.error_over_noise * VERDICT.worthwhile < alone
     ):
         return []
