@@ -24,7 +24,8 @@ class VerdictNumbers:
         "assumption",
         (
             "Error in units of the floor above which something is left to explain: another parent is tried, an "
-            "exponent is released, and two effects that are one law are not believed."
+            "exponent is released, and the remainder of a single effect, or of two that are one law, is asked "
+            "whether it is noise."
         ),
         set_by="14 pairs that were one law on drawn rigs: the two true ones left 0.99 and 1.01, seven others 1.05 to 1.10",
     )
