@@ -55,11 +55,22 @@ def with_joint_starts(
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     """
-    best = _plainest_of_the_best(models)
-    if best is None or len(best.effects) != 2 or best.error_over_noise <= VERDICT.exact or is_adequate(best):
+    nearest = _plainest_of_the_best(models)
+    if not nearest or len(nearest[0].effects) != 2:
+        return list(models)
+    best = nearest[0]
+    if best.error_over_noise <= VERDICT.exact or is_adequate(best):
         return list(models)
     alone = {model.names[0]: model for model in singles if model.residuals}
-    relatives = list(_relatives(context, best, alone, effects))
+    # Of two that say the same, such as a late drive and a late sensor, each has relatives of its own.
+    relatives = list(
+        {
+            frozenset(effect.name for effect in two): two
+            for pair in nearest
+            if len(pair.effects) == 2
+            for two in _relatives(context, pair, alone, effects)
+        }.values()
+    )
     if prepare is not None:
         prepare([context.simplest(two) for two in relatives])
     looks = list(
@@ -70,21 +81,26 @@ def with_joint_starts(
             relatives,
         )
     )
-    promising = sorted(widened(context, looks), key=lambda look: look.cost)[: SEARCH.most_finished]
+    promising = sorted(
+        (look for look in widened(context, looks) if look.cost < SEARCH.near_the_best * best.fit.cost),
+        key=lambda look: look.cost,
+    )
+    last = promising[: SEARCH.most_finished][-1].cost if promising else 0.0
     found = [
         finished(context, followed(context, look, promising=True, finish=False))
         for look in promising
-        if look.cost < SEARCH.near_the_best * best.fit.cost
+        if look.cost <= SEARCH.alike_pairs**2 * last
     ]
     better = [m for m in refine(context, found) if m.error_over_noise < best.error_over_noise]
     new = {frozenset(model.names) for model in better}
     return [*larger_first(better, singles), *(m for m in models if frozenset(m.names) not in new)]
 
 
-def _plainest_of_the_best(models: Sequence[Scored]) -> Scored | None:
+def _plainest_of_the_best(models: Sequence[Scored]) -> list[Scored]:
+    """Return the nearest models, of those that explain as much the ones with the fewest numbers first."""
     lowest = min((model.error_over_noise for model in models), default=np.inf)
     near = [m for m in models if m.error_over_noise <= SEARCH.alike_pairs * lowest]
-    return min(near, key=lambda model: (model.n_free, model.error_over_noise), default=None)
+    return sorted(near, key=lambda model: (model.n_free, model.error_over_noise))[: SEARCH.most_finished]
 
 
 def _relatives(
