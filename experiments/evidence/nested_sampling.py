@@ -38,11 +38,11 @@ def log_evidence(context: FitContext, model: Scored, variance: float, seed: int)
     center = np.array([best.values[name] for name in names])
     # The formula's covariance allows for colored residuals; under white noise it is the inverse of the normal matrix.
     root = np.linalg.cholesky(best.covariance)
-    reference = own.fit(best.values, [], best.initial_states, STATES, finish=False).cost
+    reference = own.fit(best.values, [], best.initial_states, STATES, finish=False, substeps=best.substeps).cost
 
     def log_likelihood(unit: np.ndarray) -> float:
         values = {**best.values, **dict(zip(names, center + root @ unit, strict=True))}
-        found = own.fit(values, [], best.initial_states, STATES, finish=False).cost
+        found = own.fit(values, [], best.initial_states, STATES, finish=False, substeps=best.substeps).cost
         return -0.5 * (found - reference) / variance if np.isfinite(found) else -1e300
 
     curvature = _curvature(log_likelihood, len(names))
