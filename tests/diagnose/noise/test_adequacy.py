@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -127,14 +128,19 @@ def test_a_number_that_differs_in_one_record_is_told() -> None:
     assert found.agreements[0].what == "record: d"
 
 
-def test_the_joint_is_told(train: Any) -> None:
+def train_bench(train: Any, records: Sequence[Record]) -> FitContext:
+    """Return records of a drive train, as they were measured."""
     rig = RIGS["drive_train"]
-    records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 1e-3})
     estimation = tuple(r for r in records if r.role == "estimation")
     scoring = tuple(r for r in records if r.role == "validation")
     scales = characteristic_scales(rig, estimation, train.values)
     noise = {signal.name: train.noise for signal in rig.outputs}
-    context = FitContext(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
+    return FitContext(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
+
+
+def test_the_joint_is_told(train: Any) -> None:
+    damping = placed(effect_named("quadratic_damping"), "load_bearing")
+    context = train_bench(train, train.records([damping], {"c_2": 1e-3}))
     found = asked(context, reidentify(context, train.values))
     assert not found.adequate
     assert found.agreements[0].what == "velocity of load_bearing"
@@ -143,16 +149,12 @@ def test_the_joint_is_told(train: Any) -> None:
 
 def test_a_sensor_that_drifts_is_told_though_another_one_stands_still(train: Any) -> None:
     """A disturbance wanders too, but moves both sensors: what one of them alone shows is its own."""
-    rig, drift = RIGS["drive_train"], 10.0 * train.noise
+    drift = 10.0 * train.noise
     records = [
         r.with_signals(load_angle=r["load_angle"] + drift * np.linspace(-1.0, 1.0, r.n_samples))
         for r in train.records([], {})
     ]
-    estimation = tuple(r for r in records if r.role == "estimation")
-    scoring = tuple(r for r in records if r.role == "validation")
-    scales = characteristic_scales(rig, estimation, train.values)
-    noise = {signal.name: train.noise for signal in rig.outputs}
-    context = FitContext(rig, estimation, scoring, estimation, scales, noise, frozenset(), train.values)
+    context = train_bench(train, records)
     found = asked(context, reidentify(context, train.values))
     assert not found.adequate
     assert found.agreements[0].what == "time, at load_angle"
