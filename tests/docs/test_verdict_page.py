@@ -54,7 +54,7 @@ STATED = (
     ("verdict.comparable", 1.5, "at most 1.5 times as much"),
     ("verdict.larger_part", 0.5, "from half of the gain on"),
     ("verdict.larger_part", 0.5, "at least half of the re-identified gap closed"),
-    ("verdict.exact", 1.03, "reach 1.03 of the floor"),
+    ("verdict.exact", 1.03, "reaches 1.03 of the floor"),
     ("trust.level", 0.01, "one right model in a hundred"),
     ("trust.worth_a_step", 0.05, "more than 5 % of its squared error"),
     ("trust.own_steps", 5, "five where a record takes"),
