@@ -13,6 +13,7 @@ from rigsight.diagnose.advise import advise
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.placed_effects import candidates_on
+from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import readings
 from rigsight.diagnose.location.localize import localize
@@ -23,7 +24,6 @@ from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, LikelyCauses, OutputGap
-from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.of_verdict import with_own_errors

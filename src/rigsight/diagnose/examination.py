@@ -12,7 +12,7 @@ from rigsight.diagnose.data_quality.checks import data_quality, with_best_model,
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of, start_values_of
 from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Adequacy, Checks
@@ -20,15 +20,14 @@ from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.evidence_for_more import OtherForms, beyond_disturbance, with_parts
 from rigsight.diagnose.search.horizon import brings_back, preparing, windowing_of
-from rigsight.diagnose.search.joint_starts import with_joint_starts
-from rigsight.diagnose.search.one_law import split_distinguishable
-from rigsight.diagnose.search.one_more_effect import Prepare
-from rigsight.diagnose.search.pairs import grown, refit_singles
-from rigsight.diagnose.search.pairs_in_windows import pairs_in_windows
 from rigsight.diagnose.search.places import Search, SuspectedPlace, search_places
 from rigsight.diagnose.search.sensitive_motion import fitted_in_windows, is_predictable
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms, beyond_disturbance, with_parts
+from rigsight.diagnose.search.several.one_law import split_distinguishable
+from rigsight.diagnose.search.several.pairs import refit_singles
+from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
+from rigsight.diagnose.search.several.several_effects import several_effects
 from rigsight.diagnose.search.single_effects import contenders, fit_candidate, fit_candidates, reidentify
 from rigsight.diagnose.verdict.judgement import (
     Judgement,
@@ -163,7 +162,9 @@ def examine(
         in_windows = _explained(cut, cut.singles, at_floor)
     checks = Checks(models.context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
     if not in_windows:
-        pairs = _grown(models, effects, forms, checks, lower_bound, ready)
+        pairs = several_effects(
+            models.context, models.reidentified, models.singles, effects, forms, checks, lower_bound, ready
+        )
         models = replace(models, singles=refit_singles(models.context, models.singles, pairs))
         if windowing.whole and not is_predictable(models.context, models.reidentified, pairs, allowed, rng):
             cut = cut or _cut(task, noise, models)
@@ -300,51 +301,6 @@ def _singly(
             prepare([context.simplest((effect,)) for effect in search.others])
         singles = fit_candidates(context, reidentified, search.others, say, singles)
     return _Singly(windowing, context, before, reidentified, quality, singles, search)
-
-
-def _grown(
-    models: _Singly,
-    effects: Sequence[Effect],
-    forms: OtherForms,
-    checks: Checks,
-    lower_bound: bool,
-    prepare: Prepare | None,
-) -> list[Scored]:
-    """Return models of two and three effects where a single effect leaves something to explain.
-
-    Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
-    """
-    is_excused = False
-    if lower_bound and models.singles:
-        best = min(models.singles, key=lambda model: model.error_over_noise)
-        is_excused = best.error_over_noise <= VERDICT.at_lower_bound
-        if is_excused and checks.is_adequate(best):
-            return []
-    worthwhile = models.reidentified.error_over_noise / VERDICT.worthwhile
-    pairs = grown(
-        models.context,
-        models.singles,
-        effects,
-        _nothing_left(models.singles, checks, lower_bound),
-        worthwhile,
-        forms,
-        prepare,
-    )
-    pairs = with_joint_starts(
-        models.context, models.reidentified, pairs, models.singles, effects, checks.is_adequate, prepare
-    )
-    return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
-
-
-def _nothing_left(singles: Sequence[Scored], checks: Checks, lower_bound: bool) -> float:
-    """Return the error, in units of the noise floor, up to which no second effect is asked for.
-
-    A floor is known to a few percent. Within these the remainder of the best effect tells whether it is noise.
-    """
-    best = min(singles, key=lambda model: model.error_over_noise, default=None)
-    if lower_bound or best is None or not VERDICT.exact < best.error_over_noise <= VERDICT.at_floor:
-        return VERDICT.at_floor
-    return VERDICT.at_floor if checks.is_adequate(best) else VERDICT.exact
 
 
 def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:

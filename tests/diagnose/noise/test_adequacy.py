@@ -13,7 +13,7 @@ from scipy.stats import kstest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
-from rigsight.diagnose.search.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import Effect, effect_named, placed
 from rigsight.identify import characteristic_scales

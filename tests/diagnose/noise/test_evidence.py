@@ -11,7 +11,7 @@ import pytest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.noise.evidence import Evidence
-from rigsight.diagnose.search.evidence_for_more import beyond_disturbance
+from rigsight.diagnose.search.several.evidence_for_more import beyond_disturbance
 from rigsight.diagnose.search.single_effects import fit_candidate, reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales

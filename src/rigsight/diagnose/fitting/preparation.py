@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from rigsight.diagnose.fitting.fit_context import FitContext, liveliest, until_rest
 from rigsight.diagnose.fitting.task import Task
@@ -14,7 +14,10 @@ from rigsight.identify import (
     linear_start,
     swallowed_by_offsets,
 )
-from rigsight.simulate import compose
+from rigsight.simulate import Structure, compose
+
+Prepare = Callable[[Sequence[Structure]], None]
+"""Called with the structures that are about to be simulated, to compile them side by side."""
 
 
 def fit_context_of(
@@ -35,7 +38,7 @@ def fit_context_of(
     windowing
         How to cut records.
     memory, threads
-        As of `Workbench`.
+        As of `FitContext`.
     """
     start = start_values_of(task)
     fitted = windowing.cut(task.estimation)

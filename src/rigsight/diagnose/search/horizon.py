@@ -8,11 +8,10 @@ import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.fitting.observer import Observer, followed_sensors
-from rigsight.diagnose.fitting.preparation import fit_context_of, start_values_of
+from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of, start_values_of
 from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing, typical_period, window_length
 from rigsight.diagnose.policy import HORIZON, VERDICT
-from rigsight.diagnose.search.one_more_effect import Prepare
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.errors import SimulationError
 from rigsight.identify import DEFAULT_ACCURACY, FitResult, IdleThreads

@@ -22,7 +22,7 @@ from rigsight.diagnose.search.first_look import (
     mean_square,
     widened,
 )
-from rigsight.diagnose.search.late_shifts import without_late_shifts
+from rigsight.diagnose.search.same_equation import without_repeated_equations
 from rigsight.diagnose.search.starts import restart_values, sized, start_values
 from rigsight.effects import Effect
 from rigsight.identify import DEFAULT_ACCURACY, EffectRegression, FitResult
@@ -85,7 +85,7 @@ def fit_candidates(
 
     models = list(context.threads.side_by_side(one, looks))
     refined = in_lowest_basins(context, refine(context, [*known, *models]))
-    return without_late_shifts(with_a_mean_that_is_needed(context, refined))
+    return without_repeated_equations(context, refined)
 
 
 def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> Scored:
@@ -101,56 +101,6 @@ def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> S
     known = context.constant_forces_beside(look.effects)
     begin = replace(base, values={**start, **base.values, **faint, **known})
     return _fitted(context, look.effects, structure, look.free, (begin,), promising=False)
-
-
-def with_a_mean_that_is_needed(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return the models without those whose mean force nothing asks for.
-
-    An effect with a mean force, and a plainer one beside a constant force, are the same equation. Where the plainer one, beside
-    the same others, leaves the constant forces where they are known to be, it is the whole of it.
-
-    Parameters
-    ----------
-    context
-        Says which constant forces are known.
-    models
-        Of one or several effects, fitted and scored.
-    """
-    fits = {frozenset(model.names): model.fit for model in models}
-
-    def is_needed(model: Scored) -> bool:
-        held = context.constant_forces_beside(model.effects)
-        plainer = [
-            fit
-            for effect in model.effects
-            if effect.holds_constant_force
-            for parent in effect.parents
-            if (fit := fits.get(frozenset(model.names) - {effect.name} | {parent})) is not None
-        ]
-        return not held or not plainer or any(_moves(context, fit, held) for fit in plainer)
-
-    return [model for model in models if is_needed(model)]
-
-
-def _moves(context: FitContext, fit: FitResult, known: Mapping[str, float]) -> bool:
-    """Return True if a fit moves a constant force that is known: farther than others that somebody estimated are wrong."""
-    defaults = {p.name: p.default for p in context.rig.parameters}
-    estimated = {name: value for name, value in context.given.items() if value != defaults.get(name)}
-    others = _moves_of(fit, {name: value for name, value in estimated.items() if name not in known})
-    usual = max(1.0, float(np.sqrt(np.mean(np.square(list(others.values())))))) if others else 1.0
-    return any(
-        move > VERDICT.standard_errors * (usual if name in estimated else 1.0)
-        for name, move in _moves_of(fit, known).items()
-    )
-
-
-def _moves_of(fit: FitResult, known: Mapping[str, float]) -> dict[str, float]:
-    """Return how far a fit lies from known values, in standard errors."""
-    return {
-        name: abs(fit.values[name] - value) / fit.standard_errors[name]
-        for name, value in known.items()
-        if name in fit.free and fit.standard_errors[name] > 0.0
-    }
 
 
 def _looks(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rigsight.diagnose.fitting.fit_context import Scored
 from rigsight.diagnose.noise.block_means import RESAMPLES, block_means
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search.one_law import is_linear
+from rigsight.diagnose.search.several.one_law import is_linear
 from rigsight.effects.effect import Place
 
 

@@ -7,20 +7,18 @@ strong memory hides behind the effect that was found first.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.screening import structures_of_lineup
 from rigsight.diagnose.search.single_effects import followed
 from rigsight.effects import Effect
-from rigsight.simulate import Structure
-
-Prepare = Callable[[Sequence[Structure]], None]
 
 
 def with_one_more(

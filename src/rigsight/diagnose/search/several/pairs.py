@@ -16,18 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import FirstLook, look_at, widened
-from rigsight.diagnose.search.late_shifts import without_late_shifts
-from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
-from rigsight.diagnose.search.single_effects import (
-    finished,
-    followed,
-    refine,
-    with_a_mean_that_is_needed,
-)
-from rigsight.diagnose.search.third_effect import with_a_third, with_relatives
+from rigsight.diagnose.search.same_equation import without_repeated_equations
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.one_more_effect import is_among, with_one_more
+from rigsight.diagnose.search.several.third_effect import with_a_third, with_relatives
+from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over
 
@@ -129,8 +125,7 @@ def grown(
         for pair in pairs
         if pair.error_over_noise <= allowed or any(set(pair.names) < own for own in of_triples)
     ]
-    apart = without_late_shifts(with_a_mean_that_is_needed(context, [*pairs, *triples]))
-    return larger_first(apart, singles)
+    return larger_first(without_repeated_equations(context, [*pairs, *triples]), singles)
 
 
 def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:

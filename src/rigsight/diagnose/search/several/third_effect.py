@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.evidence_for_more import OtherForms
 from rigsight.diagnose.search.first_look import FirstLook
-from rigsight.diagnose.search.one_law import are_one_law
-from rigsight.diagnose.search.one_more_effect import Prepare, is_among, with_one_more
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.one_law import are_one_law
+from rigsight.diagnose.search.several.one_more_effect import is_among, with_one_more
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.effects import Effect
 from rigsight.simulate import carried_over

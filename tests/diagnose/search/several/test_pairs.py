@@ -11,9 +11,9 @@ import pytest
 from rigsight.diagnose import Task, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import VERDICT
-from rigsight.diagnose.search import pairs as pair_search
-from rigsight.diagnose.search.evidence_for_more import OtherForms
-from rigsight.diagnose.search.pairs import grown, refit_singles
+from rigsight.diagnose.search.several import pairs as pair_search
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.pairs import grown, refit_singles
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import linear_sweep, step

@@ -16,7 +16,7 @@ from rigsight.diagnose.noise.evidence import Evidence
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.pushes.alternatives import law_columns
 from rigsight.diagnose.pushes.answers import Answers, orthonormal
-from rigsight.diagnose.search.one_law import are_one_law, is_one_law
+from rigsight.diagnose.search.several.one_law import are_one_law, is_one_law
 from rigsight.effects import Effect
 
 

@@ -8,13 +8,13 @@ import pytest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
 from rigsight.diagnose.fitting.windows import Windowing
-from rigsight.diagnose.search.pairs_in_windows import pairs_in_windows
+from rigsight.diagnose.search.several.pairs_in_windows import pairs_in_windows
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.effects import effect_named
 from rigsight.identify import characteristic_scales
 from rigsight.rigs import AXIS
 
-from .test_sensitive_motion import NOISE, RIG, measured
+from ..test_sensitive_motion import NOISE, RIG, measured
 
 TRUTH = {**RIG, "g": 1.35e-4, "u_0": 0.1}
 PAIR = (effect_named("backlash"), effect_named("input_dead_zone"))

@@ -13,15 +13,16 @@ from dataclasses import replace
 import numpy as np
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare
 from rigsight.diagnose.policy import SEARCH, VERDICT
-from rigsight.diagnose.search.first_look import looked_from, widened
-from rigsight.diagnose.search.one_more_effect import Prepare
-from rigsight.diagnose.search.pairs import larger_first
+from rigsight.diagnose.search.first_look import FirstLook, looked_from, widened
 from rigsight.diagnose.search.places import search_places
+from rigsight.diagnose.search.several.pairs import larger_first
 from rigsight.diagnose.search.single_effects import finished, followed, refine
 from rigsight.diagnose.search.starts import start_values
 from rigsight.effects import Effect
 from rigsight.identify import FitResult
+from rigsight.simulate import Structure
 
 _SEED = 0
 """Starts are the same for equal pairs: a diagnosis depends on its records alone."""
@@ -73,24 +74,23 @@ def with_joint_starts(
     )
     if prepare is not None:
         prepare([context.simplest(two) for two in relatives])
-    looks = list(
-        context.threads.side_by_side(
-            lambda two: looked_from(
-                context, two, context.simplest(two), _starts(context, two, reidentified.fit)
-            ),
-            relatives,
-        )
-    )
+
+    def look_at(two: tuple[Effect, Effect]) -> FirstLook:
+        structure = context.simplest(two)
+        return looked_from(context, two, structure, _starts(context, two, structure, reidentified.fit))
+
+    def follow(look: FirstLook) -> Scored:
+        return finished(context, followed(context, look, promising=True, finish=False))
+
+    looks = list(context.threads.side_by_side(look_at, relatives))
     promising = sorted(
         (look for look in widened(context, looks) if look.cost < SEARCH.near_the_best * best.fit.cost),
         key=lambda look: look.cost,
     )
     last = promising[: SEARCH.most_finished][-1].cost if promising else 0.0
-    found = [
-        finished(context, followed(context, look, promising=True, finish=False))
-        for look in promising
-        if look.cost <= SEARCH.alike_pairs**2 * last
-    ]
+    # A cost is a sum of squares, the factor is one of errors.
+    alike = [look for look in promising if look.cost <= SEARCH.alike_pairs**2 * last]
+    found = list(context.threads.side_by_side(follow, alike))
     better = [m for m in refine(context, found) if m.error_over_noise < best.error_over_noise]
     new = {frozenset(model.names) for model in better}
     return [*larger_first(better, singles), *(m for m in models if frozenset(m.names) not in new)]
@@ -126,9 +126,11 @@ def _relatives(
         )
 
 
-def _starts(context: FitContext, two: tuple[Effect, Effect], base: FitResult) -> list[dict[str, float]]:
+def _starts(
+    context: FitContext, two: tuple[Effect, Effect], structure: Structure, base: FitResult
+) -> list[dict[str, float]]:
     """Return values of all parameters: any declared numbers of one with any of the other; a draw of them where they are many."""
-    first, structure = context.simplest(two[:1]), context.simplest(two)
+    first = context.simplest(two[:1])
     found = [
         values
         for start in start_values(context, first, two[0], base, {})

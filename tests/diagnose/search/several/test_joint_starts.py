@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.search.joint_starts import with_joint_starts
+from rigsight.diagnose.search.several.joint_starts import with_joint_starts
 from rigsight.diagnose.search.single_effects import fit_candidate, fit_candidates, reidentify
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep

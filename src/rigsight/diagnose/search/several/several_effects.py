@@ -1,0 +1,66 @@
+"""Are several effects looked for, and in which ways? Only where what the best single effect leaves is no noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.preparation import Prepare
+from rigsight.diagnose.noise.adequacy import Checks
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.several.evidence_for_more import OtherForms
+from rigsight.diagnose.search.several.joint_starts import with_joint_starts
+from rigsight.diagnose.search.several.pairs import grown
+from rigsight.effects import Effect
+
+
+def several_effects(
+    context: FitContext,
+    reidentified: Scored,
+    singles: Sequence[Scored],
+    effects: Sequence[Effect],
+    forms: OtherForms,
+    checks: Checks,
+    lower_bound: bool,
+    prepare: Prepare | None,
+) -> list[Scored]:
+    """Return models of two and three effects where a single effect leaves something to explain.
+
+    Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
+
+    Parameters
+    ----------
+    context
+        Records, scales and noise.
+    reidentified
+        The equations without an effect.
+    singles
+        Every effect alone, fitted and scored.
+    effects
+        Candidates.
+    forms
+        Says which effects are worth trying beside another.
+    checks
+        Say whether what a model leaves is noise and disturbance.
+    lower_bound
+        True if the noise floor is only a lower bound.
+    prepare
+        Called with the structures that are about to be looked at.
+
+    Returns
+    -------
+    Each with the effect first that explains more by itself.
+    """
+    best = min(singles, key=lambda model: model.error_over_noise, default=None)
+    is_excused = lower_bound and best is not None and best.error_over_noise <= VERDICT.at_lower_bound
+    if best is None or (is_excused and checks.is_adequate(best)):
+        return []
+    at_floor = VERDICT.at_floor
+    # A floor is known to a few percent. Within these what the best effect leaves tells whether it is noise.
+    is_near = not lower_bound and VERDICT.exact < best.error_over_noise <= VERDICT.at_floor
+    if is_near and not checks.is_adequate(best):
+        at_floor = VERDICT.exact
+    worthwhile = reidentified.error_over_noise / VERDICT.worthwhile
+    pairs = grown(context, singles, effects, at_floor, worthwhile, forms, prepare)
+    pairs = with_joint_starts(context, reidentified, pairs, singles, effects, checks.is_adequate, prepare)
+    return [pair for pair in pairs if not is_excused or pair.error_over_noise <= VERDICT.at_floor]
