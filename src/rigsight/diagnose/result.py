@@ -174,8 +174,8 @@ class Diagnosis:
     likely
         The causes that the records leave open.
     error_of_choice
-        What models chosen by some stretches of the scored records leave of the others, in units of the noise floor; None where no
-        model with an effect could be scored.
+        What a model that was chosen on part of the scored records leaves of the rest, in units of the noise floor; None where no
+        model with an effect was chosen by its errors.
     trust
         Whether the numbers of the verdict's model are the same in every record, at every amplitude and in shorter windows; None
         where that was not asked.

@@ -312,8 +312,8 @@ def basis_sentence(diagnosis: Diagnosis) -> str:
         chosen = ""
         if diagnosis.verdict == "effect" and diagnosis.error_of_choice is not None:
             chosen = (
-                " They also chose the model: a choice by some stretches of them leaves "
-                f"{diagnosis.error_of_choice:.3g} times the noise floor in the others."
+                " The same records chose the model. A model chosen on part of them leaves "
+                f"{diagnosis.error_of_choice:.3g} times the noise floor on the rest."
             )
         return f"Errors are those of validation records, which were not fitted{windows}.{chosen}"
     return f"There is no validation record: errors are those of the fitted records{windows}, and too good."

@@ -41,16 +41,13 @@ def _following(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     mean, low, high = float(np.mean(known)), float(np.min(known)), float(np.max(known))
     if order == 0 or low == high:
         return np.full(count, samples[-1])
-    rows = sliding_window_view(known - mean, order + 1)
+    # In units of its size: squares of a motion that runs away may leave the range of numbers, and its prediction does not.
+    rows = sliding_window_view((known - mean) / max(high - mean, mean - low), order + 1)
     regressors = np.vstack([rows[:, -2::-1], rows[:, 1:]])
     # By the normal equations: ten times as fast as a singular value decomposition, and every piece of every record asks.
-    # In units of its size: squares of a motion that runs away may leave the range of numbers, and its prediction does not.
-    regressors /= max(high - mean, mean - low)
     powers, directions = np.linalg.eigh(regressors.T @ regressors)
     directions, powers = directions[:, powers > _RANK * powers[-1]], powers[powers > _RANK * powers[-1]]
-    told = directions.T @ (
-        regressors.T @ np.concatenate([rows[:, -1], rows[:, 0]]) / max(high - mean, mean - low)
-    )
+    told = directions.T @ (regressors.T @ np.concatenate([rows[:, -1], rows[:, 0]]))
     weights = directions @ (told / powers)
     # An unstable prediction would run away, and noise may make one.
     lowest, highest = 2.0 * low - high - mean, 2.0 * high - low - mean

@@ -71,6 +71,7 @@ def test_a_stiffness_a_hundred_times_off_and_a_number_at_its_bound_are_told(mode
 def test_a_plausible_model_at_the_same_place_comes_first(models) -> None:
     reidentified, coulomb, stribeck = models
     found = plausible_first(ranked(stribeck, coulomb), reidentified, PLACES)
+    assert np.isnan(found.error_of_choice), "no resampling chose it"
     assert found.order[0] is coulomb
     assert found.tied == (stribeck,)
     assert sum(found.probabilities) == pytest.approx(1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -105,4 +106,5 @@ def _with_first(ranking: Ranking, index: int) -> Ranking:
         probabilities=(share, *shares),
         grounds=(grounds.pop(index), *grounds),
         tied=(ranking.order[0], *rivals),
+        error_of_choice=math.nan,
     )

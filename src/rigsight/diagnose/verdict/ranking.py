@@ -50,8 +50,9 @@ class Ranking:
     grounds
         What each probability rests on, in the same order.
     error_of_choice
-        What the model that wins in a resampling leaves of the stretches that were not drawn, in units of the noise floor, root
-        mean square of all resamplings: what has chosen a model does not report its error. Not a number where none was drawn.
+        What the model with the best held-out errors in a resampling leaves of the stretches that were not drawn, in units of the
+        noise floor, root mean square of all resamplings. Evidence, which knows all records, has no part in that choice. Not a
+        number where a model was chosen by other means, or nothing was left out.
     """
 
     order: tuple[Scored, ...]
@@ -156,7 +157,7 @@ def rank(
             *(Grounds(float(probabilities[i]), float(wins[i]), evidence[i]) for i in order),
             *(Grounds(0.0, 0.0, None) for _ in failed),
         ),
-        error_of_choice=_error_of_choice(squares, draws, np.argmax(won * weights, axis=1)),
+        error_of_choice=_error_of_choice(squares, draws, np.argmax(won, axis=1)),
     )
 
 
