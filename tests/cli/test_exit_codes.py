@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from rigsight.cli.exit_codes import told
 from rigsight.workflow.files.results import write_together
 from rigsight.workflow.progress import Stage
 from rigsight.workflow.progress_display import listening
@@ -240,6 +241,18 @@ def test_who_is_interrupted_when_all_is_written_is_told_so(
     code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
     assert code == 130
     assert stderr == f"rigsight: interrupted; the results in {tmp_path / 'out'} are complete.\n"
+
+
+def test_a_bench_that_is_interrupted_goes_on_and_its_settings_are_no_results(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        write_together(tmp_path / "bench" / "keys", {"settings.json": "{}"})
+        raise KeyboardInterrupt
+
+    with pytest.raises(SystemExit), told(debug=False, left="the same command goes on from here"):
+        interrupted()
+    assert capsys.readouterr().err == "rigsight: interrupted; the same command goes on from here.\n"
 
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EFBIG])

@@ -26,12 +26,13 @@ _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES
 _OF_THE_SESSION = (errno.EMFILE, errno.ENFILE, errno.EFBIG)
 _MOST_NAMED = 3
 """Folders with results that an interruption names one by one; a bench has hundreds."""
-GOES_ON = "nothing was written; the same command goes on from there"
+_NOTHING = "nothing was written"
+GOES_ON = f"{_NOTHING}; the same command goes on from there"
 """What an interrupted diagnosis leaves: no file, but the fits that it has done."""
 
 
 @contextlib.contextmanager
-def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
+def told(debug: bool, left: str = _NOTHING) -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code.
 
     Parameters
@@ -58,7 +59,7 @@ def told(debug: bool, left: str = "nothing was written") -> Iterator[None]:
     except RigsightError as error:
         leave(str(error), BAD_INPUT, isinstance(error, MachineError))
     except KeyboardInterrupt as error:
-        if written():
+        if written() and left.startswith(_NOTHING):
             left = f"the results in {_named(written())} are complete"
         leave(f"interrupted; {left}.", exit_code(error))
     except BrokenPipeError:
