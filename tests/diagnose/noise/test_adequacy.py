@@ -157,7 +157,7 @@ def test_a_sensor_that_drifts_is_told_though_another_one_stands_still(train: Any
     context = train_bench(train, records)
     found = asked(context, reidentify(context, train.values))
     assert not found.adequate
-    assert found.agreements[0].what == "time, at load_angle"
+    assert found.agreements[0].what == "drift of load_angle"
     assert found.place == "load_angle"
 
 

@@ -1,8 +1,8 @@
 """What else could make what a model leaves? The answers of its readings to small pushes that go with one thing each.
 
 A force that is another function of a joint's velocity or position, a drive that is another function of its signal or its change,
-another reading of a sensor, something that changes with time, or a number that differs from record to record. Functions are
-piecewise linear. These are the alternatives of a score test: nothing is fitted for them.
+another reading of a sensor, a sensor that drifts, something else that changes with time, or a number that differs from record to
+record. Functions are piecewise linear. These are the alternatives of a score test: nothing is fitted for them.
 
 References
 ----------
@@ -81,7 +81,7 @@ def alternatives(answers: Answers) -> Iterator[tuple[str, str, Floats]]:
     for sensor in (s.name for s in rig.outputs):
         yield f"reading of {sensor}", sensor, _readings_of(answers, sensor)
         yield f"change of {sensor}", sensor, _changes_of(answers, sensor)
-        yield f"time, at {sensor}", sensor, _shown(answers, sensor, _course(answers))
+        yield f"drift of {sensor}", sensor, _shown(answers, sensor, _course(answers))
     if len(answers.records) > 1:
         for name in answers.free:
             yield f"{BY_RECORD}{name}", "", _by_record(answers, answers.to_parameter(name))

@@ -1,8 +1,7 @@
-"""Where the best pair still leaves something: does a relative of it explain more, if both effects start from their own guesses?
+"""Does a relative of the best pair explain more, if both effects start from their declared numbers?
 
-Pairs are grown from a single effect that was fitted alone. Where that fit had to bend far for what a second effect does, the
-second one starts in the wrong place and a relative of it, which is easier to find, wins. Here no fit of a single effect is a
-start: the equations are those without an effect, and each of the two has its declared numbers.
+Pairs are grown from a single effect that was fitted alone, and so took over part of what a second one does. The second then
+starts in the wrong place, and another effect that is like it wins. Here both start beside the equations without an effect.
 """
 
 from __future__ import annotations
@@ -108,8 +107,8 @@ def _relatives(
 ) -> Iterator[tuple[Effect, Effect]]:
     """Yield the pair, and those with another effect at the place of one of the two.
 
-    One whose push explains about as much beside the other effect; where a force with memory is replaced any other one too, as
-    what such a force does depends on its inner numbers, at which a push stands still.
+    One whose push explains about as much beside the other effect; where the replaced effect has a memory any other with a memory
+    too, as a push shows one shape of its loop.
     """
     yield pair.effects[0], pair.effects[1]
     for kept, replaced in (pair.effects, pair.effects[::-1]):
