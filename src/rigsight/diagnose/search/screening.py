@@ -224,15 +224,17 @@ class Lineup:
 def _sized(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
     """Return own values of an effect that makes so many times the push; as they are where that is no size it could have.
 
-    Where an effect is absent at a value of a parameter, its force grows with the distance from there.
+    Where an effect is absent at a value of a parameter, its force grows with the distance from there. A push the other way is the
+    same effect only where its parameters may have that sign: a spring may soften, a friction cannot drive.
     """
-    values = {p.name: own[p.name] for p in effect.parameters if p.fitted and p.name in own}
-    if not factor > 0.0:
+    fitted = [p for p in effect.parameters if p.fitted and p.name in own]
+    values = {p.name: own[p.name] for p in fitted}
+    if factor == 0.0:
         return values
-    nulls = effect.null_values()
-    return {
-        name: sized(value, nulls[name], factor) if name in nulls else value for name, value in values.items()
+    grown = {
+        p.name: values[p.name] if p.null is None else sized(values[p.name], p.null, factor) for p in fitted
     }
+    return grown if all(p.lower <= grown[p.name] <= p.upper for p in fitted) else values
 
 
 def structures_of_lineup(

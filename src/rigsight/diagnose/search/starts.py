@@ -135,7 +135,7 @@ def sized(value: float, null: float, factor: float) -> float:
     null
         Where the effect is absent.
     factor
-        Positive.
+        Not zero; a negative one turns the effect around.
     """
     return null + factor * (value - null) if abs(null) < _ENDLESS else value / factor
 
