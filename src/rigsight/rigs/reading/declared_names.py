@@ -148,10 +148,12 @@ def _allowed(declaration: Declaration, path: Path) -> set[str]:
     rates = set(map(rate_name, motion))
     everything = numbers | motion | rates | names("inputs", "states", "signals", "drives", "sensors")
     match path:
-        case ("energy", "potential") | ("joints", _, "motion") | ("drives", _, "along"):
+        case ("joints", _, "motion") | ("drives", _, "along"):
             return numbers | motion
+        case ("energy", "potential"):
+            return _with_signals(declaration, numbers | motion)
         case ("energy", "kinetic"):
-            return numbers | motion | rates
+            return _with_signals(declaration, numbers | motion | rates)
         case ("joints", _, "force"):
             return numbers | motion | rates | names("states", "signals")
         case ("joints", _, _) | ("initial", _) | ("states", _, "start"):
@@ -163,13 +165,24 @@ def _allowed(declaration: Declaration, path: Path) -> set[str]:
     return everything
 
 
+def _with_signals(declaration: Declaration, readable: set[str]) -> set[str]:
+    """Return names with those of the signals that are made of nothing else, directly or through other signals."""
+    found = set(readable)
+    left = dict.fromkeys(declaration.table.signals)
+    while made := [name for name in left if declaration.expressions["signals", name].reads.keys() <= found]:
+        found.update(made)
+        for name in made:
+            del left[name]
+    return found
+
+
 def _made_of(path: Path) -> str:
     """Return in words what an expression is made of."""
     match path:
         case ("energy", "kinetic"):
-            return "a kinetic energy is made of coordinates, rates, parameters and constants"
+            return "a kinetic energy is made of coordinates, rates, parameters and constants, and of signals made of these"
         case ("energy", "potential"):
-            return "a potential energy is made of coordinates, parameters and constants"
+            return "a potential energy is made of coordinates, parameters and constants, and of signals made of these"
         case ("joints", _, "motion"):
             return "a joint's motion is made of coordinates, parameters and constants"
         case ("joints", _, "force"):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import sympy as sp
+
 from rigsight.parameters import Parameter
 from rigsight.rigs.mechanism import Coordinate, Drive, Joint, Mechanism, RateState, Sensor
 from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declaration, Path
@@ -66,14 +70,15 @@ def rig_of(declaration: Declaration, order: list[Path]) -> Rig:
 
 def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
     table, symbols, sympy = declaration.table, declaration.symbols, declaration.sympy
+    signals = {symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"}
     return Mechanism(
         inputs=tuple(table.inputs),
         coordinates=tuple(
             Coordinate(symbols[name], symbols[rate_name(name)], own.unit, own.prescribed_by, own.about)
             for name, own in table.coordinates.items()
         ),
-        kinetic=sympy(("energy", "kinetic")),
-        potential=sympy(("energy", "potential")),
+        kinetic=_written_out(sympy(("energy", "kinetic")), signals),
+        potential=_written_out(sympy(("energy", "potential")), signals),
         joints=tuple(
             Joint(
                 name,
@@ -100,7 +105,7 @@ def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
             )
             for name, own in table.states.items()
         ),
-        signals={symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"},
+        signals=signals,
         initial={
             **{symbols[name]: sympy(("initial", name)) for name in table.initial},
             **{
@@ -111,6 +116,14 @@ def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
         },
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
     )
+
+
+def _written_out(energy: sp.Expr, signals: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """Return an energy of coordinates and rates alone, as it is differentiated by them."""
+    known: dict[sp.Symbol, sp.Expr] = {}
+    for symbol, signal in signals.items():
+        known[symbol] = signal.xreplace(known)
+    return energy.xreplace(known)
 
 
 def _parameter(
