@@ -17,6 +17,7 @@ PACKAGES = (
     "rigs",
     "simulate",
     "frequency",
+    "robots",
     "identify",
     "discover",
     "compare",

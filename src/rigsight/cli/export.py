@@ -24,7 +24,7 @@ def export(
         typer.Option(
             "--to",
             metavar="TARGET",
-            help="python, control, c, fmu (FMI 2.0), fmu3 (FMI 3.0), matlab, latex or modelica.",
+            help="python, control, c, fmu (FMI 2.0), fmu3 (FMI 3.0), matlab, latex, modelica, mjcf or isaac.",
         ),
     ],
     out: Annotated[
@@ -52,38 +52,54 @@ def export(
             "--step",
             metavar="SECONDS",
             show_default="from the model's own time scales",
-            help="Longest internal step of python and matlab.",
+            help="Longest internal step of python and matlab; step of the physics of isaac.",
         ),
     ] = None,
     source_only: Annotated[
         bool, typer.Option("--source-only", help="An FMU without a binary: the importing tool compiles it.")
     ] = False,
+    mjcf: Annotated[
+        Path | None,
+        typer.Option(
+            "--mjcf",
+            metavar="FILE",
+            show_default="(none)",
+            help="The MuJoCo model or URDF from which rigsight init made the rig, for mjcf and isaac.",
+        ),
+    ] = None,
     effects: OwnEffects = None,
     rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Write a model for other tools: Python, python-control, C, an FMU, MATLAB, LaTeX or Modelica.
+    """Write a model for other tools: Python, python-control, C, an FMU, MATLAB, LaTeX, Modelica, MuJoCo or Isaac Lab.
 
-    One file, with the equations, the numbers and their units, and nothing of rigsight needed to run it.
+    One file, with the equations, the numbers and their units, and nothing of rigsight needed to run it. mjcf and isaac write the
+    numbers and effects into the fields that MuJoCo and Isaac Lab have for them, and say what they have no field for.
     """
     with told(debug):
         from rigsight.workflow.export import run_export
         from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs
 
-        file = run_export(
+        written = run_export(
             model,
             to,
             out,
             hold=cast("Hold | None", hold),
             step=step,
             source_only=source_only,
+            robot=mjcf,
             own_effects=own_effects(effects or [], check=False),
             own_rigs=own_rigs(rigs or []).values(),
         )
     if json:
-        show_as_json({"target": to, "file": str(file)})
+        fields = {"written": list(written.written), "without_field": list(written.without_field)}
+        show_as_json({"target": to, "file": str(written.path), **(fields if mjcf is not None else {})})
     elif not quiet:
-        typer.echo(f"{to}: {file}")
+        typer.echo(f"{to}: {written.path}")
+        for line in written.written:
+            typer.echo(f"Written: {line}")
+        for line in written.without_field:
+            typer.echo(f"No field for: {line}")

@@ -14,8 +14,13 @@ from rigsight.cli.terminal import show_as_json
 
 def init(
     folder: Annotated[
-        Path, typer.Argument(metavar="FOLDER", help="The folder that holds the measured files.")
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="FOLDER",
+            show_default="this folder, with --mjcf",
+            help="The folder that holds the measured files.",
+        ),
+    ] = None,
     model: Annotated[
         str | None,
         typer.Option(
@@ -25,6 +30,15 @@ def init(
             help="A rig that rigsight rigs lists, or one of --rigs.",
         ),
     ] = None,
+    mjcf: Annotated[
+        Path | None,
+        typer.Option(
+            "--mjcf",
+            metavar="FILE",
+            show_default="(no model)",
+            help="A MuJoCo model or URDF to write a rig file from, beside the campaign. Needs the extra mujoco.",
+        ),
+    ] = None,
     rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -32,9 +46,17 @@ def init(
 ) -> None:
     """Write a commented campaign.toml for the measured files of a folder.
 
-    Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten.
+    Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten. With
+    --mjcf, writes the rig file of a robot's model as well, and checks it against MuJoCo.
     """
+    if mjcf is not None:
+        _init_from_mjcf(folder or Path(), mjcf, model, rigs, json=json, quiet=quiet, debug=debug)
+        return
     with told(debug):
+        if folder is None:
+            from rigsight.errors import InputError
+
+            raise InputError("Name the FOLDER that holds the measured files, or a model with --mjcf.")
         from rigsight.workflow.campaigns.init import run_init
 
         draft = run_init(folder, model=model, rig_files=rigs or [])
@@ -64,3 +86,56 @@ def init(
         typer.echo(f'Fill in what reads "FILL IN" ({draft.n_blanks} times). Then: rigsight diagnose {folder}')
     else:
         typer.echo(f"Check the comments in it. Then: rigsight diagnose {folder}")
+
+
+def _init_from_mjcf(
+    folder: Path,
+    file: Path,
+    model: str | None,
+    rigs: list[Path] | None,
+    *,
+    json: bool,
+    quiet: bool,
+    debug: bool,
+) -> None:
+    with told(debug):
+        from rigsight.errors import InputError
+        from rigsight.workflow.campaigns.from_mjcf import run_init_from_mjcf
+
+        if model is not None or rigs:
+            raise InputError("--mjcf gives the rig; leave out --model and --rigs.")
+        written = run_init_from_mjcf(folder, file)
+    draft, run = written.draft, written.run
+    if json:
+        show_as_json(
+            {
+                "file": str(written.path),
+                "campaign": None if written.campaign is None else str(written.campaign.path),
+                "left_out": list(draft.left_out),
+                "notes": list(draft.notes),
+                "free_run": {"duration_s": run.duration, "relative_difference": run.differences},
+            }
+        )
+        return
+    if quiet:
+        return
+    count = len(draft.joints)
+    typer.echo(f"Written: {written.path} ({count} joint{'' if count == 1 else 's'})")
+    beside = f", without {' and '.join(run.left_out)}" if run.left_out else ""
+    verdict = "it moves as MuJoCo does" if run.agrees else "IT MOVES OTHERWISE THAN MUJOCO"
+    typer.echo(
+        f"Free run of {run.duration:.1f} s beside MuJoCo{beside}: {verdict}, largest relative difference {run.worst:.1g}."
+    )
+    for note in draft.notes:
+        typer.echo(note)
+    for what in draft.left_out:
+        typer.echo(f"Not taken over: {what}")
+    if written.campaign is None:
+        typer.echo(
+            f"Put records into {folder}, with columns t, {', '.join((*draft.controls.values(), *draft.sensors))}. "
+            "Then the same command again."
+        )
+    else:
+        typer.echo(
+            f"Written: {written.campaign.path}. Check the comments in it. Then: rigsight diagnose {folder}"
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.effects import Effect
@@ -10,8 +11,32 @@ from rigsight.errors import InputError, check_option
 from rigsight.export import TARGETS, export_model
 from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
+from rigsight.simulate.model import Model
 from rigsight.workflow.files.model_file import read_model
 from rigsight.workflow.files.results import check_target, write_together
+
+
+@dataclass(frozen=True)
+class WrittenFile:
+    """A file as it was written.
+
+    Attributes
+    ----------
+    path
+        The file.
+    written
+        In words, fields of a robot's model that changed.
+    without_field
+        In words, what it has no field for.
+    """
+
+    path: Path
+    written: tuple[str, ...] = ()
+    without_field: tuple[str, ...] = ()
+
+
+ROBOT_TARGETS = {"mjcf": ".xml", "isaac": ".yaml"}
+"""Models of robots that numbers and effects are written back to, and how their files end."""
 
 
 def run_export(
@@ -22,9 +47,10 @@ def run_export(
     hold: Hold | None = None,
     step: float | None = None,
     source_only: bool = False,
+    robot: Path | None = None,
     own_effects: Sequence[Effect] = (),
     own_rigs: Iterable[Rig] = (),
-) -> Path:
+) -> WrittenFile:
     """Write a model for another tool.
 
     Parameters
@@ -32,36 +58,38 @@ def run_export(
     model
         A ``model.json`` or the folder that holds one.
     target
-        A key of `rigsight.export.TARGETS`.
+        A key of `rigsight.export.TARGETS` or `ROBOT_TARGETS`.
     out
         File to write; default is the rig's name with the target's suffix in this folder. Its name is that of the function, C
         prefix or model.
     hold
         How the input behaves between its samples; default is the model's.
     step
-        Longest internal step of a target with a fixed one [s].
+        Longest internal step of a target with a fixed one [s]; for ``isaac`` the step of its physics.
     source_only
         True for an FMU without a binary.
+    robot
+        The MJCF or URDF file from which the rig was made, for a key of `ROBOT_TARGETS`.
     own_effects
         Effects that the model may name beside those of the catalogue.
     own_rigs
         Rigs that it may name beside the built-in ones, where it does not declare its own.
-
-    Returns
-    -------
-    The file written.
 
     Raises
     ------
     InputError
         If the model cannot be read, the target cannot say it, or the file cannot be written.
     """
-    chosen = TARGETS[check_option("Target", target, TARGETS)]
+    check_option("Target", target, (*TARGETS, *ROBOT_TARGETS))
     read = read_model(model, own_effects, own_rigs)
-    file = Path(f"{read.structure.rig.name}{chosen.suffix}" if out is None else out)
-    check_target(file)
-    if file.suffix != chosen.suffix:
-        raise InputError(f"{file} cannot hold {chosen.name}: name a file that ends in {chosen.suffix}.")
+    if target in ROBOT_TARGETS:
+        if hold is not None or source_only or (step is not None and target != "isaac"):
+            raise InputError(f"--hold, --step and --source-only say nothing of {target}. Leave them out.")
+        return _robot(read, target, robot, out, step)
+    if robot is not None:
+        raise InputError(f"--mjcf is of {' and '.join(ROBOT_TARGETS)}; leave it out for {target}.")
+    chosen = TARGETS[target]
+    file = _target_file(read, out, chosen.name, chosen.suffix)
     content = export_model(
         read,
         target,
@@ -72,6 +100,34 @@ def run_export(
         source_only=source_only,
     )
     write_together(file.parent, {file.name: content})
+    return WrittenFile(file)
+
+
+def _robot(
+    model: Model, target: str, robot: Path | None, out: str | Path | None, step: float | None
+) -> WrittenFile:
+    from rigsight.robots import isaac_settings, write_back
+
+    if robot is None:
+        raise InputError(
+            f"{target} is written from the robot's model: name the MJCF or URDF file from which rigsight init made the rig with "
+            "--mjcf."
+        )
+    file = _target_file(model, out, target, ROBOT_TARGETS[target])
+    if file.resolve() == robot.resolve():
+        raise InputError(
+            f"{file} is the robot's model itself and is not overwritten; name another file with --out."
+        )
+    written = write_back(model, robot) if target == "mjcf" else isaac_settings(model, robot, step)
+    write_together(file.parent, {file.name: written.text})
+    return WrittenFile(file, written.written, written.without_field)
+
+
+def _target_file(model: Model, out: str | Path | None, target: str, suffix: str) -> Path:
+    file = Path(f"{model.structure.rig.name}{suffix}" if out is None else out)
+    check_target(file)
+    if file.suffix != suffix:
+        raise InputError(f"{file} cannot hold {target}: name a file that ends in {suffix}.")
     return file
 
 

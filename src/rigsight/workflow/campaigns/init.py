@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,7 +51,13 @@ class Draft:
     others: tuple[str, ...] = ()
 
 
-def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterable[Path] = ()) -> Draft:
+def run_init(
+    folder: str | Path,
+    *,
+    model: str | None = None,
+    rig_files: Iterable[Path] = (),
+    values: Mapping[str, float] | None = None,
+) -> Draft:
     """Write a `campaign.toml` for the measured files of a folder, and a copy of a rig file from elsewhere beside it.
 
     Parameters
@@ -62,6 +68,8 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
         The rig; None for the one that the channels fit best.
     rig_files
         Rigs of the user's own, beside the built-in ones.
+    values
+        Parameters of the simulation in question, where they are known; constants then keep what the rig file says.
 
     Raises
     ------
@@ -78,13 +86,7 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     # A user's own come first: they win where a built-in one fits as well.
     known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
     rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
-    files = sorted(
-        file
-        for file in folder.iterdir()
-        if file.is_file()
-        and not file.name.startswith(".")
-        and file.suffix.lower() in (*SUFFIXES, *TEXT_SUFFIXES)
-    )
+    files = measured_files(folder)
     if len(files) > MOST_RECORDS:
         raise InputError(
             f"{folder} holds {len(files)} measured files; a campaign has at most {MOST_RECORDS}."
@@ -100,10 +102,21 @@ def run_init(folder: str | Path, *, model: str | None = None, rig_files: Iterabl
     source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
     beside = {} if source is None else _copied(folder, source)
     inside = source and (folder / source.name if beside else source)
-    text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, inside, others), proposals, left_out)
+    text, n_blanks = _text(folder, rig, _rig_lines(folder, rig, inside, others), values, proposals, left_out)
     write_together(folder, {**beside, CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
     return Draft(
         path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks, others
+    )
+
+
+def measured_files(folder: Path) -> list[Path]:
+    """Return the files of a folder that may hold records, in the order of their names."""
+    return sorted(
+        file
+        for file in folder.iterdir()
+        if file.is_file()
+        and not file.name.startswith(".")
+        and file.suffix.lower() in (*SUFFIXES, *TEXT_SUFFIXES)
     )
 
 
@@ -161,6 +174,7 @@ def _text(
     folder: Path,
     rig: Rig,
     rig_lines: Sequence[str],
+    values: Mapping[str, float] | None,
     proposals: Sequence[Proposal],
     left_out: Sequence[tuple[str, str]],
 ) -> tuple[str, int]:
@@ -173,7 +187,7 @@ def _text(
     if n_blanks:
         lines.append(f"# What could not be guessed reads {BLANK} ({_times(n_blanks)}): fill it in.")
     lines += ["", f"title = {quoted(folder.resolve().name)}", "", *rig_lines]
-    if rig.constants:
+    if rig.constants and (values is None or open_constants):
         lines += ["", "[rig.constants]"]
         for constant in rig.constants:
             about = f"# {constant.description} [{constant.unit}]"
@@ -184,9 +198,17 @@ def _text(
         "",
         "[rig.parameters]  # the simulation in question; what stays a comment is identified from the records",
     ]
-    lines += [f"# {one.name} =    # {one.description} [{one.unit}]" for one in rig.parameters]
+    known = values or {}
+    lines += [
+        f"{one.name} = {known[one.name]!r}  # {one.description} [{one.unit}]"
+        if one.name in known
+        else f"# {one.name} =    # {one.description} [{one.unit}]"
+        for one in rig.parameters
+    ]
     for proposal, (role, remark) in zip(proposals, _roles(proposals), strict=True):
         lines += ["", proposal.toml(role, remark).rstrip("\n")]
+        if values is not None and rig.inputs:
+            lines.append('hold = "zoh"  # a controller holds its command until the next one')
     if left_out:
         lines += ["", "# Not used:"]
         lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]

@@ -1,0 +1,116 @@
+"""Which drives does a MuJoCo model have? Force of each as an expression of its control, with the numbers of its fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+@dataclass(frozen=True)
+class TreeActuator:
+    """An actuator at a hinge or slide joint: ``gear * clip(gain * a + bias_0 + bias_1 * length + bias_2 * speed)``.
+
+    Attributes
+    ----------
+    index, joint
+        Its numbers in the model, and that of its joint.
+    name
+        As MuJoCo calls it; empty without a name.
+    gear
+        Its length is so many times the coordinate, its force at the joint so many times its own.
+    gain, bias
+        Numbers of the law; a is the control, or what a filter makes of it.
+    control_range, force_range
+        Where the control and the force end; None without an end.
+    time_constant
+        Of the filter between the control and a [s]; 0 without one.
+    """
+
+    index: int
+    joint: int
+    name: str
+    gear: float
+    gain: float
+    bias: tuple[float, float, float]
+    control_range: tuple[float, float] | None
+    force_range: tuple[float, float] | None
+    time_constant: float
+
+    @property
+    def holds_position(self) -> bool:
+        """True for the law of ``position``: a proportional gain, with or without damping."""
+        return self.gain != 0.0 and self.bias[0] == 0.0 and self.bias[1] == -self.gain
+
+    @property
+    def holds_velocity(self) -> bool:
+        """True for the law of ``velocity``."""
+        return self.gain != 0.0 and self.bias[:2] == (0.0, 0.0) and self.bias[2] == -self.gain
+
+
+def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
+    """Return the actuators that a rig file can say, and in words those that it cannot, and why."""
+    import mujoco
+
+    found, left_out = [], []
+    joints = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    fixed, none = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtBias.mjBIAS_NONE)
+    affine = int(mujoco.mjtBias.mjBIAS_AFFINE)
+    filters = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
+    still = int(mujoco.mjtDyn.mjDYN_NONE)
+    for index in range(model.nu):
+        name = model.actuator(index).name
+        called = f"actuator '{name}'" if name else f"actuator number {index}"
+        dynamics, bias_kind = int(model.actuator_dyntype[index]), int(model.actuator_biastype[index])
+        if int(model.actuator_trntype[index]) not in joints:
+            left_out.append(f"{called}: it drives no joint (a tendon, site or body)")
+            continue
+        if int(model.actuator_gaintype[index]) != fixed or bias_kind not in (none, affine):
+            left_out.append(f"{called}: a muscle, motor model, plugin or gain that changes with the motion")
+            continue
+        if dynamics not in (still, *filters):
+            left_out.append(f"{called}: activation dynamics other than a filter")
+            continue
+        bias = (
+            tuple(float(b) for b in model.actuator_biasprm[index, :3]) if bias_kind == affine else (0.0,) * 3
+        )
+        found.append(
+            TreeActuator(
+                index,
+                int(model.actuator_trnid[index, 0]),
+                name,
+                float(model.actuator_gear[index, 0]),
+                float(model.actuator_gainprm[index, 0]),
+                (bias[0], bias[1], bias[2]),
+                _range(model.actuator_ctrllimited[index], model.actuator_ctrlrange[index]),
+                _range(model.actuator_forcelimited[index], model.actuator_forcerange[index]),
+                float(model.actuator_dynprm[index, 0]) if dynamics in filters else 0.0,
+            )
+        )
+        left_out += _beside(model, index, called)
+    return found, left_out
+
+
+def _beside(model: mujoco.MjModel, index: int, called: str) -> list[str]:
+    """Return in words what is not taken over of an actuator that is."""
+    found = []
+    delay = float(model.actuator_delay[index])
+    if delay > 0.0:
+        found.append(
+            f'{called}: its delay of {delay:g} s; a campaign says it by effects = ["input_delay@DRIVE"] and T_d'
+        )
+    if (
+        float(model.actuator_armature[index])
+        or model.actuator_damping[index]
+        or model.actuator_dampingpoly[index].any()
+    ):
+        found.append(f"{called}: its own armature and damping; give them to the joint")
+    if model.actuator_actlimited[index]:
+        found.append(f"{called}: the range of its activation")
+    return found
+
+
+def _range(limited: int, ends: tuple[float, float]) -> tuple[float, float] | None:
+    return (float(ends[0]), float(ends[1])) if limited else None

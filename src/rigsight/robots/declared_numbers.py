@@ -1,0 +1,89 @@
+"""Which numbers does a rig file from a model declare, and which numbers of the model is each?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from rigsight.robots.naming import Names
+
+
+@dataclass(frozen=True)
+class Field:
+    """A number of a MuJoCo model: attribute of an element, and which of several numbers it is.
+
+    Attributes
+    ----------
+    element
+        ``"joint"``, ``"actuator"`` or ``"body"``.
+    index
+        Its number in the model.
+    attribute
+        As MuJoCo's XML calls it.
+    entry
+        Which number of an attribute of several.
+    sign
+        -1 where a rig file and MuJoCo count it the other way.
+    """
+
+    element: str
+    index: int
+    attribute: str
+    entry: int = 0
+    sign: float = 1.0
+
+
+class DeclaredNumbers:
+    """Constants and parameters, each declared once.
+
+    Attributes
+    ----------
+    parameters
+        Their tables, by name.
+    fields
+        Parameter or constant -> the numbers of the model that it stands for.
+    """
+
+    def __init__(self, names: Names) -> None:
+        self._names = names
+        self._constants: dict[str, tuple[str, dict[str, Any]]] = {}
+        self.parameters: dict[str, dict[str, Any]] = {}
+        self.fields: dict[str, tuple[Field, ...]] = {}
+
+    @property
+    def constants(self) -> Mapping[str, dict[str, Any]]:
+        """Their tables, by name."""
+        return dict(self._constants.values())
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters as the model has them."""
+        return {name: float(table["default"]) for name, table in self.parameters.items()}
+
+    def constant(self, wished: str, value: float, unit: str, about: str, *fields: Field) -> sp.Expr:
+        """Return the symbol of a constant; zero for one that is zero."""
+        if value == 0.0:
+            return sp.S.Zero
+        if wished not in self._constants:
+            name = self._names.free(wished)
+            self._constants[wished] = name, {"unit": unit, "default": value, "about": about}
+            if fields:
+                self.fields[name] = fields
+        return sp.Symbol(self._constants[wished][0], real=True)
+
+    def factor(self, wished: str, value: float, about: str, *fields: Field) -> str:
+        """Return a factor in front of an expression, ``"NAME*"``; nothing for 1."""
+        return "" if value == 1.0 else f"{self.constant(wished, value, '1', about, *fields)}*"
+
+    def parameter(
+        self, wished: str, value: float, unit: str, about: str, *fields: Field, lower: float | None = 0.0
+    ) -> str:
+        """Return the name of a parameter."""
+        name = self._names.free(wished)
+        table: dict[str, Any] = {"unit": unit, "default": value, "about": about}
+        self.parameters[name] = table if lower is None else {**table, "lower": lower}
+        self.fields[name] = fields
+        return name

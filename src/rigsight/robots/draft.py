@@ -1,0 +1,172 @@
+"""A MuJoCo model -> the tables of a rig file, with where each part comes from, so that numbers find the way back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sympy as sp
+
+from rigsight.rigs import Rig, rig_of_tables
+from rigsight.robots.actuators import actuators_of
+from rigsight.robots.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.drive_tables import drive_of, plain_drive
+from rigsight.robots.energies import energies_of
+from rigsight.robots.joint_tables import armature, joint_table, way_unit
+from rigsight.robots.left_out import left_out_of
+from rigsight.robots.naming import Names
+from rigsight.robots.sensors import TreeSensor, sensors_of
+from rigsight.robots.tree import TreeJoint, bodies_of, cleaned
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+@dataclass(frozen=True)
+class RigDraft:
+    """A rig file that says what a MuJoCo model says.
+
+    Attributes
+    ----------
+    tables
+        The rig file.
+    joints, drives, sensors
+        Place of the rig -> number of the joint, actuator or sensor in the model; -1 for what was added.
+    controls
+        Drive -> the input that it is told.
+    fields
+        Parameter or constant of the rig -> the numbers of the model that it stands for.
+    values
+        Parameters as the model has them.
+    left_out
+        In words, what of the model the rig file does not say.
+    notes
+        In words, what was added.
+    """
+
+    tables: Mapping[str, Any]
+    joints: Mapping[str, int]
+    drives: Mapping[str, int]
+    controls: Mapping[str, str]
+    sensors: Mapping[str, int]
+    fields: Mapping[str, tuple[Field, ...]]
+    values: Mapping[str, float]
+    left_out: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def rig(self) -> Rig:
+        """The rig."""
+        return rig_of_tables(self.tables, "the rig of the model")
+
+
+def draft_rig(model: mujoco.MjModel, name: str, *, with_drives: bool = False) -> RigDraft:
+    """Return the rig file of a MuJoCo model.
+
+    Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants.
+
+    Parameters
+    ----------
+    model
+        Compiled.
+    name
+        What the rig is called.
+    with_drives
+        Give a model without actuators a force or torque at every joint: a URDF has none.
+
+    Raises
+    ------
+    InputError
+        If a joint is no hinge or slide, or nothing moves.
+    """
+    names, notes = Names(), []
+    numbers = DeclaredNumbers(names)
+    rig_name = names.free(name, "rig")
+    bodies = bodies_of(model)
+    actuators, drives_left_out = actuators_of(model)
+    sensors, sensors_left_out = sensors_of(model, actuators)
+    joints = sorted((joint for body in bodies for joint in body.joints), key=lambda joint: joint.index)
+    coordinates = [names.free(joint.name or f"joint_{joint.index + 1}", "joint") for joint in joints]
+    drives = [drive_of(one, joints[one.joint], coordinates[one.joint], names, numbers) for one in actuators]
+    if not drives and with_drives:
+        notes.append("The model has no actuators: a force or torque drives every joint.")
+        drives = [plain_drive(joint, q, names) for joint, q in zip(joints, coordinates, strict=True)]
+    if not sensors:
+        notes.append("The model has no sensor of a joint: the rig reads the position of every joint.")
+        sensors = [TreeSensor(-1, joint.index, "", 1.0, False) for joint in joints]
+    joint_tables = {
+        q: joint_table(model, joint, q, numbers) for joint, q in zip(joints, coordinates, strict=True)
+    }
+    called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
+    symbols = [sp.Symbol(q, real=True) for q in coordinates]
+    energies = energies_of(bodies, called, symbols, cleaned(model.opt.gravity), numbers)
+    rotors = [armature(model, joint, q, numbers) for joint, q in zip(joints, coordinates, strict=True)]
+    shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
+    tables: dict[str, Any] = {
+        "name": rig_name,
+        "summary": "From a MuJoCo model.",
+        "inputs": {drive.told: drive.control for drive in drives},
+        "constants": {},
+        "parameters": numbers.parameters,
+        "coordinates": {q: {"unit": way_unit(joint)} for joint, q in zip(joints, coordinates, strict=True)},
+        "energy": {
+            "kinetic": _sum(*energies.kinetic, *rotors),
+            "potential": _sum(*energies.potential),
+        },
+        "signals": {signal: _sum(value) for signal, value in energies.signals.items()},
+        "states": {name: state for drive in drives for name, state in drive.states.items()},
+        "joints": joint_tables,
+        "drives": {drive.name: drive.table for drive in drives},
+        "sensors": {name: table for name, _, table in shown},
+    }
+    return RigDraft(
+        with_known_constants(tables, numbers.constants),
+        {q: joint.index for joint, q in zip(joints, coordinates, strict=True)},
+        {drive.name: drive.index for drive in drives},
+        {drive.name: drive.told for drive in drives},
+        {name: sensor.index for name, sensor, _ in shown},
+        numbers.fields,
+        numbers.values,
+        (*left_out_of(model), *drives_left_out, *sensors_left_out),
+        tuple(notes),
+    )
+
+
+def with_known_constants(tables: Mapping[str, Any], constants: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of a rig with those constants that they read, and without tables that are empty."""
+    read = set(_words(value for key, value in tables.items() if key != "constants"))
+    known = {name: table for name, table in constants.items() if name in read}
+    return {key: value for key, value in {**tables, "constants": known}.items() if value != {}}
+
+
+def _words(values: Iterable[Any]) -> Iterable[str]:
+    for value in values:
+        if isinstance(value, Mapping):
+            yield from _words(value.values())
+        elif isinstance(value, str):
+            yield from re.findall(r"\w+", value)
+
+
+def _sensor_tables(
+    sensors: Sequence[TreeSensor],
+    joints: Sequence[TreeJoint],
+    coordinates: Sequence[str],
+    names: Names,
+    numbers: DeclaredNumbers,
+) -> list[tuple[str, TreeSensor, dict[str, Any]]]:
+    found = []
+    for sensor in sensors:
+        q, unit = coordinates[sensor.joint], way_unit(joints[sensor.joint])
+        what = ("position", "velocity") if joints[sensor.joint].slides else ("angle", "speed")
+        name = names.free(sensor.name or f"{q}_{what[sensor.is_rate]}", "sensor")
+        factor = numbers.factor(f"{name}_factor", sensor.factor, f"what {name} reads, by the joint")
+        reads, own = (f"d({q})", f"{unit}/s") if sensor.is_rate else (q, unit)
+        found.append((name, sensor, {"reads": f"{factor}{reads}", "unit": own}))
+    return found
+
+
+def _sum(*terms: sp.Expr) -> str:
+    """Return a sum as an expression of a rig file."""
+    return str(sp.Add(*terms)).replace("**", "^")

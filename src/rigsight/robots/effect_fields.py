@@ -1,0 +1,88 @@
+"""Which field of MuJoCo says an effect at its place? Many have none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+_SLACK = 2
+"""Samples of a control's history beyond its delay: one for the step in hand, one for rounding."""
+
+Write = Callable[[Any, Mapping[str, float], float], str | None]
+"""Writes an effect's own values into an element, given the time step, and says why not where it cannot."""
+
+
+@dataclass(frozen=True)
+class EffectField:
+    """Where an effect is written.
+
+    Attributes
+    ----------
+    element
+        ``"joint"``, ``"actuator"`` or ``"sensor"``.
+    attribute
+        For people.
+    write
+        Does it.
+    """
+
+    element: str
+    attribute: str
+    write: Write
+
+
+def _added(attribute: str, own: str, entry: int | None = None) -> Write:
+    def write(element: Any, values: Mapping[str, float], _: float) -> None:
+        if entry is None:
+            setattr(element, attribute, float(getattr(element, attribute)) + values[own])
+        else:
+            getattr(element, attribute)[entry] += values[own]
+
+    return write
+
+
+def _late(own: str) -> Write:
+    def write(element: Any, values: Mapping[str, float], step: float) -> str | None:
+        if element.delay > 0.0:
+            element.delay += values[own]
+        else:
+            element.delay = values[own]
+        element.nsample = max(element.nsample, int(element.delay / step) + _SLACK)
+        element.interp = 1  # linear: the delay need not be a whole number of steps
+        return None
+
+    return write
+
+
+def _limited(element: Any, values: Mapping[str, float], _: float) -> str | None:
+    size = values["u_max"]
+    low, high = (-size, size)
+    if element.ctrlrange[0] < element.ctrlrange[1]:
+        low, high = max(low, float(element.ctrlrange[0])), min(high, float(element.ctrlrange[1]))
+    element.ctrlrange[:] = (low, high)
+    element.ctrllimited = True
+    return None
+
+
+def _filtered(element: Any, values: Mapping[str, float], _: float) -> str | None:
+    import mujoco
+
+    if element.dyntype != mujoco.mjtDyn.mjDYN_NONE:
+        return "the actuator has a filter already"
+    element.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+    element.dynprm[0] = values["T_a"]
+    return None
+
+
+EFFECT_FIELDS: Mapping[str, EffectField] = {
+    "coulomb_friction": EffectField("joint", "frictionloss", _added("frictionloss", "T_c")),
+    "quadratic_damping": EffectField("joint", "damping, second number", _added("damping", "c_2", 1)),
+    "asymmetric_stiffness": EffectField("joint", "stiffness, second number", _added("stiffness", "k_2", 1)),
+    "cubic_stiffness": EffectField("joint", "stiffness, third number", _added("stiffness", "k_3", 2)),
+    "input_delay": EffectField("actuator", "delay", _late("T_d")),
+    "input_saturation": EffectField("actuator", "ctrlrange", _limited),
+    "actuator_lag": EffectField("actuator", "dyntype filterexact", _filtered),
+    "sensor_delay": EffectField("sensor", "delay", _late("T_s")),
+}
+"""By the name of the effect, as of MuJoCo 4.0."""

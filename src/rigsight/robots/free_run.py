@@ -1,0 +1,134 @@
+"""Does a rig move as MuJoCo does? Both start from one state and run freely, and their coordinates are compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.records import Record
+from rigsight.rigs import Rig, rig_of_tables
+from rigsight.robots.draft import RigDraft, with_known_constants
+from rigsight.simulate import compose, simulate
+
+if TYPE_CHECKING:
+    import mujoco
+
+STEP, SAMPLES, STEPS_PER_SAMPLE = 1e-4, 500, 10
+"""MuJoCo's step [s], samples that are compared, and steps from each to the next."""
+ALLOWED = 1e-5
+"""Largest relative difference of equations that are the same."""
+_ACCURACY = 1e-8
+_WATCHED = "watched_"
+_WAY = {False: 0.4, True: 0.05}
+"""How far from its reference a hinge [rad] or slide [m] starts."""
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """A run of both.
+
+    Attributes
+    ----------
+    duration
+        Of the run [s].
+    differences
+        Coordinate -> largest difference, relative to how far the coordinate moves.
+    left_out
+        In words, what was switched off in both.
+    """
+
+    duration: float
+    differences: dict[str, float]
+    left_out: tuple[str, ...]
+
+    @property
+    def worst(self) -> float:
+        """Largest of the differences."""
+        return max(self.differences.values())
+
+    @property
+    def agrees(self) -> bool:
+        """True if the equations are the same."""
+        return self.worst <= ALLOWED
+
+
+def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
+    """Let a rig and the model that it comes from run freely from one state, under constant controls.
+
+    MuJoCo steps with the Runge-Kutta method of fourth order at a small step. What a rig file does not say is switched off in it:
+    contacts, ranges and equalities; and so is dry friction, in both, as MuJoCo's creeps where it should stick.
+
+    Parameters
+    ----------
+    model
+        Compiled; it stays as it is.
+    draft
+        Its rig file.
+    """
+    import copy
+
+    import mujoco
+
+    off = mujoco.mjtDisableBit
+    own = copy.copy(model)
+    own.opt.timestep, own.opt.integrator = STEP, int(mujoco.mjtIntegrator.mjINT_RK4)
+    for flag in (off.mjDSBL_CONTACT, off.mjDSBL_EQUALITY, off.mjDSBL_LIMIT, off.mjDSBL_FRICTIONLOSS):
+        own.opt.disableflags |= int(flag)
+    own.actuator_delay[:] = 0.0
+    # The same filter, which the method of fourth order integrates as well: MuJoCo's exact one is of first order beside it.
+    exact = own.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
+    own.actuator_dyntype[exact] = int(mujoco.mjtDyn.mjDYN_FILTER)
+    data = mujoco.MjData(own)
+    rng = np.random.default_rng(0)
+    coordinates = {name: int(own.jnt_qposadr[index]) for name, index in draft.joints.items()}
+    for name, index in draft.joints.items():
+        slides = int(own.jnt_type[index]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        data.qpos[coordinates[name]] += _WAY[slides] * rng.uniform(-1.0, 1.0)
+    controls = {name: index for name, index in draft.drives.items() if index >= 0}
+    for index in controls.values():
+        low, high = own.actuator_ctrlrange[index] if own.actuator_ctrllimited[index] else (-0.2, 0.2)
+        data.ctrl[index] = rng.uniform(low, high)
+    start, told = data.qpos.copy(), data.ctrl.copy()
+    theirs = np.empty((SAMPLES, own.nq))
+    for row in theirs:
+        row[:] = data.qpos
+        mujoco.mj_step(own, data, STEPS_PER_SAMPLE)
+    ours = _ours(draft, {name: start[place] for name, place in coordinates.items()}, told)
+    differences = {}
+    for name, place in coordinates.items():
+        moved = np.ptp(theirs[:, place])
+        differences[name] = float(np.max(np.abs(ours[name] - theirs[:, place])) / max(moved, 1e-12))
+    friction = ("dry friction",) if np.any(model.dof_frictionloss) else ()
+    return FreeRun(STEP * STEPS_PER_SAMPLE * (SAMPLES - 1), differences, friction)
+
+
+def _ours(
+    draft: RigDraft, start: dict[str, float], told: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the coordinates of the rig along the run, shape (SAMPLES,) each."""
+    rig = watched(draft)
+    structure = compose(rig, [])
+    dry = {
+        name for name, fields in draft.fields.items() if any(f.attribute == "frictionloss" for f in fields)
+    }
+    values = {name: 0.0 if name in dry else value for name, value in draft.values.items()}
+    held = {draft.controls[drive]: told[index] for drive, index in draft.drives.items() if index >= 0}
+    inputs = {signal.name: np.full(SAMPLES, held.get(signal.name, 0.0)) for signal in rig.inputs}
+    units = {signal.name: signal.unit for signal in rig.inputs}
+    record = Record("free run", STEP * STEPS_PER_SAMPLE, inputs, units, hold="zoh")
+    state = np.array([start.get(state.name, 0.0) for state in structure.states])
+    out = simulate(structure, values, record, state, _ACCURACY)
+    return {name: out[f"{_WATCHED}{name}"] for name in start}
+
+
+def watched(draft: RigDraft) -> Rig:
+    """Return a rig with a sensor at every coordinate in the place of its own."""
+    sensors = {
+        f"{_WATCHED}{name}": {"reads": name, "unit": table["unit"]}
+        for name, table in draft.tables["coordinates"].items()
+    }
+    tables = with_known_constants({**draft.tables, "sensors": sensors}, draft.tables.get("constants", {}))
+    return rig_of_tables(tables, "the rig from the model")

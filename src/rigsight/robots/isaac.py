@@ -1,0 +1,134 @@
+"""Numbers and effects of a model -> the settings of Isaac Lab's actuators, a group for each joint.
+
+Written for Isaac Lab 3.0 (`isaaclab.actuators.ActuatorBaseCfg`, `DelayedPDActuatorCfg`). Friction of joints is there since Isaac
+Sim 5.0; 2.x calls ``actuator_effort_limit`` ``effort_limit``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigsight.effects import kind_of
+from rigsight.errors import InputError
+from rigsight.robots.draft import RigDraft
+from rigsight.robots.writing_back import WrittenBack, draft_of
+from rigsight.simulate.model import Model
+
+_FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("joint", "damping"): ("viscous_friction",),
+    ("joint", "frictionloss"): ("friction", "dynamic_friction"),
+    ("joint", "armature"): ("armature",),
+    ("actuator", "forcerange"): ("actuator_effort_limit",),
+}
+"""Element and attribute of MuJoCo -> the settings that say the same."""
+
+
+@dataclass
+class _Settings:
+    """Settings of each joint's group as they are found."""
+
+    by_joint: dict[int, dict[str, Any]]
+    written: list[str]
+    without_field: list[str]
+
+    def add(self, joint: int, setting: str, value: float) -> None:
+        group = self.by_joint[joint]
+        group[setting] = group.get(setting, 0.0) + value
+
+
+def isaac_settings(model: Model, source: Path, step: float | None = None) -> WrittenBack:
+    """Return the YAML of Isaac Lab's actuators for a model that was made from an MJCF or URDF file.
+
+    Parameters
+    ----------
+    model
+        Identified, or with the effects that a diagnosis named.
+    source
+        The file that ``rigsight init --mjcf`` read.
+    step
+        Step of the physics [s], of which delays are whole numbers; default is the file's.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or the rig has places that are not in it.
+    """
+    try:
+        import yaml
+    except ImportError:
+        raise InputError(
+            "Writing for Isaac Lab needs PyYAML, which is not installed: pip install 'rigsight[mujoco]'."
+        ) from None
+    compiled, draft = draft_of(model, source)
+    step = float(compiled.opt.timestep) if step is None else step
+    names = {index: compiled.joint(index).name or place for place, index in draft.joints.items()}
+    settings = _Settings({index: {"joint_names_expr": [name]} for index, name in names.items()}, [], [])
+    joints_of_drives = {
+        drive: int(compiled.actuator_trnid[index, 0]) for drive, index in draft.drives.items() if index >= 0
+    }
+    for actuator in joints_of_drives:
+        _gains(model, draft, actuator, joints_of_drives[actuator], settings)
+    _numbers(model, draft, compiled, settings)
+    _effects(model, draft, joints_of_drives, settings, step)
+    content = {"actuators": {names[index]: group for index, group in settings.by_joint.items()}}
+    head = [
+        f"Written by rigsight export from {source.name}, for Isaac Lab 3.0.",
+        f"Delays are steps of the physics of {step:g} s each.",
+        *(f"Isaac Lab has no setting for {what}" for what in settings.without_field),
+    ]
+    text = "".join(f"# {line}\n" for line in head) + yaml.safe_dump(content, sort_keys=False)
+    return WrittenBack(text, tuple(settings.written), tuple(settings.without_field))
+
+
+def _gains(model: Model, draft: RigDraft, drive: str, joint: int, settings: _Settings) -> None:
+    for name, setting in ((f"{drive}_kp", "stiffness"), (f"{drive}_kv", "damping")):
+        if name in draft.fields and name in model.values:
+            settings.by_joint[joint][setting] = model.values[name]
+            settings.written.append(f"{setting} of {drive}")
+
+
+def _numbers(model: Model, draft: RigDraft, compiled: Any, settings: _Settings) -> None:
+    for name, fields in draft.fields.items():
+        field = fields[0]
+        if name not in model.values or (field.element, field.attribute) not in _FIELDS:
+            continue
+        if field.entry and field.attribute == "damping":
+            settings.without_field.append(f"{name} = {model.values[name]:.4g}")
+            continue
+        joint = field.index if field.element == "joint" else int(compiled.actuator_trnid[field.index, 0])
+        for setting in _FIELDS[field.element, field.attribute]:
+            if field.attribute == "forcerange":
+                if field.entry == 1:
+                    settings.by_joint[joint][setting] = model.values[name]
+            else:
+                settings.add(joint, setting, model.values[name])
+        settings.written.append(f"{name} = {model.values[name]:.4g}")
+
+
+def _effects(
+    model: Model, draft: RigDraft, joints_of_drives: Mapping[str, int], settings: _Settings, step: float
+) -> None:
+    structure = model.structure
+    for effect in model.effects:
+        place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
+        values = structure.values_of(effect, model.values)
+        told = f"{kind} at {place} ({', '.join(f'{own} = {value:.4g}' for own, value in values.items())})"
+        joint = draft.joints.get(place, joints_of_drives.get(place, -1))
+        match kind:
+            case "coulomb_friction" if joint >= 0:
+                settings.add(joint, "friction", values["T_c"])
+                settings.add(joint, "dynamic_friction", values["T_c"])
+            case "stribeck_friction" if joint >= 0:
+                settings.add(joint, "friction", values["T_s"])
+                settings.add(joint, "dynamic_friction", values["T_c"])
+                settings.without_field.append(f"w_s = {values['w_s']:.4g} of {kind} at {place}")
+            case "input_delay" if joint >= 0:
+                steps = round(values["T_d"] / step)
+                settings.by_joint[joint] |= {"min_delay": steps, "max_delay": steps}
+            case _:
+                settings.without_field.append(told)
+                continue
+        settings.written.append(told)

@@ -1,0 +1,36 @@
+"""What are parts of a MuJoCo model called in a rig file? Its own names, as identifiers that are free."""
+
+from __future__ import annotations
+
+import re
+
+from rigsight.rigs.reading.functions import FUNCTIONS
+
+_LONGEST = 40
+"""Characters of a part's name; what is made of it has more."""
+
+
+class Names:
+    """Gives names that no other part has."""
+
+    def __init__(self) -> None:
+        self._taken = {*FUNCTIONS, "t", "d", "force"}
+
+    def free(self, wished: str, otherwise: str = "part") -> str:
+        """Return a name as it is wished if it can be, or the nearest one.
+
+        Parameters
+        ----------
+        wished
+            As MuJoCo calls it.
+        otherwise
+            What to begin with where that holds no letter.
+        """
+        name = re.sub(r"\W+", "_", wished, flags=re.ASCII).strip("_")[:_LONGEST] or otherwise
+        name = name if not name[0].isdigit() else f"{otherwise}_{name}"
+        found, count = name, 1
+        while found in self._taken:
+            count += 1
+            found = f"{name}_{count}"
+        self._taken.add(found)
+        return found

@@ -1,0 +1,39 @@
+"""The tables of a rig file -> its text, with what it leaves out as comments at its head."""
+
+from __future__ import annotations
+
+from rigsight.errors import InputError
+from rigsight.robots.draft import RigDraft
+
+
+def rig_text(draft: RigDraft, source: str) -> str:
+    """Return the text of a rig file.
+
+    Parameters
+    ----------
+    draft
+        The rig of a model.
+    source
+        How the text calls the file of the model.
+
+    Raises
+    ------
+    InputError
+        If what writes TOML is not installed.
+    """
+    try:
+        import tomli_w
+    except ImportError:
+        raise InputError(
+            "Writing a rig file needs tomli-w, which is not installed: pip install 'rigsight[mujoco]'."
+        ) from None
+    lines = [f"Written by rigsight init from {source}.", *draft.notes]
+    if draft.left_out:
+        lines += ["Not taken over:", *(f"- {what}" for what in draft.left_out)]
+    head = "\n".join(f"# {line}" for line in "\n".join(lines).split("\n"))
+    return f"{_printable(head)}\n\n{tomli_w.dumps(draft.tables)}"
+
+
+def _printable(text: str) -> str:
+    """Return text without the signs that TOML forbids in comments."""
+    return "".join(sign if sign in "\n\t" or sign.isprintable() else " " for sign in text)

@@ -1,0 +1,153 @@
+"""What of a compiled MuJoCo model moves? Its bodies in their order, each with its joints, as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+
+if TYPE_CHECKING:
+    import mujoco
+
+Floats = NDArray[np.float64]
+
+_ROUNDING = 1e-9
+"""Share of the largest component below which another one is rounding of the quaternions that a model is stored with."""
+
+
+@dataclass(frozen=True)
+class TreeJoint:
+    """A hinge or slide joint.
+
+    Attributes
+    ----------
+    index, dof
+        Its numbers in the model, and that of its degree of freedom.
+    name
+        As MuJoCo calls it; empty without a name.
+    slides
+        True for a slide, False for a hinge.
+    axis, anchor
+        In the frame of its body, shape (3,) each.
+    reference
+        Coordinate at which the body stands as the model draws it.
+    """
+
+    index: int
+    dof: int
+    name: str
+    slides: bool
+    axis: Floats
+    anchor: Floats
+    reference: float
+
+
+@dataclass(frozen=True)
+class TreeBody:
+    """A body and how it hangs on its parent.
+
+    Attributes
+    ----------
+    index, parent
+        Its number in the model, and that of its parent; 0 is the world.
+    name
+        As MuJoCo calls it; empty without a name.
+    position, rotation
+        Of its frame in that of its parent, shapes (3,) and (3, 3).
+    mass
+        Mass [kg].
+    weight
+        Part of it that gravity acts on: less where the model compensates gravity.
+    center
+        Center of mass in its own frame, shape (3,).
+    inertia
+        About its center, along the axes of its own frame, shape (3, 3).
+    joints
+        In the order in which they move it.
+    """
+
+    index: int
+    parent: int
+    name: str
+    position: Floats
+    rotation: Floats
+    mass: float
+    weight: float
+    center: Floats
+    inertia: Floats
+    joints: tuple[TreeJoint, ...]
+
+
+def bodies_of(model: mujoco.MjModel) -> tuple[TreeBody, ...]:
+    """Return the bodies of a model behind their parents, without the world.
+
+    Raises
+    ------
+    InputError
+        If a joint is no hinge or slide, or nothing moves.
+    """
+    import mujoco
+
+    kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
+    for j in range(model.njnt):
+        kind = kinds.get(int(model.jnt_type[j]))
+        if kind is not None:
+            body = model.body(int(model.jnt_bodyid[j])).name or f"number {int(model.jnt_bodyid[j])}"
+            raise InputError(
+                f"Body '{body}' has a {kind} joint. A rig file takes hinge and slide joints; fix the body to the world, or write "
+                "its motion as hinges and slides."
+            )
+    if model.njnt == 0:
+        raise InputError("The model has no joint, so nothing in it moves.")
+    return tuple(_body(model, index) for index in range(1, model.nbody))
+
+
+def _body(model: mujoco.MjModel, index: int) -> TreeBody:
+    axes = _matrix(model.body_iquat[index])
+    mass = float(model.body_mass[index])
+    return TreeBody(
+        index,
+        int(model.body_parentid[index]),
+        model.body(index).name,
+        cleaned(model.body_pos[index]),
+        cleaned(_matrix(model.body_quat[index])),
+        mass,
+        mass * (1.0 - float(model.body_gravcomp[index])),
+        cleaned(model.body_ipos[index]),
+        cleaned(axes @ np.diag(model.body_inertia[index]) @ axes.T),
+        tuple(_joint(model, int(model.body_jntadr[index]) + i) for i in range(int(model.body_jntnum[index]))),
+    )
+
+
+def _joint(model: mujoco.MjModel, index: int) -> TreeJoint:
+    import mujoco
+
+    return TreeJoint(
+        index,
+        int(model.jnt_dofadr[index]),
+        model.joint(index).name,
+        int(model.jnt_type[index]) == int(mujoco.mjtJoint.mjJNT_SLIDE),
+        cleaned(model.jnt_axis[index]),
+        cleaned(model.jnt_pos[index]),
+        float(model.qpos0[int(model.jnt_qposadr[index])]),
+    )
+
+
+def cleaned(numbers: Sequence[float] | Floats) -> Floats:
+    """Return numbers with what is rounding beside the largest of them as zero."""
+    array = np.array(numbers, dtype=np.float64)
+    array[np.abs(array) <= _ROUNDING * np.max(np.abs(array), initial=0.0)] = 0.0
+    return array
+
+
+def _matrix(quaternion: Floats) -> Floats:
+    import mujoco
+
+    flat = np.zeros(9)
+    mujoco.mju_quat2Mat(flat, quaternion)
+    return flat.reshape(3, 3)

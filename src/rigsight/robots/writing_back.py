@@ -1,0 +1,183 @@
+"""Numbers and effects of a model -> the MuJoCo model that it began as, with what MuJoCo has a field for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigsight.effects import Effect, kind_of
+from rigsight.errors import InputError
+from rigsight.robots.declared_numbers import Field
+from rigsight.robots.draft import RigDraft, draft_rig
+from rigsight.robots.effect_fields import EFFECT_FIELDS
+from rigsight.robots.loading import load_model, load_spec
+from rigsight.simulate.model import Model
+
+if TYPE_CHECKING:
+    import mujoco
+
+_SAME = 1e-12
+"""Relative difference below which a number is the one that the file has."""
+
+
+@dataclass(frozen=True)
+class WrittenBack:
+    """A MuJoCo model with the numbers and effects of another one.
+
+    Attributes
+    ----------
+    text
+        MJCF.
+    written
+        In words, each field that changed.
+    without_field
+        In words, what MuJoCo has no field for.
+    """
+
+    text: str
+    written: tuple[str, ...]
+    without_field: tuple[str, ...]
+
+
+def write_back(model: Model, source: Path) -> WrittenBack:
+    """Return the MuJoCo model of a file with the numbers and effects of a rig that was made from it.
+
+    Parameters
+    ----------
+    model
+        Identified, or with the effects that a diagnosis named.
+    source
+        The MJCF or URDF file that ``rigsight init --mjcf`` read.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or the rig has places that are not in it.
+    """
+    compiled, draft = draft_of(model, source)
+    writer = _Writer(load_spec(source), compiled, draft)
+    for name, value in model.values.items():
+        if name in draft.fields:
+            writer.write_number(name, value)
+    for effect in model.effects:
+        writer.write_effect(effect, model)
+    return writer.finished(source)
+
+
+def draft_of(model: Model, source: Path) -> tuple[mujoco.MjModel, RigDraft]:
+    """Return the compiled model of a file and the rig that it gives.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or the model's rig has places that are not in it.
+    """
+    compiled = load_model(source)
+    draft = draft_rig(compiled, source.stem, with_drives=source.suffix.lower() == ".urdf")
+    _check_is_of(model, draft, source)
+    return compiled, draft
+
+
+def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
+    mechanism = model.structure.rig.mechanism
+    for what, parts, known in (
+        ("joint", mechanism.joints, draft.joints),
+        ("drive", mechanism.drives, draft.drives),
+        ("sensor", mechanism.sensors, draft.sensors),
+    ):
+        missing = [part.name for part in parts if part.name not in known]
+        if missing:
+            raise InputError(
+                f"The model's rig has a {what} '{missing[0]}', and {source} has none of that name "
+                f"({', '.join(known) or 'none at all'}). Name the file from which rigsight init --mjcf made the rig."
+            )
+
+
+class _Writer:
+    def __init__(self, spec: mujoco.MjSpec, compiled: mujoco.MjModel, draft: RigDraft) -> None:
+        self._spec, self._compiled, self._draft = spec, compiled, draft
+        self._elements: Mapping[str, Mapping[int, Any]] = {
+            "joint": {joint.id: joint for joint in spec.joints},
+            "actuator": {actuator.id: actuator for actuator in spec.actuators},
+            "sensor": {sensor.id: sensor for sensor in spec.sensors},
+            "body": {body.id: body for body in spec.bodies},
+        }
+        self._written: list[str] = []
+        self._without_field: list[str] = []
+
+    def write_number(self, name: str, value: float) -> None:
+        tables = {**self._draft.tables.get("constants", {}), **self._draft.tables["parameters"]}
+        before = float(tables[name]["default"])
+        if math.isclose(before, value, rel_tol=_SAME, abs_tol=0.0):
+            return
+        for field in self._draft.fields[name]:
+            self._set(field, value)
+        first = self._draft.fields[name][0]
+        self._written.append(
+            f"{self._called(first.element, first.index)} {first.attribute}: {before:g} -> {value:g}"
+        )
+
+    def _set(self, field: Field, value: float) -> None:
+        element = self._elements[field.element][field.index]
+        number = field.sign * value
+        if field.element == "body":
+            self._set_mass(element, field.index, number)
+        elif field.attribute == "springref" and self._in_degrees(field.index):
+            element.springref = math.degrees(number)
+        elif isinstance(getattr(element, field.attribute), float):
+            setattr(element, field.attribute, number)
+        else:
+            getattr(element, field.attribute)[field.entry] = number
+
+    def _in_degrees(self, joint: int) -> bool:
+        import mujoco
+
+        hinge = int(mujoco.mjtJoint.mjJNT_HINGE)
+        return bool(self._spec.compiler.degree) and int(self._compiled.jnt_type[joint]) == hinge
+
+    def _set_mass(self, body: Any, index: int, mass: float) -> None:
+        """Give a body a mass, with center and inertia as they were: its shapes no longer say them."""
+        body.explicitinertial = True
+        body.mass = mass
+        body.ipos[:], body.iquat[:] = self._compiled.body_ipos[index], self._compiled.body_iquat[index]
+        body.inertia[:] = self._compiled.body_inertia[index]
+        body.fullinertia[:] = [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+    def write_effect(self, effect: Effect, model: Model) -> None:
+        structure = model.structure
+        place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
+        values = structure.values_of(effect, model.values)
+        numbers = ", ".join(f"{own} = {value:.4g}" for own, value in values.items())
+        told = f"{kind} at {place} ({numbers})"
+        field = EFFECT_FIELDS.get(kind)
+        places = {"joint": self._draft.joints, "actuator": self._draft.drives, "sensor": self._draft.sensors}
+        index = -1 if field is None else places[field.element].get(place, -1)
+        if field is None or index < 0:
+            self._without_field.append(told)
+            return
+        refused = field.write(
+            self._elements[field.element][index], values, float(self._compiled.opt.timestep)
+        )
+        if refused is None:
+            self._written.append(f"{self._called(field.element, index)} {field.attribute}: {told}")
+        else:
+            self._without_field.append(f"{told}: {refused}")
+
+    def _called(self, element: str, index: int) -> str:
+        return f"{element} '{self._elements[element][index].name or index}'"
+
+    def finished(self, source: Path) -> WrittenBack:
+        try:
+            self._spec.compile()
+            text = self._spec.to_xml()
+        except ValueError as error:
+            raise InputError(f"{source}: MuJoCo refuses it with the new numbers: {error}") from None
+        lines = [f"Written by rigsight export from {source.name}."]
+        lines += [f"{line}" for line in self._written]
+        lines += [f"MuJoCo has no field for {line}" for line in self._without_field]
+        # A comment of XML may hold no two hyphens.
+        comment = "\n".join(lines).replace("--", "- -")
+        return WrittenBack(f"<!-- {comment} -->\n{text}", tuple(self._written), tuple(self._without_field))

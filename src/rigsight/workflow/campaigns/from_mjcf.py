@@ -1,0 +1,74 @@
+"""What `rigsight init --mjcf` does: a robot's model -> a rig file that moves as MuJoCo does, and a campaign for its records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigsight.errors import InputError
+from rigsight.robots import FreeRun, RigDraft, draft_rig, free_run, load_model, rig_text
+from rigsight.workflow.campaigns.init import CAMPAIGN_FILE, Draft, measured_files, run_init
+from rigsight.workflow.files.results import write_together
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDraft:
+    """A rig file as it was written.
+
+    Attributes
+    ----------
+    path
+        The rig file.
+    draft
+        What it says, and what it leaves out.
+    run
+        How it moves beside MuJoCo.
+    campaign
+        The campaign beside it; None where the folder holds no records yet.
+    """
+
+    path: Path
+    draft: RigDraft
+    run: FreeRun
+    campaign: Draft | None
+
+
+def run_init_from_mjcf(folder: str | Path, model_file: str | Path) -> ModelDraft:
+    """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files.
+
+    Parameters
+    ----------
+    folder
+        Where it is written; created if it does not exist.
+    model_file
+        MJCF or URDF.
+
+    Raises
+    ------
+    InputError
+        If the model cannot be read or taken over, a file is in the way, or nothing can be written there.
+    """
+    folder, source = Path(folder), Path(model_file)
+    model = load_model(source)
+    try:
+        draft = draft_rig(model, source.stem, with_drives=source.suffix.lower() == ".urdf")
+        rig = draft.rig
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    path = folder / f"{rig.name}.toml"
+    text = rig_text(draft, source.name)
+    # Once records are there, the same command goes on with the campaign.
+    if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
+        raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
+    campaign_file = folder / CAMPAIGN_FILE
+    if campaign_file.exists() or campaign_file.is_symlink():
+        raise InputError(
+            f"{campaign_file} exists already and is not overwritten; remove it, or edit it by hand."
+        )
+    run = free_run(model, draft)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_together(folder, {path.name: text}, "Make room or ask for the right to write there.")
+    campaign = None
+    if measured_files(folder):
+        campaign = run_init(folder, model=rig.name, rig_files=[path], values=draft.values)
+    return ModelDraft(path, draft, run, campaign)

@@ -1,0 +1,109 @@
+"""``rigsight init --mjcf`` and ``rigsight export --to mjcf``: from a robot's model to a rig file, and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigsight.rigs import read_rig_file
+
+Run = Callable[..., tuple[int, str, str]]
+CART = Path(__file__).parents[1] / "robots" / "models" / "cart_pole.xml"
+
+
+def test_a_model_becomes_a_rig_file_and_a_campaign_once_records_are_there(tmp_path: Path, run: Run) -> None:
+    folder = tmp_path / "stage"
+    code, stdout, stderr = run("init", folder, "--mjcf", CART)
+    assert (code, stderr) == (0, "")
+    assert f"Written: {folder / 'cart_pole.toml'} (2 joints)" in stdout
+    assert "without dry friction: it moves as MuJoCo does" in stdout
+    assert "columns t, push_ctrl, slider_position, hinge_angle" in stdout
+    assert read_rig_file(folder / "cart_pole.toml").name == "cart_pole"
+    t = 0.01 * np.arange(200)
+    rows = np.column_stack([t, np.sin(t), 0.1 * np.sin(t), 0.3 + 0.01 * np.sin(t)])
+    np.savetxt(
+        folder / "a.csv", rows, delimiter=",", header="t,push_ctrl,slider_position,hinge_angle", comments=""
+    )
+    code, stdout, stderr = run("init", folder, "--mjcf", CART)
+    assert (code, stderr) == (0, "")
+    campaign = (folder / "campaign.toml").read_text("utf-8")
+    assert 'file = "cart_pole.toml"' in campaign
+    assert "slider_frictionloss = 0.2 " in campaign
+    assert 'hold = "zoh"' in campaign
+    code, _, stderr = run("init", folder, "--mjcf", CART)
+    assert code == 2
+    assert "campaign.toml exists already and is not overwritten" in stderr
+
+
+def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
+    model = tmp_path / "robot.xml"
+    limited = CART.read_text("utf-8").replace('damping="0.5"', 'damping="0.5" range="-1 1" limited="true"')
+    model.write_text(limited, "utf-8")
+    code, stdout, _ = run("init", tmp_path, "--mjcf", model, "--json")
+    told = json.loads(stdout)
+    assert code == 0
+    assert told["left_out"] == [
+        "range of joints: slider; the rig moves past it, and end_stop says it as an effect"
+    ]
+    assert max(told["free_run"]["relative_difference"].values()) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["init", "--mjcf", "missing.xml"], "missing.xml"),
+        (["init", "--mjcf", CART, "--model", "axis"], "leave out --model"),
+        (["init"], "Name the FOLDER"),
+        (["export", "MODEL", "--to", "mjcf"], "name the MJCF or URDF file"),
+        (["export", "MODEL", "--to", "mjcf", "--mjcf", CART], "has a joint"),
+        (["export", "MODEL", "--to", "mjcf", "--mjcf", CART, "--hold", "zoh"], "say nothing of mjcf"),
+        (["export", "MODEL", "--to", "c", "--mjcf", CART], "leave it out for c"),
+    ],
+)
+def test_what_cannot_be_is_one_message(
+    arguments: list[object],
+    said: str,
+    write_model: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    run: Run,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, stdout, stderr = run(*(write_model() if one == "MODEL" else one for one in arguments))
+    assert (code, stdout) == (2, "")
+    assert said in stderr
+    assert not list(tmp_path.glob("*.xml"))
+
+
+def test_a_model_of_the_robot_is_written_back(tmp_path: Path, run: Run) -> None:
+    run("init", tmp_path, "--mjcf", CART, "-q")
+    rig = read_rig_file(tmp_path / "cart_pole.toml")
+    model = tmp_path / "model.json"
+    model.write_text(
+        json.dumps(
+            {
+                "schema_version": 1,
+                "rig": rig.name,
+                "declaration": dict(rig.declaration),
+                "hold": "zoh",
+                "constants": {p.name: p.default for p in rig.constants},
+                "parameters": {p.name: p.default for p in rig.parameters} | {"slider_damping": 0.7},
+                "effects": ["input_delay@push"],
+                "effect_parameters": {"T_d": 0.01},
+            }
+        ),
+        "utf-8",
+    )
+    out = tmp_path / "corrected.xml"
+    code, stdout, stderr = run("export", model, "--to", "mjcf", "--mjcf", CART, "--out", out)
+    assert (code, stderr) == (0, "")
+    assert "Written: joint 'slider' damping: 0.5 -> 0.7" in stdout
+    assert "Written: actuator 'push' delay: input_delay at push (T_d = 0.01)" in stdout
+    assert 'delay="0.01"' in out.read_text("utf-8")
+    code, stdout, _ = run("export", model, "--to", "isaac", "--mjcf", CART, "--out", tmp_path / "cart.yaml")
+    assert code == 0
+    assert "friction: 0.2" in (tmp_path / "cart.yaml").read_text("utf-8")

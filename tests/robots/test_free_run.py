@@ -1,0 +1,31 @@
+"""A rig file from a robot's model moves as MuJoCo does; one that does not is told apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rigsight.robots import draft_rig, free_run, load_model
+from rigsight.robots.free_run import ALLOWED
+
+MODELS = Path(__file__).parent / "models"
+
+
+@pytest.mark.parametrize("name", ["two_link_arm.xml", "cart_pole.xml", "spatial_arm.xml", "pendulum.urdf"])
+def test_it_moves_as_mujoco_does(name: str) -> None:
+    path = MODELS / name
+    model = load_model(path)
+    run = free_run(model, draft_rig(model, path.stem, with_drives=path.suffix == ".urdf"))
+    # What differs are two integrators of the same equations.
+    assert run.worst < 1e-3 * ALLOWED
+
+
+def test_another_damping_is_seen() -> None:
+    model = load_model(MODELS / "two_link_arm.xml")
+    draft = draft_rig(model, "arm")
+    other = replace(draft, values={**draft.values, "elbow_damping": 1.01 * draft.values["elbow_damping"]})
+    run = free_run(model, other)
+    assert not run.agrees
+    assert run.worst == run.differences["elbow"]

@@ -1,0 +1,142 @@
+"""Numbers and effects go back into a robot's model, which then moves as the one that they were taken from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+
+from rigsight.effects import effect_named, placed
+from rigsight.errors import InputError
+from rigsight.records import Record
+from rigsight.rigs import RIGS
+from rigsight.robots import draft_rig, isaac_settings, load_model, write_back
+from rigsight.simulate import compose, simulate
+from rigsight.simulate.model import Model
+
+ARM = Path(__file__).parent / "models" / "two_link_arm.xml"
+STEP = 0.001
+
+
+def model_of(values: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> Model:
+    draft = draft_rig(load_model(ARM), ARM.stem)
+    at_places = [placed(effect_named(name.partition("@")[0]), name.partition("@")[2]) for name in effects]
+    structure = compose(draft.rig, at_places)
+    own = {
+        structure.parameter_name(effect, name): value
+        for effect in at_places
+        for name, value in effects[effect.name].items()
+    }
+    defaults = {p.name: p.default for p in (*draft.rig.constants, *draft.rig.parameters)}
+    return Model(structure, {**defaults, **values, **own}, "zoh")
+
+
+def run(model: Any, controls: np.ndarray) -> np.ndarray:
+    """Let MuJoCo run from where the model hangs still; one control for each step."""
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
+    data = mujoco.MjData(model)
+    out = np.empty((len(controls), model.nsensordata))
+    for row, told in zip(out, controls, strict=True):
+        data.ctrl[:] = told
+        mujoco.mj_step(model, data)
+        row[:] = data.sensordata
+    return out
+
+
+def sweeping(n: int = 3000) -> np.ndarray:
+    t = STEP * np.arange(n)
+    return np.column_stack(
+        [0.5 * np.sin(2 * np.pi * (0.3 + t) * t), 0.8 * np.sin(2 * np.pi * (0.5 + 0.7 * t) * t)]
+    )
+
+
+def test_the_written_model_moves_as_the_plant_and_the_old_one_does_not(tmp_path: Path) -> None:
+    text = ARM.read_text("utf-8").replace('damping="0.15 0.02 0"', 'damping="0.2 0.02 0" frictionloss="0.12"')
+    text = text.replace('kv="0.5"', 'kv="0.5" delay="0.0125" nsample="20" interp="linear"')
+    plant = mujoco.MjModel.from_xml_string(text)
+    effects = {"coulomb_friction@elbow": {"T_c": 0.12}, "input_delay@shoulder_motor": {"T_d": 0.0125}}
+    found = write_back(model_of({"elbow_damping": 0.2}, effects), ARM)
+    assert found.without_field == ()
+    controls = sweeping()
+    true, corrected, before = (
+        run(model, controls)
+        for model in (
+            plant,
+            mujoco.MjModel.from_xml_string(found.text),
+            mujoco.MjModel.from_xml_path(str(ARM)),
+        )
+    )
+    gap, left = np.std(before - true, axis=0), np.std(corrected - true, axis=0)
+    assert np.all(gap > 0.01 * np.std(true, axis=0))
+    assert np.all(left < 1e-6 * gap)
+
+
+def test_every_field_is_the_one_that_the_effect_means(tmp_path: Path) -> None:
+    """MuJoCo runs what was written as rigsight simulates it; its dry friction gives way a little."""
+    fine = tmp_path / ARM.name
+    fine.write_text(ARM.read_text("utf-8").replace('timestep="0.001"', 'timestep="0.0002"'), encoding="utf-8")
+    effects: dict[str, dict[str, float]] = {
+        "coulomb_friction@elbow": {"T_c": 0.12},
+        "quadratic_damping@shoulder": {"c_2": 0.05},
+        "asymmetric_stiffness@elbow": {"k_2": 0.3},
+        "cubic_stiffness@elbow": {"k_3": 0.4},
+        "input_delay@shoulder_motor": {"T_d": 0.0125},
+        "actuator_lag@elbow_drive": {"T_a": 0.05},
+        "input_saturation@elbow_drive": {"u_max": 0.5},
+    }
+    model = model_of({"elbow_stiffness": 0.8, "shoulder_armature": 0.03, "forearm_mass": 0.5}, effects)
+    written = mujoco.MjModel.from_xml_string(write_back(model, fine).text)
+    controls = sweeping()
+    theirs = run(written, np.repeat(controls, 5, axis=0))[::5, :2]
+    start = np.zeros(len(model.structure.states))
+    inputs = dict(zip((signal.name for signal in model.structure.rig.inputs), controls.T, strict=True))
+    record = Record(
+        "sweep", STEP, inputs, {"shoulder_motor_ctrl": "rad", "elbow_drive_ctrl": "N m"}, hold="zoh"
+    )
+    ours = simulate(model.structure, model.values, record, start)
+    for i, name in enumerate(("angle_1", "angle_2")):
+        assert np.std(ours[name] - theirs[:, i]) < 1e-2 * np.std(theirs[:, i])
+
+
+def test_what_has_no_field_is_said() -> None:
+    found = write_back(model_of({}, {"stribeck_friction@elbow": {"T_c": 0.1, "T_s": 0.2, "w_s": 0.1}}), ARM)
+    assert found.without_field == ("stribeck_friction at elbow (T_c = 0.1, T_s = 0.2, w_s = 0.1)",)
+    assert "MuJoCo has no field for stribeck_friction at elbow" in found.text
+
+
+def test_what_did_not_change_is_not_written() -> None:
+    assert write_back(model_of({}, {}), ARM).written == ()
+
+
+def test_another_robot_is_refused() -> None:
+    rig = RIGS["drive_train"]
+    model = Model(compose(rig, []), dict.fromkeys(("k_t",), 1.0), "foh")
+    with pytest.raises(InputError, match=r"has a joint 'shaft'.*shoulder, elbow"):
+        write_back(model, ARM)
+
+
+def test_isaac_settings_hold_friction_and_delay_of_each_joint() -> None:
+    effects = {
+        "coulomb_friction@elbow": {"T_c": 0.12},
+        "input_delay@shoulder_motor": {"T_d": 0.0125},
+        "cubic_stiffness@elbow": {"k_3": 0.4},
+    }
+    found = isaac_settings(model_of({"shoulder_armature": 0.03}, effects), ARM, step=0.005)
+    groups = yaml.safe_load(found.text)["actuators"]
+    assert groups["shoulder"] == {
+        "joint_names_expr": ["shoulder"],
+        "stiffness": 25.0,
+        "damping": 0.5,
+        "viscous_friction": 0.3,
+        "armature": 0.03,
+        "actuator_effort_limit": 40.0,
+        "min_delay": 2,
+        "max_delay": 2,
+    }
+    assert (groups["elbow"]["friction"], groups["elbow"]["dynamic_friction"]) == (0.12, 0.12)
+    assert any("cubic_stiffness at elbow" in one for one in found.without_field)
