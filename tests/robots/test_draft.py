@@ -103,7 +103,7 @@ def test_names_that_repeat_or_are_none_become_free_ones(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_what_cannot_be_a_rig_is_refused(tmp_path: Path, model: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        drafted(tmp_path, model)
+        drafted(tmp_path, f"<mujoco><worldbody>{model}</worldbody></mujoco>")
 
 
 @pytest.mark.parametrize(

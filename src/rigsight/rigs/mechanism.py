@@ -12,8 +12,9 @@ from sympy.simplify.fu import TR8
 
 _LONGEST_SHORTENED = 100
 """In operations. Shortening takes a millisecond for each, and nobody reads what is longer."""
-
-
+_LONGEST_INVERTED = 100
+"""In operations of the entries that are inverted, as formulas: the inverse of 3 x 3 has some thirty times as many. An arm of three
+joints in a plane has fewer, one in space more."""
 MOST_COUPLED = 3
 """Coordinates that move one another's inertia and whose accelerations are written as formulas. Those of four links in a plane
 take a compiler minutes, those of three a second."""
@@ -343,24 +344,36 @@ class Mechanism:
 
 
 def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
-    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia: directly, or through others.
+    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, directly or through others, by short formulas.
 
     Parameters
     ----------
     mass
         Mass matrix, shape (n, n).
     """
-    left, largest = set(range(mass.rows)), 0
+    return all(
+        len(group) <= MOST_COUPLED and (len(group) == 1 or _operations(mass, group) <= _LONGEST_INVERTED)
+        for group in _coupled(mass)
+    )
+
+
+def _coupled(mass: sp.ImmutableMatrix) -> list[list[int]]:
+    """Return the rows of a mass matrix in groups that move one another."""
+    left, groups = set(range(mass.rows)), []
     while left:
-        count, waiting = 0, [left.pop()]
+        group, waiting = [], [left.pop()]
         while waiting:
             row = waiting.pop()
-            count += 1
+            group.append(row)
             moved = {column for column in left if mass[row, column] != 0}
             left -= moved
             waiting += moved
-        largest = max(largest, count)
-    return largest <= MOST_COUPLED
+        groups.append(group)
+    return groups
+
+
+def _operations(mass: sp.ImmutableMatrix, group: list[int]) -> int:
+    return sum(int(sp.count_ops(mass[i, j])) for i in group for j in group if j <= i)
 
 
 def _shortened(expression: sp.Expr) -> sp.Expr:
