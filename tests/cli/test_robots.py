@@ -57,6 +57,11 @@ def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
     [
         (["init", "--mjcf", "missing.xml"], "missing.xml"),
         (["init", "--mjcf", CART, "--model", "axis"], "leave out --model"),
+        (["init", "--mjcf", CART, "--gear", "hinge"], "JOINT=STIFFNESS"),
+        (["init", "--mjcf", CART, "--gear", "slidr=1"], "Did you mean 'slider'"),
+        (["init", "--mjcf", CART, "--gear", "slider=-1"], "is positive, got -1"),
+        (["init", "--mjcf", CART, "--gear", "slider=100"], "has no armature"),
+        (["init", "--gear", "slider=100"], "name the model with --mjcf"),
         (["init"], "Name the FOLDER"),
         (["export", "MODEL", "--to", "mjcf"], "name the MJCF or URDF file"),
         (["export", "MODEL", "--to", "mjcf", "--mjcf", CART], "has a joint"),

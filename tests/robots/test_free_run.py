@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rigsight.robots import draft_rig, free_run, load_model
+from rigsight.robots import draft_rig, free_run, load_model, load_spec, with_gears
 from rigsight.robots.free_run import ALLOWED
 
 MODELS = Path(__file__).parent / "models"
@@ -29,3 +29,11 @@ def test_another_damping_is_seen() -> None:
     run = free_run(model, other)
     assert not run.agrees
     assert run.worst == run.differences["elbow"]
+
+
+def test_a_gear_gives_way_as_the_second_joint_of_mujoco_does() -> None:
+    spec = load_spec(MODELS / "two_link_arm.xml")
+    draft = draft_rig(spec.compile(), "arm", gears={"shoulder": 400.0})
+    run = free_run(with_gears(spec, draft), draft)
+    assert set(run.differences) == {"shoulder", "shoulder_play", "elbow"}
+    assert run.worst < 1e-2 * ALLOWED

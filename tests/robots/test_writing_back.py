@@ -103,6 +103,28 @@ def test_every_field_is_the_one_that_the_effect_means(tmp_path: Path) -> None:
         assert np.std(ours[name] - theirs[:, i]) < 1e-2 * np.std(theirs[:, i])
 
 
+def test_play_of_a_gear_is_a_second_joint_with_a_range(tmp_path: Path) -> None:
+    """MuJoCo's limit is a spring beyond the range; that it is one of the stiffness said is seen in how far it gives way."""
+    stiff, half = 60.0, 0.03
+    draft = draft_rig(load_model(ARM), ARM.stem, gears={"shoulder": stiff})
+    play = placed(effect_named("free_play"), "shoulder_gear")
+    structure = compose(draft.rig, [play])
+    values = {p.name: p.default for p in (*draft.rig.constants, *draft.rig.parameters)}
+    found = write_back(Model(structure, {**values, structure.parameter_name(play, "g"): half}, "zoh"), ARM)
+    assert found.without_field == ()
+    assert any("joint 'shoulder_play' behind 'shoulder'" in one for one in found.written)
+    model = mujoco.MjModel.from_xml_string(found.text)
+    data = mujoco.MjData(model)
+    place = int(model.jnt_qposadr[model.joint("shoulder_play").id])
+    # The arm held out by a goal of the shoulder: its weight and the elbow's spring pull on the gear.
+    data.ctrl[0] = 1.0
+    mujoco.mj_step(model, data, 8000)
+    pulling = stiff * (abs(data.qpos[place]) - half)
+    weight = abs(data.qfrc_bias[place])
+    assert abs(data.qpos[place]) > half
+    assert pulling == pytest.approx(weight, rel=0.02)
+
+
 def test_what_has_no_field_is_said() -> None:
     found = write_back(model_of({}, {"stribeck_friction@elbow": {"T_c": 0.1, "T_s": 0.2, "w_s": 0.1}}), ARM)
     assert found.without_field == ("stribeck_friction at elbow (T_c = 0.1, T_s = 0.2, w_s = 0.1)",)

@@ -39,6 +39,15 @@ def init(
             help="A MuJoCo model or URDF to write a rig file from, beside the campaign. Needs the extra mujoco.",
         ),
     ] = None,
+    gear: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--gear",
+            metavar="JOINT=STIFFNESS",
+            show_default="(joints move their bodies rigidly)",
+            help="A joint of the model whose gear gives way, in N m/rad (N/m): play at it can be found then. May be repeated.",
+        ),
+    ] = None,
     rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -50,12 +59,14 @@ def init(
     --mjcf, writes the rig file of a robot's model as well, and checks it against MuJoCo.
     """
     if mjcf is not None:
-        _init_from_mjcf(folder or Path(), mjcf, model, rigs, json=json, quiet=quiet, debug=debug)
+        _init_from_mjcf(folder or Path(), mjcf, gear, model, rigs, json=json, quiet=quiet, debug=debug)
         return
     with told(debug):
-        if folder is None:
-            from rigsight.errors import InputError
+        from rigsight.errors import InputError
 
+        if gear:
+            raise InputError("--gear is of a joint of a robot's model; name the model with --mjcf.")
+        if folder is None:
             raise InputError("Name the FOLDER that holds the measured files, or a model with --mjcf.")
         from rigsight.workflow.campaigns.init import run_init
 
@@ -91,6 +102,7 @@ def init(
 def _init_from_mjcf(
     folder: Path,
     file: Path,
+    gears: list[str] | None,
     model: str | None,
     rigs: list[Path] | None,
     *,
@@ -104,7 +116,7 @@ def _init_from_mjcf(
 
         if model is not None or rigs:
             raise InputError("--mjcf gives the rig; leave out --model and --rigs.")
-        written = run_init_from_mjcf(folder, file)
+        written = run_init_from_mjcf(folder, file, gears=dict(map(_gear, gears or [])))
     draft, run = written.draft, written.run
     if json:
         show_as_json(
@@ -139,3 +151,13 @@ def _init_from_mjcf(
         typer.echo(
             f"Written: {written.campaign.path}. Check the comments in it. Then: rigsight diagnose {folder}"
         )
+
+
+def _gear(text: str) -> tuple[str, float]:
+    from rigsight.errors import InputError
+
+    joint, _, stiffness = text.rpartition("=")
+    try:
+        return joint, float(stiffness)
+    except ValueError:
+        raise InputError(f"--gear: JOINT=STIFFNESS, such as elbow=500, got '{text}'.") from None

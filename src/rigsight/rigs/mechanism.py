@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import permutations
 
 import numpy as np
 import sympy as sp
@@ -12,9 +14,10 @@ from sympy.simplify.fu import TR8
 
 _LONGEST_SHORTENED = 100
 """In operations. Shortening takes a millisecond for each, and nobody reads what is longer."""
-_LONGEST_INVERTED = 100
-"""In operations of the entries that are inverted, as formulas: the inverse of 3 x 3 has some thirty times as many. An arm of three
-joints in a plane has fewer, one in space more."""
+_MOST_PRODUCTS = 20
+"""Products of the determinant of coupled coordinates that are written as formulas. Accelerations hold as many, times those of the
+forces. With 8 (two links by their moments) a compiler takes as long as for elimination, with 30 (the same by masses, lengths and
+inertias) three times as long, at the same speed of the simulation."""
 MOST_COUPLED = 3
 """Coordinates that move one another's inertia and whose accelerations are written as formulas. Those of four links in a plane
 take a compiler minutes, those of three a second."""
@@ -344,7 +347,9 @@ class Mechanism:
 
 
 def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
-    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, directly or through others, by short formulas.
+    """Return True if at most `MOST_COUPLED` coordinates move one another's inertia, by short formulas.
+
+    They may do so directly, or through others.
 
     Parameters
     ----------
@@ -352,7 +357,7 @@ def has_short_inverse(mass: sp.ImmutableMatrix) -> bool:
         Mass matrix, shape (n, n).
     """
     return all(
-        len(group) <= MOST_COUPLED and (len(group) == 1 or _operations(mass, group) <= _LONGEST_INVERTED)
+        len(group) <= MOST_COUPLED and (len(group) == 1 or _products(mass, group) <= _MOST_PRODUCTS)
         for group in _coupled(mass)
     )
 
@@ -372,8 +377,14 @@ def _coupled(mass: sp.ImmutableMatrix) -> list[list[int]]:
     return groups
 
 
-def _operations(mass: sp.ImmutableMatrix, group: list[int]) -> int:
-    return sum(int(sp.count_ops(mass[i, j])) for i in group for j in group if j <= i)
+def _products(mass: sp.ImmutableMatrix, group: list[int]) -> int:
+    """Return the products in the determinant of a group's rows, each entry written out as a sum."""
+    terms = {
+        (i, j): len(sp.Add.make_args(mass[i, j])) if mass[i, j] != 0 else 0 for i in group for j in group
+    }
+    return sum(
+        math.prod(terms[i, j] for i, j in zip(group, order, strict=True)) for order in permutations(group)
+    )
 
 
 def _shortened(expression: sp.Expr) -> sp.Expr:

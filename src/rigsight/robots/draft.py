@@ -14,6 +14,7 @@ from rigsight.robots.actuators import actuators_of
 from rigsight.robots.declared_numbers import DeclaredNumbers, Field
 from rigsight.robots.drive_tables import drive_of, plain_drive
 from rigsight.robots.energies import energies_of
+from rigsight.robots.gears import gear_table, split_joints
 from rigsight.robots.joint_tables import armature, joint_table, way_unit
 from rigsight.robots.left_out import left_out_of
 from rigsight.robots.naming import Names
@@ -22,6 +23,22 @@ from rigsight.robots.tree import TreeJoint, bodies_of, cleaned
 
 if TYPE_CHECKING:
     import mujoco
+
+
+@dataclass(frozen=True)
+class Gear:
+    """What lies between the rotor of a joint and what it moves.
+
+    Attributes
+    ----------
+    joint
+        Number of the joint in the model.
+    coordinate
+        How far the gear gives way.
+    """
+
+    joint: int
+    coordinate: str
 
 
 @dataclass(frozen=True)
@@ -34,6 +51,8 @@ class RigDraft:
         The rig file.
     joints, drives, sensors
         Place of the rig -> number of the joint, actuator or sensor in the model; -1 for what was added.
+    gears
+        Place between a rotor and what it moves -> its joint.
     controls
         Drive -> the input that it is told.
     fields
@@ -48,6 +67,7 @@ class RigDraft:
 
     tables: Mapping[str, Any]
     joints: Mapping[str, int]
+    gears: Mapping[str, Gear]
     drives: Mapping[str, int]
     controls: Mapping[str, str]
     sensors: Mapping[str, int]
@@ -56,13 +76,23 @@ class RigDraft:
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
 
+    def index_with_gears(self, joint: int) -> int:
+        """Return the number of a joint once each with a gear has its second joint behind it."""
+        return joint + sum(gear.joint < joint for gear in self.gears.values())
+
     @property
     def rig(self) -> Rig:
         """The rig."""
         return rig_of_tables(self.tables, "the rig of the model")
 
 
-def draft_rig(model: mujoco.MjModel, name: str, *, with_drives: bool = False) -> RigDraft:
+def draft_rig(
+    model: mujoco.MjModel,
+    name: str,
+    *,
+    with_drives: bool = False,
+    gears: Mapping[str, float] | None = None,
+) -> RigDraft:
     """Return the rig file of a MuJoCo model.
 
     Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants.
@@ -75,16 +105,19 @@ def draft_rig(model: mujoco.MjModel, name: str, *, with_drives: bool = False) ->
         What the rig is called.
     with_drives
         Give a model without actuators a force or torque at every joint: a URDF has none.
+    gears
+        Name of a joint -> stiffness of its gear, through which its rotor moves the body; other joints move it rigidly.
 
     Raises
     ------
     InputError
-        If a joint is no hinge or slide, or nothing moves.
+        If a joint is no hinge or slide, nothing moves, or a joint cannot have a gear.
     """
     names, notes = Names(), []
     numbers = DeclaredNumbers(names)
     rig_name = names.free(name, "rig")
-    bodies = bodies_of(model)
+    gears = gears or {}
+    bodies, plays = split_joints(model, bodies_of(model), gears)
     actuators, drives_left_out = actuators_of(model)
     sensors, sensors_left_out = sensors_of(model, actuators)
     joints = sorted((joint for body in bodies for joint in body.joints), key=lambda joint: joint.index)
@@ -92,17 +125,26 @@ def draft_rig(model: mujoco.MjModel, name: str, *, with_drives: bool = False) ->
     drives = [drive_of(one, joints[one.joint], coordinates[one.joint], names, numbers) for one in actuators]
     if not drives and with_drives:
         notes.append("The model has no actuators: a force or torque drives every joint.")
-        drives = [plain_drive(joint, q, names) for joint, q in zip(joints, coordinates, strict=True)]
+        drives = [
+            plain_drive(joint, q, names)
+            for joint, q in zip(joints, coordinates, strict=True)
+            if joint.index < model.njnt
+        ]
     if not sensors:
         notes.append("The model has no sensor of a joint: the rig reads the position of every joint.")
-        sensors = [TreeSensor(-1, joint.index, "", 1.0, False) for joint in joints]
-    joint_tables = {
-        q: joint_table(model, joint, q, numbers) for joint, q in zip(joints, coordinates, strict=True)
-    }
+        sensors = [
+            TreeSensor(-1, joint.index, "", 1.0, False) for joint in joints if joint.index < model.njnt
+        ]
+    own = [(joint, q) for joint, q in zip(joints, coordinates, strict=True) if joint.index < model.njnt]
+    joint_tables = {q: joint_table(model, joint, q, numbers) for joint, q in own}
+    for joint, q in own:
+        if joint.index in plays:
+            play = coordinates[plays[joint.index].index]
+            joint_tables[f"{q}_gear"] = gear_table(model, joint, q, play, gears[joint.name], numbers)
     called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
     symbols = [sp.Symbol(q, real=True) for q in coordinates]
     energies = energies_of(bodies, called, symbols, cleaned(model.opt.gravity), numbers)
-    rotors = [armature(model, joint, q, numbers) for joint, q in zip(joints, coordinates, strict=True)]
+    rotors = [armature(model, joint, q, numbers) for joint, q in own]
     shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
     tables: dict[str, Any] = {
         "name": rig_name,
@@ -123,7 +165,12 @@ def draft_rig(model: mujoco.MjModel, name: str, *, with_drives: bool = False) ->
     }
     return RigDraft(
         with_known_constants(tables, numbers.constants),
-        {q: joint.index for joint, q in zip(joints, coordinates, strict=True)},
+        {q: joint.index for joint, q in own},
+        {
+            f"{q}_gear": Gear(joint.index, coordinates[plays[joint.index].index])
+            for joint, q in own
+            if joint.index in plays
+        },
         {drive.name: drive.index for drive in drives},
         {drive.name: drive.told for drive in drives},
         {name: sensor.index for name, sensor, _ in shown},

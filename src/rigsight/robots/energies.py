@@ -102,14 +102,10 @@ def energies_of(
         if not frame.is_still:
             frame = frame.shifted(known.length("at", body.position, "where it hangs on its parent"))
         frame = frame.turned(_numbers(body.rotation))
-        for i, joint in enumerate(body.joints):
-            frame = _moved(
-                frame,
-                joint,
-                coordinates[joint.index],
-                known,
-                f"joint{i + 1 if len(body.joints) > 1 else ''}",
-            )
+        together = _together(body.joints)
+        for i, alike in enumerate(together):
+            called = f"joint{i + 1 if len(together) > 1 else ''}"
+            frame = _moved(frame, alike, [coordinates[joint.index] for joint in alike], known, called)
         if body.joints:
             frame = _named(frame, name, found.signals)
         frames[body.index] = frame
@@ -159,18 +155,43 @@ def _gravity(gravity: Floats, axis: int, numbers: DeclaredNumbers) -> sp.Expr:
     )
 
 
-def _moved(frame: _Frame, joint: TreeJoint, coordinate: sp.Symbol, known: _Known, called: str) -> _Frame:
-    axis = sp.Matrix([_number(value) for value in joint.axis])
-    rate = sp.Symbol(f"d({coordinate.name})", real=True)
-    unit = "m" if joint.slides else "rad"
-    reference = known.numbers.constant(
-        f"{coordinate.name}_ref", joint.reference, unit, f"{coordinate.name} where the model is drawn"
+def _together(joints: Sequence[TreeJoint]) -> list[list[TreeJoint]]:
+    """Return the joints of a body in their order, those that follow one another about one axis together: their angles add up."""
+    groups: list[list[TreeJoint]] = []
+    for joint in joints:
+        last = groups[-1][-1] if groups else None
+        if (
+            last is not None
+            and last.slides == joint.slides
+            and np.array_equal(last.axis, joint.axis)
+            and np.array_equal(last.anchor, joint.anchor)
+        ):
+            groups[-1].append(joint)
+        else:
+            groups.append([joint])
+    return groups
+
+
+def _moved(
+    frame: _Frame, joints: Sequence[TreeJoint], coordinates: Sequence[sp.Symbol], known: _Known, called: str
+) -> _Frame:
+    first = joints[0]
+    axis = sp.Matrix([_number(value) for value in first.axis])
+    rate = sp.Add(*(sp.Symbol(f"d({coordinate.name})", real=True) for coordinate in coordinates))
+    unit = "m" if first.slides else "rad"
+    way = sp.Add(
+        *(
+            coordinate
+            - known.numbers.constant(
+                f"{coordinate.name}_ref", joint.reference, unit, f"{coordinate.name} where the model is drawn"
+            )
+            for joint, coordinate in zip(joints, coordinates, strict=True)
+        )
     )
-    way = coordinate - reference
-    if joint.slides:
+    if first.slides:
         frame = frame.shifted(axis * way)
         return replace(frame, moving=frame.moving + axis * rate)
-    anchor = known.length(called, joint.anchor, "where its joint is")
+    anchor = known.length(called, first.anchor, "where its joint is")
     turned = frame.shifted(anchor).turned(_rotation(axis, way))
     turned = replace(turned, turning=turned.turning + axis * rate)
     return turned.shifted(-anchor)

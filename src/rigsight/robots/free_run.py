@@ -64,7 +64,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     Parameters
     ----------
     model
-        Compiled; it stays as it is.
+        Compiled, with the second joint of each gear; it stays as it is.
     draft
         Its rig file.
     """
@@ -83,9 +83,11 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     own.actuator_dyntype[exact] = int(mujoco.mjtDyn.mjDYN_FILTER)
     data = mujoco.MjData(own)
     rng = np.random.default_rng(0)
-    coordinates = {name: int(own.jnt_qposadr[index]) for name, index in draft.joints.items()}
-    for name, index in draft.joints.items():
-        slides = int(own.jnt_type[index]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    joints = {name: draft.index_with_gears(index) for name, index in draft.joints.items()}
+    joints |= {gear.coordinate: draft.index_with_gears(gear.joint) + 1 for gear in draft.gears.values()}
+    coordinates = {name: int(own.jnt_qposadr[index]) for name, index in joints.items()}
+    for name in draft.joints:
+        slides = int(own.jnt_type[joints[name]]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
         data.qpos[coordinates[name]] += _WAY[slides] * rng.uniform(-1.0, 1.0)
     controls = {name: index for name, index in draft.drives.items() if index >= 0}
     for index in controls.values():

@@ -28,6 +28,9 @@ def joint_table(
 ) -> dict[str, Any]:
     """Return ``[joints.NAME]``, with its numbers declared as parameters.
 
+    The inertia that moves with it is that of the model as it is drawn. Effects that read one, a flexible mode, take it for
+    constant.
+
     Parameters
     ----------
     model
@@ -41,6 +44,14 @@ def joint_table(
     """
     way, force = way_unit(joint), force_unit(joint)
     table: dict[str, Any] = {"motion": name}
+    moved = 1.0 / float(model.dof_invweight0[joint.dof])
+    inertia = numbers.constant(
+        f"{name}_inertia",
+        moved,
+        "kg" if joint.slides else "kg m^2",
+        f"what moves with {name} where the model is drawn",
+    )
+    table["inertia"] = str(inertia)
     table["damping"] = numbers.parameter(
         f"{name}_damping",
         float(model.dof_damping[joint.dof]),

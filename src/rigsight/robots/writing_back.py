@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
 from rigsight.robots.declared_numbers import Field
-from rigsight.robots.draft import RigDraft, draft_rig
+from rigsight.robots.draft import Gear, RigDraft, draft_rig
 from rigsight.robots.effect_fields import EFFECT_FIELDS
 from rigsight.robots.loading import load_model, load_spec
+from rigsight.robots.second_joint import add_second_joint
 from rigsight.simulate.model import Model
 
 if TYPE_CHECKING:
@@ -59,8 +60,10 @@ def write_back(model: Model, source: Path) -> WrittenBack:
     """
     compiled, draft = draft_of(model, source)
     writer = _Writer(load_spec(source), compiled, draft)
+    for place, gear in draft.gears.items():
+        writer.write_gear(place, gear, model)
     for name, value in model.values.items():
-        if name in draft.fields:
+        if name in draft.fields and draft.fields[name][0].element != "gear":
             writer.write_number(name, value)
     for effect in model.effects:
         writer.write_effect(effect, model)
@@ -76,7 +79,18 @@ def draft_of(model: Model, source: Path) -> tuple[mujoco.MjModel, RigDraft]:
         If the file cannot be read, or the model's rig has places that are not in it.
     """
     compiled = load_model(source)
-    draft = draft_rig(compiled, source.stem, with_drives=source.suffix.lower() == ".urdf")
+    plain = draft_rig(compiled, source.stem, with_drives=source.suffix.lower() == ".urdf")
+    places = {joint.name for joint in model.structure.rig.mechanism.joints}
+    gears = {
+        compiled.joint(index).name: model.values[f"{place}_gear_stiffness"]
+        for place, index in plain.joints.items()
+        if f"{place}_gear" in places and f"{place}_gear_stiffness" in model.values
+    }
+    draft = (
+        draft_rig(compiled, source.stem, with_drives=source.suffix.lower() == ".urdf", gears=gears)
+        if gears
+        else plain
+    )
     _check_is_of(model, draft, source)
     return compiled, draft
 
@@ -84,7 +98,7 @@ def draft_of(model: Model, source: Path) -> tuple[mujoco.MjModel, RigDraft]:
 def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
     mechanism = model.structure.rig.mechanism
     for what, parts, known in (
-        ("joint", mechanism.joints, draft.joints),
+        ("joint", mechanism.joints, {**draft.joints, **draft.gears}),
         ("drive", mechanism.drives, draft.drives),
         ("sensor", mechanism.sensors, draft.sensors),
     ):
@@ -146,8 +160,26 @@ class _Writer:
         body.inertia[:] = self._compiled.body_inertia[index]
         body.fullinertia[:] = [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
 
+    def write_gear(self, place: str, gear: Gear, model: Model) -> None:
+        first = self._elements["joint"][gear.joint]
+        stiffness, damping = (model.values[f"{place}_{what}"] for what in ("stiffness", "damping"))
+        structure = model.structure
+        loose = [
+            effect
+            for effect in model.effects
+            if kind_of(effect.name) == "free_play" and structure.rig.acts_at(effect) == place
+        ]
+        play = structure.values_of(loose[0], model.values)["g"] if loose else 0.0
+        name = add_second_joint(self._spec, first, stiffness, damping, play)
+        told = f", range +-{play:.4g} (free_play at {place})" if play > 0.0 else ""
+        self._written.append(
+            f"joint '{name}' behind '{first.name}': stiffness {stiffness:.4g}, damping {damping:.4g}{told}"
+        )
+
     def write_effect(self, effect: Effect, model: Model) -> None:
         structure = model.structure
+        if kind_of(effect.name) == "free_play" and structure.rig.acts_at(effect) in self._draft.gears:
+            return
         place, kind = structure.rig.acts_at(effect), kind_of(effect.name)
         values = structure.values_of(effect, model.values)
         numbers = ", ".join(f"{own} = {value:.4g}" for own, value in values.items())

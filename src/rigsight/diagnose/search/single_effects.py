@@ -34,10 +34,17 @@ _HOPELESS_TOLERANCE = 1e-2
 
 
 def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
-    """Re-identify the equations without an effect."""
+    """Re-identify the equations without an effect.
+
+    From numbers that a regression found, or from those of the given simulation where a rig with these cannot be simulated: a
+    coordinate that no sensor reads leaves the regression some of them open.
+    """
     structure = context.composed()
-    fit = context.problem(structure, context.estimation)
-    return context.score((), fit.fit(start, context.free_parameters(structure)))
+    problem, free = context.problem(structure, context.estimation), context.free_parameters(structure)
+    fit = problem.fit(start, free)
+    if not fit.residuals and context.given:
+        fit = problem.fit({**start, **context.given}, free)
+    return context.score((), fit)
 
 
 def fit_candidates(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.errors import InputError
-from rigsight.robots import FreeRun, RigDraft, draft_rig, free_run, load_model, rig_text
+from rigsight.robots import FreeRun, RigDraft, draft_rig, free_run, load_spec, rig_text, with_gears
 from rigsight.workflow.campaigns.init import CAMPAIGN_FILE, Draft, measured_files, run_init
 from rigsight.workflow.files.results import write_together
 
@@ -33,7 +34,9 @@ class ModelDraft:
     campaign: Draft | None
 
 
-def run_init_from_mjcf(folder: str | Path, model_file: str | Path) -> ModelDraft:
+def run_init_from_mjcf(
+    folder: str | Path, model_file: str | Path, *, gears: Mapping[str, float] | None = None
+) -> ModelDraft:
     """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files.
 
     Parameters
@@ -42,6 +45,8 @@ def run_init_from_mjcf(folder: str | Path, model_file: str | Path) -> ModelDraft
         Where it is written; created if it does not exist.
     model_file
         MJCF or URDF.
+    gears
+        Name of a joint -> stiffness of its gear.
 
     Raises
     ------
@@ -49,9 +54,10 @@ def run_init_from_mjcf(folder: str | Path, model_file: str | Path) -> ModelDraft
         If the model cannot be read or taken over, a file is in the way, or nothing can be written there.
     """
     folder, source = Path(folder), Path(model_file)
-    model = load_model(source)
+    spec = load_spec(source)
+    model = spec.compile()
     try:
-        draft = draft_rig(model, source.stem, with_drives=source.suffix.lower() == ".urdf")
+        draft = draft_rig(model, source.stem, with_drives=source.suffix.lower() == ".urdf", gears=gears)
         rig = draft.rig
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
@@ -65,7 +71,7 @@ def run_init_from_mjcf(folder: str | Path, model_file: str | Path) -> ModelDraft
         raise InputError(
             f"{campaign_file} exists already and is not overwritten; remove it, or edit it by hand."
         )
-    run = free_run(model, draft)
+    run = free_run(with_gears(spec, draft), draft)
     folder.mkdir(parents=True, exist_ok=True)
     write_together(folder, {path.name: text}, "Make room or ask for the right to write there.")
     campaign = None
