@@ -28,6 +28,7 @@ MOVED = {
     "experiments/linear_recovery/README.md": "experiments/linear_recovery.md",
     "experiments/engine_accuracy/README.md": "experiments/engine_accuracy.md",
     "experiments/rounding/README.md": "experiments/rounding.md",
+    "experiments/robots/README.md": "experiments/robots.md",
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",
     "experiments/places/README.md": "experiments/places.md",
     "experiments/adequacy/README.md": "experiments/adequacy.md",

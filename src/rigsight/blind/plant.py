@@ -191,7 +191,8 @@ class _Run:
                     message = solver.step()
                 if message is not None or not np.all(np.isfinite(solver.y)):
                     raise SimulationError(f"The plant cannot be integrated past {solver.t:.4g} s: {message}")
-                path = solver.dense_output()
+                with np.errstate(over="ignore", invalid="ignore"):
+                    path = solver.dense_output()
                 event = self._first_event(path, solver.t_old, solver.t)
                 t = solver.t if event is None else event[0]
                 _fill(wanted, path, t)
