@@ -36,9 +36,9 @@ def model_of(values: Mapping[str, float], effects: Mapping[str, Mapping[str, flo
     return Model(structure, {**defaults, **values, **own}, "zoh")
 
 
-def run(model: Any, controls: np.ndarray) -> np.ndarray:
+def run(model: Any, controls: np.ndarray, integrator: str = "RK4") -> np.ndarray:
     """Let MuJoCo run from where the model hangs still; one control for each step."""
-    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
+    model.opt.integrator = int(getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"))
     data = mujoco.MjData(model)
     out = np.empty((len(controls), model.nsensordata))
     for row, told in zip(out, controls, strict=True):
@@ -56,19 +56,21 @@ def sweeping(n: int = 3000) -> np.ndarray:
 
 
 def test_the_written_model_moves_as_the_plant_and_the_old_one_does_not(tmp_path: Path) -> None:
-    text = ARM.read_text("utf-8").replace('damping="0.15 0.02 0"', 'damping="0.2 0.02 0" frictionloss="0.12"')
+    arm = tmp_path / ARM.name
+    arm.write_text(ARM.read_text("utf-8").replace('integrator="RK4"', 'integrator="Euler"'), encoding="utf-8")
+    text = arm.read_text("utf-8").replace('damping="0.15 0.02 0"', 'damping="0.2 0.02 0" frictionloss="0.12"')
     text = text.replace('kv="0.5"', 'kv="0.5" delay="0.0125" nsample="20" interp="linear"')
     plant = mujoco.MjModel.from_xml_string(text)
     effects = {"coulomb_friction@elbow": {"T_c": 0.12}, "input_delay@shoulder_motor": {"T_d": 0.0125}}
-    found = write_back(model_of({"elbow_damping": 0.2}, effects), ARM)
+    found = write_back(model_of({"elbow_damping": 0.2}, effects), arm)
     assert found.without_field == ()
     controls = sweeping()
     true, corrected, before = (
-        run(model, controls)
+        run(model, controls, "Euler")
         for model in (
             plant,
             mujoco.MjModel.from_xml_string(found.text),
-            mujoco.MjModel.from_xml_path(str(ARM)),
+            mujoco.MjModel.from_xml_path(str(arm)),
         )
     )
     gap, left = np.std(before - true, axis=0), np.std(corrected - true, axis=0)
@@ -101,6 +103,27 @@ def test_every_field_is_the_one_that_the_effect_means(tmp_path: Path) -> None:
     ours = simulate(model.structure, model.values, record, start)
     for i, name in enumerate(("angle_1", "angle_2")):
         assert np.std(ours[name] - theirs[:, i]) < 1e-2 * np.std(theirs[:, i])
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
+def test_a_delay_that_is_no_whole_number_of_steps_is_kept_on_average(tmp_path: Path, integrator: str) -> None:
+    arm = tmp_path / ARM.name
+    arm.write_text(
+        ARM.read_text("utf-8").replace('integrator="RK4"', f'integrator="{integrator}"'), encoding="utf-8"
+    )
+    step, late = 0.001, 0.0124
+    found = write_back(model_of({}, {"input_delay@shoulder_motor": {"T_d": late}}), arm)
+    delayed, prompt = mujoco.MjModel.from_xml_string(found.text), mujoco.MjModel.from_xml_path(str(arm))
+    told = sweeping(2000)
+    whole = round(late / step)
+    shifted = [np.vstack([np.zeros((n, 2)), told])[: len(told)] for n in (whole, whole + 1)]
+    for controls in shifted:
+        controls[:, 1] = told[:, 1]
+    sooner, later = (run(prompt, controls, integrator)[:, 0] for controls in shifted)
+    own = run(delayed, told, integrator)[:, 0]
+    # Between the two, and as far from each as 0.4 of a step says.
+    share = np.vdot(own - sooner, later - sooner) / np.vdot(later - sooner, later - sooner)
+    assert share == pytest.approx(late / step - whole, abs=0.1)
 
 
 def test_play_of_a_gear_is_a_second_joint_with_a_range(tmp_path: Path) -> None:

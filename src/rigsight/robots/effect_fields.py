@@ -9,8 +9,10 @@ from typing import Any
 _SLACK = 2
 """Samples of a control's history beyond its delay: one for the step in hand, one for rounding."""
 
-Write = Callable[[Any, Mapping[str, float], float], str | None]
-"""Writes an effect's own values into an element, given the time step, and says why not where it cannot."""
+Write = Callable[[Any, Mapping[str, float], Any], str | None]
+"""Writes an effect's own values into an element, given the model's options, and says why not where it cannot."""
+_LINEAR = 1
+"""How a history is read between two steps: a delay need be no whole number of them."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class EffectField:
 
 
 def _added(attribute: str, own: str, entry: int | None = None) -> Write:
-    def write(element: Any, values: Mapping[str, float], _: float) -> None:
+    def write(element: Any, values: Mapping[str, float], _: Any) -> None:
         if entry is None:
             setattr(element, attribute, float(getattr(element, attribute)) + values[own])
         else:
@@ -43,19 +45,26 @@ def _added(attribute: str, own: str, entry: int | None = None) -> Write:
 
 
 def _late(own: str) -> Write:
-    def write(element: Any, values: Mapping[str, float], step: float) -> str | None:
-        if element.delay > 0.0:
-            element.delay += values[own]
-        else:
-            element.delay = values[own]
-        element.nsample = max(element.nsample, int(element.delay / step) + _SLACK)
-        element.interp = 1  # linear: the delay need not be a whole number of steps
+    def write(element: Any, values: Mapping[str, float], options: Any) -> str | None:
+        import mujoco
+
+        late = values[own]
+        if (
+            own == "T_d"
+            and options.integrator == int(mujoco.mjtIntegrator.mjINT_RK4)
+            and element.delay <= 0.0
+        ):
+            # The Runge-Kutta method reads on within a step, where a controller holds its command: half a step early on average.
+            late += 0.5 * options.timestep
+        element.delay = max(float(element.delay), 0.0) + late
+        element.nsample = max(element.nsample, int(element.delay / options.timestep) + _SLACK)
+        element.interp = _LINEAR
         return None
 
     return write
 
 
-def _limited(element: Any, values: Mapping[str, float], _: float) -> str | None:
+def _limited(element: Any, values: Mapping[str, float], _: Any) -> str | None:
     size = values["u_max"]
     low, high = (-size, size)
     if element.ctrlrange[0] < element.ctrlrange[1]:
@@ -65,7 +74,7 @@ def _limited(element: Any, values: Mapping[str, float], _: float) -> str | None:
     return None
 
 
-def _filtered(element: Any, values: Mapping[str, float], _: float) -> str | None:
+def _filtered(element: Any, values: Mapping[str, float], _: Any) -> str | None:
     import mujoco
 
     if element.dyntype != mujoco.mjtDyn.mjDYN_NONE:

@@ -190,9 +190,7 @@ class _Writer:
         if field is None or index < 0:
             self._without_field.append(told)
             return
-        refused = field.write(
-            self._elements[field.element][index], values, float(self._compiled.opt.timestep)
-        )
+        refused = field.write(self._elements[field.element][index], values, self._compiled.opt)
         if refused is None:
             self._written.append(f"{self._called(field.element, index)} {field.attribute}: {told}")
         else:
