@@ -15,7 +15,7 @@ from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS
-from rigsight.robots import draft_rig, isaac_settings, load_model, write_back
+from rigsight.robots import draft_rig, isaac_settings, load_model, sensor_readings, write_back
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.model import Model
 
@@ -39,13 +39,7 @@ def model_of(values: Mapping[str, float], effects: Mapping[str, Mapping[str, flo
 def run(model: Any, controls: np.ndarray, integrator: str = "RK4") -> np.ndarray:
     """Let MuJoCo run from where the model hangs still; one control for each step."""
     model.opt.integrator = int(getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"))
-    data = mujoco.MjData(model)
-    out = np.empty((len(controls), model.nsensordata))
-    for row, told in zip(out, controls, strict=True):
-        data.ctrl[:] = told
-        mujoco.mj_step(model, data)
-        row[:] = data.sensordata
-    return out
+    return sensor_readings(model, controls, float(model.opt.timestep))
 
 
 def sweeping(n: int = 3000) -> np.ndarray:
@@ -185,3 +179,12 @@ def test_isaac_settings_hold_friction_and_delay_of_each_joint() -> None:
     }
     assert (groups["elbow"]["friction"], groups["elbow"]["dynamic_friction"]) == (0.12, 0.12)
     assert any("cubic_stiffness at elbow" in one for one in found.without_field)
+
+
+@pytest.mark.parametrize(
+    ("controls", "dt", "said"),
+    [(np.zeros((5, 3)), STEP, "shape"), (np.zeros((5, 2)), 1.5 * STEP, "whole number")],
+)
+def test_controls_that_do_not_fit_are_refused(controls: np.ndarray, dt: float, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        sensor_readings(load_model(ARM), controls, dt)

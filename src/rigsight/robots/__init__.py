@@ -7,6 +7,7 @@ from rigsight.robots.free_run import free_run as free_run
 from rigsight.robots.isaac import isaac_settings as isaac_settings
 from rigsight.robots.loading import load_model as load_model
 from rigsight.robots.loading import load_spec as load_spec
+from rigsight.robots.readings import sensor_readings as sensor_readings
 from rigsight.robots.rig_text import rig_text as rig_text
 from rigsight.robots.second_joint import with_gears as with_gears
 from rigsight.robots.writing_back import WrittenBack as WrittenBack
