@@ -18,7 +18,7 @@ CART = Path(__file__).parents[1] / "robots" / "models" / "cart_pole.xml"
 def test_a_model_becomes_a_rig_file_and_a_campaign_once_records_are_there(tmp_path: Path, run: Run) -> None:
     folder = tmp_path / "stage"
     code, stdout, stderr = run("init", folder, "--mjcf", CART)
-    assert (code, stderr) == (0, "")
+    assert (code, stderr) == (0, "Equations of 2 coordinates ...\n")
     assert f"Written: {folder / 'cart_pole.toml'} (2 joints)" in stdout
     assert "without dry friction: it moves as MuJoCo does" in stdout
     assert "columns t, push_ctrl, slider_position, hinge_angle" in stdout
@@ -29,7 +29,7 @@ def test_a_model_becomes_a_rig_file_and_a_campaign_once_records_are_there(tmp_pa
         folder / "a.csv", rows, delimiter=",", header="t,push_ctrl,slider_position,hinge_angle", comments=""
     )
     code, stdout, stderr = run("init", folder, "--mjcf", CART)
-    assert (code, stderr) == (0, "")
+    assert (code, stderr) == (0, "Equations of 2 coordinates ...\n")
     campaign = (folder / "campaign.toml").read_text("utf-8")
     assert 'file = "cart_pole.toml"' in campaign
     assert "slider_frictionloss = 0.2 " in campaign
@@ -50,6 +50,21 @@ def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
         "range of joints: slider; the rig moves past it, and end_stop says it as an effect"
     ]
     assert max(told["free_run"]["relative_difference"].values()) < 1e-5
+
+
+def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else_is(
+    tmp_path: Path, run: Run
+) -> None:
+    model = tmp_path / "robot.xml"
+    limp = CART.read_text("utf-8").replace(
+        "<worldbody>", '<option><flag damper="disable"/></option><worldbody>'
+    )
+    model.write_text(limp, "utf-8")
+    code, stdout, stderr = run("init", tmp_path / "stage", "--mjcf", model, "--quiet")
+    assert (code, stdout) == (0, "")
+    assert "does not move as MuJoCo does" in stderr
+    head = (tmp_path / "stage" / "robot.toml").read_text("utf-8")
+    assert "# - the option that switches damping of joints off: the rig has it" in head
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,21 @@ def test_what_a_rig_file_cannot_say_is_named(tmp_path: Path, model: str, said: s
         assert any(said in one for one in draft.left_out)
 
 
+def test_an_actuator_with_several_controls_is_named_and_the_next_one_keeps_its_own(tmp_path: Path) -> None:
+    drives = '<actuator><pid name="both" joint="swing" kp="5" input="pos vel"/><motor name="push" joint="swing"/></actuator>'
+    path = tmp_path / "robot.xml"
+    path.write_text(one_link(beside=drives), encoding="utf-8")
+    model = load_model(path)
+    draft = draft_rig(model, "robot")
+    assert any(one.startswith("actuator 'both'") for one in draft.left_out)
+    assert (draft.drives, draft.controls) == ({"push": 1}, {"push_ctrl": 2})
+
+
+def test_gravity_that_an_option_switches_off_is_none(tmp_path: Path) -> None:
+    draft = drafted(tmp_path, one_link(beside='<option><flag gravity="disable"/></option>'))
+    assert "potential" not in draft.tables["energy"] or draft.tables["energy"]["potential"] == "0"
+
+
 def test_names_that_repeat_or_are_none_become_free_ones(tmp_path: Path) -> None:
     twice = one_link(
         '<body name="swing_damping" pos="0 0 -0.1"><joint name="1st-joint"/><geom size="0.02"/></body>',

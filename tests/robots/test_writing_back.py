@@ -148,6 +148,11 @@ def test_what_has_no_field_is_said() -> None:
     assert "MuJoCo has no field for stribeck_friction at elbow" in found.text
 
 
+def test_a_length_that_differs_from_the_file_is_said_to_have_no_field() -> None:
+    found = write_back(model_of({"forearm_at_z": -0.31}, {}), ARM)
+    assert (found.written, found.without_field) == ((), ("forearm_at_z = -0.31, -0.3 in the file",))
+
+
 def test_what_did_not_change_is_not_written() -> None:
     assert write_back(model_of({}, {}), ARM).written == ()
 
@@ -177,6 +182,9 @@ def test_isaac_settings_hold_friction_and_delay_of_each_joint() -> None:
         "min_delay": 2,
         "max_delay": 2,
     }
+    # The elbow's motor has no gains; its spring is none that Isaac Lab has.
+    assert "stiffness" not in groups["elbow"]
+    assert any(one.startswith("elbow_stiffness = ") for one in found.without_field)
     assert (groups["elbow"]["friction"], groups["elbow"]["dynamic_friction"]) == (0.12, 0.12)
     assert any("cubic_stiffness at elbow" in one for one in found.without_field)
 

@@ -10,6 +10,7 @@ import typer
 from rigsight.cli.exit_codes import told
 from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
+from rigsight.workflow.progress_display import listening
 
 
 def init(
@@ -110,14 +111,20 @@ def _init_from_mjcf(
     quiet: bool,
     debug: bool,
 ) -> None:
-    with told(debug):
+    with told(debug), listening(quiet) as listener:
         from rigsight.errors import InputError
         from rigsight.workflow.campaigns.from_mjcf import run_init_from_mjcf
 
         if model is not None or rigs:
             raise InputError("--mjcf gives the rig; leave out --model and --rigs.")
-        written = run_init_from_mjcf(folder, file, gears=dict(map(_gear, gears or [])))
+        written = run_init_from_mjcf(folder, file, gears=dict(map(_gear, gears or [])), listener=listener)
     draft, run = written.draft, written.run
+    if not run.agrees:
+        typer.echo(
+            f"rigsight: the rig does not move as MuJoCo does: the largest relative difference is {run.worst:.1g}, allowed is "
+            f"{run.allowed:g}. See what was not taken over, at the head of {written.path}.",
+            err=True,
+        )
     if json:
         show_as_json(
             {
@@ -125,7 +132,11 @@ def _init_from_mjcf(
                 "campaign": None if written.campaign is None else str(written.campaign.path),
                 "left_out": list(draft.left_out),
                 "notes": list(draft.notes),
-                "free_run": {"duration_s": run.duration, "relative_difference": run.differences},
+                "free_run": {
+                    "duration_s": run.duration,
+                    "relative_difference": run.differences,
+                    "agrees": run.agrees,
+                },
             }
         )
         return
@@ -134,17 +145,18 @@ def _init_from_mjcf(
     count = len(draft.joints)
     typer.echo(f"Written: {written.path} ({count} joint{'' if count == 1 else 's'})")
     beside = f", without {' and '.join(run.left_out)}" if run.left_out else ""
-    verdict = "it moves as MuJoCo does" if run.agrees else "IT MOVES OTHERWISE THAN MUJOCO"
-    typer.echo(
-        f"Free run of {run.duration:.1f} s beside MuJoCo{beside}: {verdict}, largest relative difference {run.worst:.1g}."
-    )
+    if run.agrees:
+        typer.echo(
+            f"Free run of {run.duration:.1f} s beside MuJoCo{beside}: it moves as MuJoCo does, largest relative difference "
+            f"{run.worst:.1g}."
+        )
     for note in draft.notes:
         typer.echo(note)
     for what in draft.left_out:
         typer.echo(f"Not taken over: {what}")
     if written.campaign is None:
         typer.echo(
-            f"Put records into {folder}, with columns t, {', '.join((*draft.controls.values(), *draft.sensors))}. "
+            f"Put records into {folder}, with columns t, {', '.join((*draft.controls, *draft.sensors))}. "
             "Then the same command again."
         )
     else:

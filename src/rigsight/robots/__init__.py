@@ -9,6 +9,8 @@ from rigsight.robots.loading import load_model as load_model
 from rigsight.robots.loading import load_spec as load_spec
 from rigsight.robots.readings import sensor_readings as sensor_readings
 from rigsight.robots.rig_text import rig_text as rig_text
+from rigsight.robots.robot_file import RobotFile as RobotFile
+from rigsight.robots.robot_file import read_robot as read_robot
 from rigsight.robots.second_joint import with_gears as with_gears
 from rigsight.robots.writing_back import WrittenBack as WrittenBack
 from rigsight.robots.writing_back import write_back as write_back

@@ -15,8 +15,8 @@ class TreeActuator:
 
     Attributes
     ----------
-    index, joint
-        Its numbers in the model, and that of its joint.
+    index, control, joint
+        Its number in the model, and those of its control and its joint.
     name
         As MuJoCo calls it; empty without a name.
     gear
@@ -30,6 +30,7 @@ class TreeActuator:
     """
 
     index: int
+    control: int
     joint: int
     name: str
     gear: float
@@ -60,7 +61,8 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
     affine = int(mujoco.mjtBias.mjBIAS_AFFINE)
     filters = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
     still = int(mujoco.mjtDyn.mjDYN_NONE)
-    for index in range(model.nu):
+    unclamped = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+    for index in range(model.nactuator):
         name = model.actuator(index).name
         called = f"actuator '{name}'" if name else f"actuator number {index}"
         dynamics, bias_kind = int(model.actuator_dyntype[index]), int(model.actuator_biastype[index])
@@ -70,22 +72,28 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
         if int(model.actuator_gaintype[index]) != fixed or bias_kind not in (none, affine):
             left_out.append(f"{called}: a muscle, motor model, plugin or gain that changes with the motion")
             continue
+        if int(model.actuator_ctrlnum[index]) != 1:
+            left_out.append(f"{called}: it takes several controls")
+            continue
         if dynamics not in (still, *filters):
             left_out.append(f"{called}: activation dynamics other than a filter")
             continue
         bias = (
             tuple(float(b) for b in model.actuator_biasprm[index, :3]) if bias_kind == affine else (0.0,) * 3
         )
+        control = int(model.actuator_ctrladr[index])
+        clamped = bool(model.actuator_ctrllimited[control]) and not unclamped
         found.append(
             TreeActuator(
                 index,
+                control,
                 int(model.actuator_trnid[index, 0]),
                 name,
                 float(model.actuator_gear[index, 0]),
                 float(model.actuator_gainprm[index, 0]),
                 (bias[0], bias[1], bias[2]),
-                _range(model.actuator_ctrllimited[index], model.actuator_ctrlrange[index]),
-                _range(model.actuator_forcelimited[index], model.actuator_forcerange[index]),
+                _range(clamped, model.actuator_ctrlrange[control]),
+                _range(bool(model.actuator_forcelimited[index]), model.actuator_forcerange[index]),
                 float(model.actuator_dynprm[index, 0]) if dynamics in filters else 0.0,
             )
         )
@@ -112,5 +120,5 @@ def _beside(model: mujoco.MjModel, index: int, called: str) -> list[str]:
     return found
 
 
-def _range(limited: int, ends: tuple[float, float]) -> tuple[float, float] | None:
+def _range(limited: bool, ends: tuple[float, float]) -> tuple[float, float] | None:
     return (float(ends[0]), float(ends[1])) if limited else None

@@ -19,7 +19,7 @@ from rigsight.robots.joint_tables import armature, joint_table, way_unit
 from rigsight.robots.left_out import left_out_of
 from rigsight.robots.naming import Names
 from rigsight.robots.sensors import TreeSensor, sensors_of
-from rigsight.robots.tree import TreeJoint, bodies_of, cleaned
+from rigsight.robots.tree import TreeJoint, bodies_of, gravity_of
 
 if TYPE_CHECKING:
     import mujoco
@@ -54,7 +54,7 @@ class RigDraft:
     gears
         Place between a rotor and what it moves -> its joint.
     controls
-        Drive -> the input that it is told.
+        Input that a drive is told -> number of the control in the model; -1 for what was added.
     fields
         Parameter or constant of the rig -> the numbers of the model that it stands for.
     values
@@ -69,7 +69,7 @@ class RigDraft:
     joints: Mapping[str, int]
     gears: Mapping[str, Gear]
     drives: Mapping[str, int]
-    controls: Mapping[str, str]
+    controls: Mapping[str, int]
     sensors: Mapping[str, int]
     fields: Mapping[str, tuple[Field, ...]]
     values: Mapping[str, float]
@@ -143,7 +143,7 @@ def draft_rig(
             joint_tables[f"{q}_gear"] = gear_table(model, joint, q, play, gears[joint.name], numbers)
     called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
     symbols = [sp.Symbol(q, real=True) for q in coordinates]
-    energies = energies_of(bodies, called, symbols, cleaned(model.opt.gravity), numbers)
+    energies = energies_of(bodies, called, symbols, gravity_of(model), numbers)
     rotors = [armature(model, joint, q, numbers) for joint, q in own]
     shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
     tables: dict[str, Any] = {
@@ -172,7 +172,7 @@ def draft_rig(
             if joint.index in plays
         },
         {drive.name: drive.index for drive in drives},
-        {drive.name: drive.told for drive in drives},
+        {drive.told: drive.control_index for drive in drives},
         {name: sensor.index for name, sensor, _ in shown},
         numbers.fields,
         numbers.values,

@@ -23,8 +23,8 @@ class DriveTables:
         ``[drives.NAME]``.
     told, control
         ``[inputs.NAME]``, what it is told.
-    index
-        Number of the actuator; -1 for a drive that was added.
+    index, control_index
+        Numbers of the actuator and of its control; -1 for a drive that was added.
     states
         ``[states.NAME]`` by name.
     """
@@ -34,6 +34,7 @@ class DriveTables:
     told: str
     control: Mapping[str, Any]
     index: int = -1
+    control_index: int = -1
     states: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -107,7 +108,7 @@ def drive_of(
     geared = f"{gear}({force})" if gear and not force.isidentifier() else f"{gear}{force}"
     table = {"signal": signal, "force": geared, "along": coordinate}
     control = {"unit": unit, "about": f"control of {name}"}
-    return DriveTables(name, table, told, control, actuator.index, states)
+    return DriveTables(name, table, told, control, actuator.index, actuator.control, states)
 
 
 def _law(

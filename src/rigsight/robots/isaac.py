@@ -14,14 +14,13 @@ from typing import Any
 from rigsight.effects import kind_of
 from rigsight.errors import InputError
 from rigsight.robots.draft import RigDraft
-from rigsight.robots.writing_back import WrittenBack, draft_of
+from rigsight.robots.writing_back import WrittenBack, read_for
 from rigsight.simulate.model import Model
 
 _FIELDS: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("joint", "damping"): ("viscous_friction",),
     ("joint", "frictionloss"): ("friction", "dynamic_friction"),
     ("joint", "armature"): ("armature",),
-    ("actuator", "forcerange"): ("actuator_effort_limit",),
 }
 """Element and attribute of MuJoCo -> the settings that say the same."""
 
@@ -62,15 +61,16 @@ def isaac_settings(model: Model, source: Path, step: float | None = None) -> Wri
         raise InputError(
             "Writing for Isaac Lab needs PyYAML, which is not installed: pip install 'rigsight[mujoco]'."
         ) from None
-    compiled, draft = draft_of(model, source)
+    robot = read_for(model, source)
+    compiled, draft = robot.model, robot.draft
     step = float(compiled.opt.timestep) if step is None else step
     names = {index: compiled.joint(index).name or place for place, index in draft.joints.items()}
     settings = _Settings({index: {"joint_names_expr": [name]} for index, name in names.items()}, [], [])
     joints_of_drives = {
         drive: int(compiled.actuator_trnid[index, 0]) for drive, index in draft.drives.items() if index >= 0
     }
-    for actuator in joints_of_drives:
-        _gains(model, draft, actuator, joints_of_drives[actuator], settings)
+    for drive, joint in joints_of_drives.items():
+        _gains(model, drive, joint, float(compiled.actuator_gear[draft.drives[drive], 0]), settings)
     _numbers(model, draft, compiled, settings)
     _effects(model, draft, joints_of_drives, settings, step)
     content = {"actuators": {names[index]: group for index, group in settings.by_joint.items()}}
@@ -83,29 +83,31 @@ def isaac_settings(model: Model, source: Path, step: float | None = None) -> Wri
     return WrittenBack(text, tuple(settings.written), tuple(settings.without_field))
 
 
-def _gains(model: Model, draft: RigDraft, drive: str, joint: int, settings: _Settings) -> None:
+def _gains(model: Model, drive: str, joint: int, gear: float, settings: _Settings) -> None:
+    """Add the gains of a position controller, at the joint: behind a gear they count by its square."""
     for name, setting in ((f"{drive}_kp", "stiffness"), (f"{drive}_kv", "damping")):
-        if name in draft.fields and name in model.values:
-            settings.by_joint[joint][setting] = model.values[name]
+        if name in model.values:
+            settings.by_joint[joint][setting] = gear**2 * model.values[name]
             settings.written.append(f"{setting} of {drive}")
 
 
 def _numbers(model: Model, draft: RigDraft, compiled: Any, settings: _Settings) -> None:
-    for name, fields in draft.fields.items():
-        field = fields[0]
-        if name not in model.values or (field.element, field.attribute) not in _FIELDS:
-            continue
-        if field.entry and field.attribute == "damping":
-            settings.without_field.append(f"{name} = {model.values[name]:.4g}")
-            continue
-        joint = field.index if field.element == "joint" else int(compiled.actuator_trnid[field.index, 0])
-        for setting in _FIELDS[field.element, field.attribute]:
-            if field.attribute == "forcerange":
-                if field.entry == 1:
-                    settings.by_joint[joint][setting] = model.values[name]
-            else:
-                settings.add(joint, setting, model.values[name])
-        settings.written.append(f"{name} = {model.values[name]:.4g}")
+    known = draft.tables.get("constants", {})
+    for name, value in model.values.items():
+        field = draft.fields.get(name, (None,))[0]
+        setting = None if field is None or field.entry else _FIELDS.get((field.element, field.attribute))
+        if field is not None and (field.element, field.attribute) == ("actuator", "forcerange"):
+            if field.entry == 1:
+                gear = abs(float(compiled.actuator_gear[field.index, 0]))
+                joint = int(compiled.actuator_trnid[field.index, 0])
+                settings.by_joint[joint]["actuator_effort_limit"] = gear * value
+                settings.written.append(f"{name} = {value:.4g}")
+        elif setting is not None and field is not None:
+            for one in setting:
+                settings.add(field.index, one, value)
+            settings.written.append(f"{name} = {value:.4g}")
+        elif name in draft.values or (name in known and value != known[name]["default"]):
+            settings.without_field.append(f"{name} = {value:.4g}")
 
 
 def _effects(

@@ -14,7 +14,7 @@ _LISTED = 3
 
 def left_out_of(model: mujoco.MjModel) -> list[str]:
     """Return in words what is not taken over of a model, apart from its actuators and sensors."""
-    found = []
+    found = [f"the option that switches {what} off: the rig has it" for what in _switched_off(model)]
     touching = _touching(model)
     if touching:
         found.append(f"contacts between bodies: {_listed(touching)}")
@@ -41,6 +41,19 @@ def left_out_of(model: mujoco.MjModel) -> list[str]:
     if model.nflex or model.nplugin:
         found.append("deformable bodies and plugins")
     return found
+
+
+def _switched_off(model: mujoco.MjModel) -> list[str]:
+    import mujoco
+
+    off = mujoco.mjtDisableBit
+    flags = {
+        off.mjDSBL_SPRING: "springs of joints",
+        off.mjDSBL_DAMPER: "damping of joints",
+        off.mjDSBL_FRICTIONLOSS: "dry friction",
+        off.mjDSBL_ACTUATION: "actuators",
+    }
+    return [what for flag, what in flags.items() if model.opt.disableflags & int(flag)]
 
 
 def _touching(model: mujoco.MjModel) -> list[str]:

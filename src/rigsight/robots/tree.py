@@ -107,6 +107,15 @@ def bodies_of(model: mujoco.MjModel) -> tuple[TreeBody, ...]:
     return tuple(_body(model, index) for index in range(1, model.nbody))
 
 
+def gravity_of(model: mujoco.MjModel) -> Floats:
+    """Return the acceleration of gravity in the frame of the world [m/s^2], shape (3,); zero where an option switches it off."""
+    import mujoco
+
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+        return np.zeros(3)
+    return cleaned(model.opt.gravity)
+
+
 def _body(model: mujoco.MjModel, index: int) -> TreeBody:
     axes = _matrix(model.body_iquat[index])
     mass = float(model.body_mass[index])

@@ -6,19 +6,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
 from rigsight.robots.declared_numbers import Field
-from rigsight.robots.draft import Gear, RigDraft, draft_rig
+from rigsight.robots.draft import Gear, RigDraft
 from rigsight.robots.effect_fields import EFFECT_FIELDS
-from rigsight.robots.loading import load_model, load_spec
+from rigsight.robots.robot_file import RobotFile, read_robot
 from rigsight.robots.second_joint import add_second_joint
 from rigsight.simulate.model import Model
-
-if TYPE_CHECKING:
-    import mujoco
 
 _SAME = 1e-12
 """Relative difference below which a number is the one that the file has."""
@@ -58,41 +55,38 @@ def write_back(model: Model, source: Path) -> WrittenBack:
     InputError
         If the file cannot be read, or the rig has places that are not in it.
     """
-    compiled, draft = draft_of(model, source)
-    writer = _Writer(load_spec(source), compiled, draft)
-    for place, gear in draft.gears.items():
+    robot = read_for(model, source)
+    structure = model.structure
+    own = frozenset(structure.parameter_name(e, p.name) for e in structure.effects for p in e.parameters)
+    writer = _Writer(robot, own)
+    for place, gear in robot.draft.gears.items():
         writer.write_gear(place, gear, model)
     for name, value in model.values.items():
-        if name in draft.fields and draft.fields[name][0].element != "gear":
-            writer.write_number(name, value)
+        writer.write_number(name, value)
     for effect in model.effects:
         writer.write_effect(effect, model)
     return writer.finished(source)
 
 
-def draft_of(model: Model, source: Path) -> tuple[mujoco.MjModel, RigDraft]:
-    """Return the compiled model of a file and the rig that it gives.
+def read_for(model: Model, source: Path) -> RobotFile:
+    """Return the robot of a file with the gears that a rig which was made from it has.
 
     Raises
     ------
     InputError
         If the file cannot be read, or the model's rig has places that are not in it.
     """
-    compiled = load_model(source)
-    plain = draft_rig(compiled, source.stem, with_drives=source.suffix.lower() == ".urdf")
+    robot = read_robot(source)
     places = {joint.name for joint in model.structure.rig.mechanism.joints}
     gears = {
-        compiled.joint(index).name: model.values[f"{place}_gear_stiffness"]
-        for place, index in plain.joints.items()
+        robot.model.joint(index).name: model.values[f"{place}_gear_stiffness"]
+        for place, index in robot.draft.joints.items()
         if f"{place}_gear" in places and f"{place}_gear_stiffness" in model.values
     }
-    draft = (
-        draft_rig(compiled, source.stem, with_drives=source.suffix.lower() == ".urdf", gears=gears)
-        if gears
-        else plain
-    )
-    _check_is_of(model, draft, source)
-    return compiled, draft
+    if gears:
+        robot = read_robot(source, gears)
+    _check_is_of(model, robot.draft, source)
+    return robot
 
 
 def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
@@ -111,25 +105,35 @@ def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
 
 
 class _Writer:
-    def __init__(self, spec: mujoco.MjSpec, compiled: mujoco.MjModel, draft: RigDraft) -> None:
-        self._spec, self._compiled, self._draft = spec, compiled, draft
+    def __init__(self, robot: RobotFile, of_effects: frozenset[str]) -> None:
+        spec, self._compiled, self._draft = robot.spec, robot.model, robot.draft
+        self._spec = spec
         self._elements: Mapping[str, Mapping[int, Any]] = {
             "joint": {joint.id: joint for joint in spec.joints},
             "actuator": {actuator.id: actuator for actuator in spec.actuators},
             "sensor": {sensor.id: sensor for sensor in spec.sensors},
             "body": {body.id: body for body in spec.bodies},
         }
+        tables = {**robot.draft.tables.get("constants", {}), **robot.draft.tables["parameters"]}
+        self._defaults = {name: float(table["default"]) for name, table in tables.items()}
+        self._of_effects = of_effects
         self._written: list[str] = []
         self._without_field: list[str] = []
 
     def write_number(self, name: str, value: float) -> None:
-        tables = {**self._draft.tables.get("constants", {}), **self._draft.tables["parameters"]}
-        before = float(tables[name]["default"])
-        if math.isclose(before, value, rel_tol=_SAME, abs_tol=0.0):
+        """Write a parameter or constant that differs from the file's, or say that it has no field: a length, an inertia."""
+        fields, before = self._draft.fields.get(name, ()), self._defaults.get(name)
+        if name in self._of_effects or (fields and fields[0].element == "gear"):
             return
-        for field in self._draft.fields[name]:
+        if before is not None and math.isclose(before, value, rel_tol=_SAME, abs_tol=0.0):
+            return
+        if not fields:
+            was = "" if before is None else f", {before:g} in the file"
+            self._without_field.append(f"{name} = {value:g}{was}")
+            return
+        for field in fields:
             self._set(field, value)
-        first = self._draft.fields[name][0]
+        first = fields[0]
         self._written.append(
             f"{self._called(first.element, first.index)} {first.attribute}: {before:g} -> {value:g}"
         )

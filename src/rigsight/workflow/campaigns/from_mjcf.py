@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigsight.errors import InputError
-from rigsight.robots import FreeRun, RigDraft, draft_rig, free_run, load_spec, rig_text, with_gears
+from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears
 from rigsight.workflow.campaigns.init import CAMPAIGN_FILE, Draft, measured_files, run_init
 from rigsight.workflow.files.results import write_together
+from rigsight.workflow.progress import Listener, Stage, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,11 @@ class ModelDraft:
 
 
 def run_init_from_mjcf(
-    folder: str | Path, model_file: str | Path, *, gears: Mapping[str, float] | None = None
+    folder: str | Path,
+    model_file: str | Path,
+    *,
+    gears: Mapping[str, float] | None = None,
+    listener: Listener = silent,
 ) -> ModelDraft:
     """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files.
 
@@ -46,7 +51,9 @@ def run_init_from_mjcf(
     model_file
         MJCF or URDF.
     gears
-        Name of a joint -> stiffness of its gear.
+        Name of a joint -> stiffness of its gear [N m/rad or N/m].
+    listener
+        Told what is being done: equations of many joints take their time.
 
     Raises
     ------
@@ -54,13 +61,11 @@ def run_init_from_mjcf(
         If the model cannot be read or taken over, a file is in the way, or nothing can be written there.
     """
     folder, source = Path(folder), Path(model_file)
-    spec = load_spec(source)
-    model = spec.compile()
-    try:
-        draft = draft_rig(model, source.stem, with_drives=source.suffix.lower() == ".urdf", gears=gears)
-        rig = draft.rig
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
+    robot = read_robot(source, gears)
+    draft = robot.draft
+    stage = Stage(f"Equations of {len(draft.tables['coordinates'])} coordinates", 2, listener)
+    rig = draft.rig
+    stage.finished("derived")
     path = folder / f"{rig.name}.toml"
     text = rig_text(draft, source.name)
     # Once records are there, the same command goes on with the campaign.
@@ -71,7 +76,8 @@ def run_init_from_mjcf(
         raise InputError(
             f"{campaign_file} exists already and is not overwritten; remove it, or edit it by hand."
         )
-    run = free_run(with_gears(spec, draft), draft)
+    run = free_run(with_gears(robot.spec, draft), draft)
+    stage.finished("compared with MuJoCo")
     folder.mkdir(parents=True, exist_ok=True)
     write_together(folder, {path.name: text}, "Make room or ask for the right to write there.")
     campaign = None

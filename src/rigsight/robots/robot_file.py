@@ -1,0 +1,58 @@
+"""A file of a robot's model -> the model, in a form that can be changed and compiled, and the rig that it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigsight.errors import InputError
+from rigsight.robots.draft import RigDraft, draft_rig
+from rigsight.robots.loading import load_spec
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFile:
+    """A robot's model with its rig.
+
+    Attributes
+    ----------
+    spec
+        What the file says; may be changed.
+    model
+        Compiled.
+    draft
+        Its rig file.
+    """
+
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    draft: RigDraft
+
+
+def read_robot(path: Path, gears: Mapping[str, float] | None = None) -> RobotFile:
+    """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint.
+
+    Parameters
+    ----------
+    path
+        The file.
+    gears
+        Name of a joint -> stiffness of its gear [N m/rad or N/m].
+
+    Raises
+    ------
+    InputError
+        Naming the file, if MuJoCo is not installed or cannot read it, or a rig file cannot say what moves in it.
+    """
+    spec = load_spec(path)
+    model = spec.compile()
+    try:
+        draft = draft_rig(model, path.stem, with_drives=path.suffix.lower() == ".urdf", gears=gears)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return RobotFile(spec, model, draft)
