@@ -8,16 +8,15 @@ from rigsight.rigs.built_in import RUNNING_GEAR as RUNNING_GEAR
 from rigsight.rigs.built_in import declared_rig as declared_rig
 from rigsight.rigs.built_in import is_built_in_motion as is_built_in_motion
 from rigsight.rigs.built_in import rig_file_text as rig_file_text
+from rigsight.rigs.coupled_inertia import has_short_inverse as has_short_inverse
 from rigsight.rigs.evaluation import evaluated as evaluated
 from rigsight.rigs.evaluation import relative_slopes as relative_slopes
-from rigsight.rigs.mechanism import MOST_COUPLED as MOST_COUPLED
 from rigsight.rigs.mechanism import Coordinate as Coordinate
 from rigsight.rigs.mechanism import Drive as Drive
 from rigsight.rigs.mechanism import Joint as Joint
 from rigsight.rigs.mechanism import Sensor as Sensor
 from rigsight.rigs.mechanism import acceleration as acceleration
 from rigsight.rigs.mechanism import force_symbol as force_symbol
-from rigsight.rigs.mechanism import has_short_inverse as has_short_inverse
 from rigsight.rigs.mechanism import reading_symbol as reading_symbol
 from rigsight.rigs.one_motion import Follower as Follower
 from rigsight.rigs.one_motion import Motion as Motion
@@ -30,7 +29,6 @@ from rigsight.rigs.signal import Signal as Signal
 __all__ = [
     "AXIS",
     "ELEMENT",
-    "MOST_COUPLED",
     "RIGS",
     "ROLLING",
     "RUNNING_GEAR",

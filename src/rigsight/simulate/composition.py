@@ -12,7 +12,7 @@ from rigsight.effects import Effect, placed_dimension
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import Parameter
 from rigsight.records.record import Record
-from rigsight.rigs import MOST_COUPLED, RIGS, Rig, joint_of
+from rigsight.rigs import RIGS, Rig, joint_of
 from rigsight.simulate.signal_path import equation_tree
 from rigsight.simulate.structure import Structure, ahead_name, bandwidth_name, unique_names
 
@@ -132,8 +132,8 @@ def _check_effects(rig: Rig, effects: tuple[Effect, ...]) -> None:
         joint = joint_of(rig, effect)
         if effect.reads_inertia and joint.inertia is None and not rig.mechanism.has_short_inverse:
             raise InputError(
-                f"Effect '{effect.name}' reads the inertia that moves with a joint, which is no formula on a rig where more than "
-                f"{MOST_COUPLED} coordinates move one another. Give joints.{joint.name} an inertia in the rig file."
+                f"Effect '{effect.name}' reads the inertia that moves with a joint, and the formula for it is too long on the "
+                f"rig '{rig.name}'. Give joints.{joint.name} an inertia in the rig file."
             )
         if not rig.offers(effect):
             raise InputError(f"Effect '{effect.name}' makes no sense on the rig '{rig.name}'.")
