@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.records import Record
 from rigsight.rigs import Rig, rig_of_tables
-from rigsight.robots.draft import RigDraft, with_known_constants
+from rigsight.robots.drafting.draft import RigDraft, with_known_constants
 from rigsight.simulate import compose, simulate
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigsight.errors import InputError
-from rigsight.robots.draft import RigDraft, draft_rig
-from rigsight.robots.loading import load_spec
+from rigsight.robots.drafting.draft import RigDraft, draft_rig
+from rigsight.robots.reading.loading import load_spec
 
 if TYPE_CHECKING:
     import mujoco

@@ -10,11 +10,11 @@ from typing import Any
 
 from rigsight.effects import Effect, kind_of
 from rigsight.errors import InputError
-from rigsight.robots.declared_numbers import Field
-from rigsight.robots.draft import Gear, RigDraft
-from rigsight.robots.effect_fields import EFFECT_FIELDS
+from rigsight.robots.drafting.declared_numbers import Field
+from rigsight.robots.drafting.draft import Gear, RigDraft
 from rigsight.robots.robot_file import RobotFile, read_robot
-from rigsight.robots.second_joint import add_second_joint
+from rigsight.robots.writing.effect_fields import EFFECT_FIELDS
+from rigsight.robots.writing.second_joint import add_second_joint
 from rigsight.simulate.model import Model
 
 _SAME = 1e-12

@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rigsight.errors import InputError, nearest
-from rigsight.robots.declared_numbers import DeclaredNumbers, Field
-from rigsight.robots.joint_tables import force_unit, way_unit
-from rigsight.robots.tree import TreeBody, TreeJoint
+from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.drafting.joint_tables import force_unit, way_unit
+from rigsight.robots.reading.tree import TreeBody, TreeJoint
 
 if TYPE_CHECKING:
     import mujoco

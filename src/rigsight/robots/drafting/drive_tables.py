@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigsight.robots.actuators import TreeActuator
-from rigsight.robots.declared_numbers import DeclaredNumbers, Field
-from rigsight.robots.joint_tables import force_unit, way_unit
-from rigsight.robots.naming import Names
-from rigsight.robots.tree import TreeJoint
+from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.drafting.joint_tables import force_unit, way_unit
+from rigsight.robots.drafting.naming import Names
+from rigsight.robots.reading.actuators import TreeActuator
+from rigsight.robots.reading.tree import TreeJoint
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from rigsight.rigs import Rig, rig_of_tables
-from rigsight.robots.actuators import actuators_of
-from rigsight.robots.declared_numbers import DeclaredNumbers, Field
-from rigsight.robots.drive_tables import drive_of, plain_drive
-from rigsight.robots.energies import energies_of
-from rigsight.robots.gears import gear_table, split_joints
-from rigsight.robots.joint_tables import armature, joint_table, way_unit
-from rigsight.robots.left_out import left_out_of
-from rigsight.robots.naming import Names
-from rigsight.robots.sensors import TreeSensor, sensors_of
-from rigsight.robots.tree import TreeJoint, bodies_of, gravity_of
+from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.drafting.drive_tables import drive_of, plain_drive
+from rigsight.robots.drafting.energies import energies_of
+from rigsight.robots.drafting.gears import gear_table, split_joints
+from rigsight.robots.drafting.joint_tables import armature, joint_table, way_unit
+from rigsight.robots.drafting.naming import Names
+from rigsight.robots.reading.actuators import actuators_of
+from rigsight.robots.reading.left_out import left_out_of
+from rigsight.robots.reading.sensors import TreeSensor, sensors_of
+from rigsight.robots.reading.tree import TreeJoint, bodies_of, gravity_of
 
 if TYPE_CHECKING:
     import mujoco

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rigsight.robots.actuators import TreeActuator
+from rigsight.robots.reading.actuators import TreeActuator
 
 if TYPE_CHECKING:
     import mujoco

@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from rigsight.robots.naming import Names
+from rigsight.robots.drafting.naming import Names
 
 
 @dataclass(frozen=True)

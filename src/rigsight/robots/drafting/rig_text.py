@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rigsight.errors import InputError
-from rigsight.robots.draft import RigDraft
+from rigsight.robots.drafting.draft import RigDraft
 
 
 def rig_text(draft: RigDraft, source: str) -> str:

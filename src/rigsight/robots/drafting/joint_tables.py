@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from rigsight.robots.declared_numbers import DeclaredNumbers, Field
-from rigsight.robots.tree import TreeJoint
+from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
+from rigsight.robots.reading.tree import TreeJoint
 
 if TYPE_CHECKING:
     import mujoco

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigsight.robots.draft import RigDraft
+from rigsight.robots.drafting.draft import RigDraft
 
 if TYPE_CHECKING:
     import mujoco

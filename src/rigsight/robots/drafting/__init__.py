@@ -1,0 +1,1 @@
+"""How do the bodies, joints, actuators and sensors of a MuJoCo model become the tables of a rig file?"""
