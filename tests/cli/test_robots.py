@@ -76,6 +76,7 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
         (["init", "--mjcf", CART, "--gear", "slidr=1"], "Did you mean 'slider'"),
         (["init", "--mjcf", CART, "--gear", "slider=-1"], "is positive, got -1"),
         (["init", "--mjcf", CART, "--gear", "slider=100"], "has no armature"),
+        (["init", CART, "--mjcf", CART], "a file is in the way"),
         (["init", "--gear", "slider=100"], "name the model with --mjcf"),
         (["init"], "Name the FOLDER"),
         (["export", "MODEL", "--to", "mjcf"], "name the MJCF or URDF file"),

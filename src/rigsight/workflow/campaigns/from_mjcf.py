@@ -78,7 +78,6 @@ def run_init_from_mjcf(
         )
     run = free_run(with_gears(robot.spec, draft), draft)
     stage.finished("compared with MuJoCo")
-    folder.mkdir(parents=True, exist_ok=True)
     write_together(folder, {path.name: text}, "Make room or ask for the right to write there.")
     campaign = None
     if measured_files(folder):
