@@ -25,7 +25,7 @@ from rigsight.export import export_model
 from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
-from rigsight.simulate.compiled.compiler import c_compilers
+from rigsight.libraries.compiler import c_compilers
 from rigsight.simulate.model import Model
 
 Floats = NDArray[np.float64]

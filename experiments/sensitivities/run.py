@@ -22,6 +22,8 @@ from rigsight.excitation import log_sweep
 from rigsight.identify.fit import fit_problem
 from rigsight.identify.fit.coordinates import FINE_STEP, STEP, Coordinates
 from rigsight.identify.fit.grey_box import GreyBoxFit
+from rigsight.libraries import library_cache
+from rigsight.libraries.compiler import c_compilers, library
 from rigsight.records import Record
 from rigsight.records.record import Hold
 from rigsight.rigs import RUNNING_GEAR
@@ -32,7 +34,6 @@ from rigsight.simulate import (
     record_input,
 )
 from rigsight.simulate.compiled import kernel_cache
-from rigsight.simulate.compiled.compiler import c_compilers, library
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import KernelEquations, kernel_source
 from rigsight.units import characteristic_value
@@ -173,7 +174,7 @@ class Case:
             def run() -> None:
                 with carried(kind):
                     text = kernel_source(self.structure)
-                library(c_compilers()[0], {"kernel.c": text}, kernel_cache.kernel_options())
+                library(c_compilers()[0], {"kernel.c": text}, library_cache.kernel_options())
 
             return run
 

@@ -18,10 +18,11 @@ import pytest
 import rigsight
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
+from rigsight.libraries import library_cache
+from rigsight.libraries.compiler import c_compilers, library
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.compiled import kernel_cache
-from rigsight.simulate.compiled.compiler import c_compilers, library
 from rigsight.simulate.compiled.kernel_source import kernel_source
 
 MOTION = """
@@ -33,6 +34,7 @@ from rigsight.effects import effect_named
 from rigsight.records.record import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
+from rigsight.libraries import library_cache
 from rigsight.simulate.compiled import kernel_cache
 def motion():
     t = 5e-3 * np.arange(4000)
@@ -48,7 +50,7 @@ def motion():
 ONCE = f"{MOTION}print(motion())"
 WITH_EACH_CACHE = f"""{MOTION}
 for folder in sys.argv[1:]:
-    os.environ[kernel_cache.CACHE_VARIABLE] = folder
+    os.environ[library_cache.CACHE_VARIABLE] = folder
     kernel_cache._kernels.clear()
     print(motion())
 """
@@ -83,7 +85,7 @@ def motion_here() -> list[str]:
 @pytest.fixture
 def fresh_cache(tmp_path, monkeypatch):
     """Point at an empty folder and forget what is loaded in this process."""
-    monkeypatch.setenv(kernel_cache.CACHE_VARIABLE, str(tmp_path / "kernels"))
+    monkeypatch.setenv(library_cache.CACHE_VARIABLE, str(tmp_path / "kernels"))
     monkeypatch.setattr(kernel_cache, "_kernels", {})
     return tmp_path / "kernels"
 
@@ -132,7 +134,7 @@ def test_other_kernels_do_not_wait_for_one_that_is_compiled_and_the_same_one_is_
     fresh_cache, monkeypatch
 ):
     together, started = threading.Barrier(2, timeout=60.0), []
-    library = kernel_cache.first_library
+    library = library_cache.first_library
 
     def first_library(sources, options):
         # Passed only if a second compiler is started before the first one is done.
@@ -140,7 +142,7 @@ def test_other_kernels_do_not_wait_for_one_that_is_compiled_and_the_same_one_is_
         started.append(sources)
         return library(sources, options)
 
-    monkeypatch.setattr(kernel_cache, "first_library", first_library)
+    monkeypatch.setattr(library_cache, "first_library", first_library)
     delay = effect_named("input_delay")
     structures = [compose(AXIS), replace(compose(AXIS)), compose(AXIS, [delay]), compose(AXIS, [delay])]
     with ThreadPoolExecutor(len(structures)) as threads:
@@ -187,9 +189,9 @@ source = hashlib.sha256(kernel_source(gear).encode()).hexdigest()
 def test_cache_that_cannot_be_written_is_explained(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder", "utf-8")
-    monkeypatch.setenv(kernel_cache.CACHE_VARIABLE, str(blocked / "kernels"))
+    monkeypatch.setenv(library_cache.CACHE_VARIABLE, str(blocked / "kernels"))
     monkeypatch.setattr(kernel_cache, "_kernels", {})
-    with pytest.raises(InputError, match=kernel_cache.CACHE_VARIABLE):
+    with pytest.raises(InputError, match=library_cache.CACHE_VARIABLE):
         kernel_cache.kernel_of(compose(AXIS))
 
 
@@ -210,7 +212,7 @@ def test_kernels_of_somebody_else_that_may_only_be_read_are_used_and_others_told
     structure = compose(AXIS, [effect_named("cubic_stiffness")])
     kernel_cache.kernel_of(structure)
     kernel_cache._kernels.clear()
-    monkeypatch.setattr("rigsight.simulate.compiled.kernel_cache.tempfile.mkstemp", unwritable)
+    monkeypatch.setattr("rigsight.libraries.library_cache.tempfile.mkstemp", unwritable)
     kernel_cache.kernel_of(structure)
     with pytest.raises(InputError, match=r"Read-only.*Set RIGSIGHT_CACHE_DIR"):
         kernel_cache.kernel_of(compose(AXIS, [effect_named("end_stop")]))
@@ -224,7 +226,7 @@ def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", homeless)
     with pytest.raises(InputError, match="Set RIGSIGHT_CACHE_DIR"):
-        kernel_cache.cache_folder()
+        library_cache.cache_folder()
 
 
 def test_simulation_is_the_same_from_any_cache(fresh_cache, axis_values, make_record):
@@ -238,5 +240,5 @@ def test_simulation_is_the_same_from_any_cache(fresh_cache, axis_values, make_re
 def test_a_kernel_calls_nothing_that_it_does_not_declare(names):
     """Newer compilers refuse it, older ones take a call that is never made for granted."""
     text = kernel_source(compose(AXIS, [effect_named(name) for name in names]))
-    options = [option for option in kernel_cache.OPTIONS if option != "-w"]
+    options = [option for option in library_cache.OPTIONS if option != "-w"]
     assert library(c_compilers()[0], {"kernel.c": text}, [*options, "-Werror=implicit-function-declaration"])

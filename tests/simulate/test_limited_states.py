@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rigsight.effects import effect_named
+from rigsight.libraries.compiler import c_compilers, library, library_suffix
 from rigsight.records.record import Record
 from rigsight.rigs import AXIS, ELEMENT
 from rigsight.simulate import compose, parameter_vector, record_input, rest_state, simulate, simulate_sets
-from rigsight.simulate.compiled.compiler import c_compilers, library, library_suffix
 
 DT = 5e-3
 STEPS = 400

@@ -15,8 +15,8 @@ from rigsight.export.c_source import c_source
 from rigsight.export.description import filled, hold_text
 from rigsight.export.equations import Exported
 from rigsight.export.fmu_description import build_description, interpolates, model_description
-from rigsight.simulate.compiled.compiler import first_library, library_suffix
-from rigsight.simulate.compiled.kernel_cache import OPTIONS
+from rigsight.libraries.compiler import first_library, library_suffix
+from rigsight.libraries.library_cache import OPTIONS
 
 Version = Literal[2, 3]
 

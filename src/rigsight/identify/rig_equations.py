@@ -13,7 +13,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from rigsight.records.record import Record
-from rigsight.rigs import Joint, Rig
+from rigsight.rigs import Joint, Rig, applied_symbol
 from rigsight.simulate import compose, parameter_vector, record_input, record_values
 from rigsight.simulate.chain_rule import slopes_of
 from rigsight.simulate.equation_tree import Output
@@ -204,15 +204,17 @@ class RigEquations:
     def momenta_and_forces(self) -> tuple[list[sp.Expr], list[sp.Expr]]:
         """``d/dt momentum = force`` of each coordinate, and of each own state the state itself and its rate."""
         mechanism = self.rig.mechanism
-        momenta = [sp.diff(mechanism.kinetic, c.rate) for c in mechanism.free]
-        forces = []
+        momenta, of_bodies = mechanism.momenta_and_forces
+        applied = []
         for c in mechanism.free:
-            force = sp.diff(mechanism.kinetic - mechanism.potential, c.symbol)
+            force = sp.S.Zero
             for drive in mechanism.drives:
                 force += sp.diff(drive.along, c.symbol) * drive.force
             for joint in mechanism.joints:
                 force -= sp.diff(joint.motion, c.symbol) * sum(_resisting(joint, self.rig), start=sp.S.Zero)
-            forces.append(force)
+            applied.append(force)
+        on_bodies = {applied_symbol(i): force for i, force in enumerate(applied)}
+        forces = [force + own.xreplace(on_bodies) for force, own in zip(applied, of_bodies, strict=True)]
         states = [state.symbol for state in mechanism.states]
         rates = [state.rate for state in mechanism.states]
         return self._bound([*momenta, *states]), self._bound([*forces, *rates])

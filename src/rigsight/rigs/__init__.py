@@ -16,6 +16,7 @@ from rigsight.rigs.mechanism import Drive as Drive
 from rigsight.rigs.mechanism import Joint as Joint
 from rigsight.rigs.mechanism import Sensor as Sensor
 from rigsight.rigs.mechanism import acceleration as acceleration
+from rigsight.rigs.mechanism import applied_symbol as applied_symbol
 from rigsight.rigs.mechanism import force_symbol as force_symbol
 from rigsight.rigs.mechanism import reading_symbol as reading_symbol
 from rigsight.rigs.one_motion import Follower as Follower
@@ -41,6 +42,7 @@ __all__ = [
     "Sensor",
     "Signal",
     "acceleration",
+    "applied_symbol",
     "declared_rig",
     "evaluated",
     "force_symbol",

@@ -11,6 +11,7 @@ import sympy as sp
 from sympy.simplify.fu import TR8
 
 from rigsight.rigs.coupled_inertia import has_short_inverse
+from rigsight.simulators import Bodies, force_leaf, mass_leaf
 
 _LONGEST_SHORTENED = 100
 """In operations. Shortening takes a millisecond for each, and nobody reads what is longer."""
@@ -168,6 +169,10 @@ class Mechanism:
         Start values of coordinates, rates and states by symbol, where they are not those of rest.
     order
         Names of drives and sensors in an order in which none reads one behind it.
+    bodies
+        What another program simulates; its mass matrix and forces are added to those of the energies.
+    asked
+        Parameters and constants that the bodies read, in the order of theirs.
     """
 
     inputs: tuple[str, ...]
@@ -181,6 +186,8 @@ class Mechanism:
     signals: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
     initial: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
     order: tuple[str, ...] = ()
+    bodies: Bodies | None = None
+    asked: tuple[sp.Symbol, ...] = ()
 
     @property
     def free(self) -> tuple[Coordinate, ...]:
@@ -234,9 +241,46 @@ class Mechanism:
         """``d^2 T / d q' d q'`` of the degrees of freedom, shape (n, n)."""
         rates, momenta = [c.rate for c in self.free], self._momenta
         entries = {
-            (i, j): _shortened(sp.diff(momenta[i], rates[j])) for i in range(len(rates)) for j in range(i + 1)
+            (i, j): _shortened(sp.diff(momenta[i], rates[j])) + self._simulated_mass(i, j)
+            for i in range(len(rates))
+            for j in range(i + 1)
         }
         return sp.ImmutableMatrix(len(rates), len(rates), lambda i, j: entries[max(i, j), min(i, j)])
+
+    def _simulated_mass(self, i: int, j: int) -> sp.Expr:
+        if self.bodies is None:
+            return sp.S.Zero
+        return mass_leaf(self.bodies, i, j, [c.symbol for c in self.free], self.asked)
+
+    @cached_property
+    def simulated_forces(self) -> tuple[sp.Expr, ...]:
+        """What another program puts on each degree of freedom; the forces of drives and joints are `applied_symbol`."""
+        if self.bodies is None:
+            return tuple(sp.S.Zero for _ in self.free)
+        q, v = [c.symbol for c in self.free], [c.rate for c in self.free]
+        f = [applied_symbol(i) for i in range(len(q))]
+        return tuple(force_leaf(self.bodies, i, q, v, f, self.asked) for i in range(len(q)))
+
+    @cached_property
+    def bodies_are_nonlinear(self) -> bool:
+        """True where bodies that another program simulates read parameters of the rig, or the forces on them.
+
+        Its equations are no sums of terms then, each of one parameter.
+        """
+        return self.bodies is not None and (bool(self.asked) or self.bodies.program.reads_forces)
+
+    @cached_property
+    def momenta_and_forces(self) -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
+        """Momentum of each degree of freedom, and its rate without drives and joints."""
+        momenta, forces, rates = [], [], [c.rate for c in self.free]
+        for i, (own, momentum) in enumerate(zip(self.free, self._momenta, strict=True)):
+            force = sp.diff(self.kinetic - self.potential, own.symbol) + self.simulated_forces[i]
+            row = [self._simulated_mass(i, j) for j in range(len(rates))]
+            momenta.append(momentum + sp.Add(*(mass * rate for mass, rate in zip(row, rates, strict=True))))
+            # The mass matrix turns with the motion: d(M v) / dt = M a + dM/dt v.
+            turned = [self.rate(mass) * rate for mass, rate in zip(row, rates, strict=True)]
+            forces.append(force + sp.Add(*turned))
+        return tuple(momenta), tuple(forces)
 
     @cached_property
     def _momenta(self) -> tuple[sp.Expr, ...]:
@@ -353,6 +397,11 @@ def _shortened(expression: sp.Expr) -> sp.Expr:
 def acceleration(coordinate: Coordinate) -> sp.Symbol:
     """Return the symbol of the second time derivative of a prescribed coordinate."""
     return sp.Symbol(f"dd({coordinate.name})", real=True)
+
+
+def applied_symbol(index: int) -> sp.Symbol:
+    """Return the symbol of what drives and joints put on a degree of freedom, where simulated bodies read it."""
+    return sp.Symbol(f"applied {index}", real=True)
 
 
 READING = "reading of "

@@ -1,7 +1,7 @@
 """Rig and effects -> compiled kernel -> outputs for a record's input."""
 
+from rigsight.libraries import cache_folder as cache_folder
 from rigsight.simulate.compiled.kernel import FittedRecord as FittedRecord
-from rigsight.simulate.compiled.kernel_cache import cache_folder as cache_folder
 from rigsight.simulate.composition import compose as compose
 from rigsight.simulate.composition import structure_named as structure_named
 from rigsight.simulate.composition import structure_of_fit as structure_of_fit

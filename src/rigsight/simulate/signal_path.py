@@ -12,7 +12,7 @@ import sympy as sp
 
 from rigsight.effects import Effect, Energy, Place, placed_dimension
 from rigsight.effects import symbols as canonical
-from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
+from rigsight.rigs import Drive, Joint, Rig, Sensor, applied_symbol, force_symbol, reading_symbol
 from rigsight.simulate.binder import Binder, state_symbol
 from rigsight.simulate.equation_tree import (
     Definition,
@@ -181,6 +181,7 @@ class _Path:
         for own, force in zip(terms, mechanism.generalized_forces, strict=True):
             if force != 0:
                 own.append(self._bound(force))
+        self._add_bodies(terms)
         mass = mechanism.mass_matrix.applyfunc(self._bound)
         if self._bandwidths:
             for own, force in zip(terms, mass * self._observer(states), strict=True):
@@ -195,6 +196,15 @@ class _Path:
             if mechanism.has_one_motion
             else tuple(size_of(c.rate.name) for c in free),
         )
+
+    def _add_bodies(self, terms: Sequence[list[sp.Expr]]) -> None:
+        """Add what another program puts on the degrees of freedom, with what drives, joints and energies put on its bodies."""
+        mechanism = self._rig.mechanism
+        if mechanism.bodies is None:
+            return
+        applied = {applied_symbol(i): sp.Add(*own) for i, own in enumerate(terms)}
+        for own, force in zip(terms, mechanism.simulated_forces, strict=True):
+            own.append(self._bound(force).xreplace(applied))
 
     def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
         """Return the accelerations by which an observer follows what sensors showed, shape (n_degrees, 1)."""

@@ -70,7 +70,7 @@ def start_values_of(task: Task) -> dict[str, float]:
         held[task.open_factor.held] = task.open_factor.value
     start = {**task.constants, **linear_start(task.rig, task.estimation, task.constants, held)}
     # Numbers fitted without the effects that the simulation has are farther off than those it came with.
-    return {**start, **task.given} if task.modelled else start
+    return {**start, **task.given} if task.modelled or task.rig.mechanism.bodies_are_nonlinear else start
 
 
 def _held(task: Task) -> frozenset[str]:

@@ -83,6 +83,10 @@ def any_rig_start(
     sought = [p for p in rig.parameters if p.name not in known]
     if not sought:
         return dict(known)
+    defaults = {p.name: p.default for p in sought if p.default is not None}
+    if rig.mechanism.bodies_are_nonlinear and len(defaults) == len(sought):
+        # Another program answers to these numbers, so the error of its equations costs as much as simulations do.
+        return {**known, **defaults}
     values = {**constants, **known}
     rough = _Rough(rig, records, values, [p.name for p in sought])
     best: FitResult | None = None

@@ -233,6 +233,8 @@ def check_all_used(declaration: Declaration) -> None:
     """
     table, expressions = declaration.table, declaration.expressions
     read = {name for expression in expressions.values() for name in expression.reads}
+    if table.simulator is not None:
+        read |= set(table.simulator.parameters)
     read |= {own.prescribed_by for own in table.coordinates.values() if own.prescribed_by is not None}
     for key in ("inputs", "constants", "parameters", "signals"):
         for name in getattr(table, key):

@@ -12,6 +12,7 @@ from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declarat
 from rigsight.rigs.reading.expressions import rate_name
 from rigsight.rigs.reading.rig_tables import ConstantTable, ParameterTable
 from rigsight.rigs.reading.roles import sized_by
+from rigsight.rigs.reading.simulator import simulated_bodies
 from rigsight.rigs.rig import Alternative, Rig
 from rigsight.rigs.signal import Signal
 from rigsight.units import size_of
@@ -71,6 +72,7 @@ def rig_of(declaration: Declaration, order: list[Path]) -> Rig:
 def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
     table, symbols, sympy = declaration.table, declaration.symbols, declaration.sympy
     signals = {symbols[str(path[1])]: sympy(path) for path in order if path[0] == "signals"}
+    bodies = simulated_bodies(declaration)
     return Mechanism(
         inputs=tuple(table.inputs),
         coordinates=tuple(
@@ -115,6 +117,8 @@ def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
             },
         },
         order=tuple(str(path[1]) for path in order if path[0] != "signals"),
+        bodies=bodies,
+        asked=tuple(symbols[name] for name in table.simulator.parameters) if table.simulator else (),
     )
 
 

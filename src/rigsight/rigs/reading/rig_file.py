@@ -15,6 +15,7 @@ from rigsight.rigs.reading.declared_names import check_all_used, check_declared_
 from rigsight.rigs.reading.declared_rig import rig_of
 from rigsight.rigs.reading.declared_units import check_units_add_up
 from rigsight.rigs.reading.signal_order import signal_order
+from rigsight.rigs.reading.simulator import check_simulator, with_whole_path
 from rigsight.rigs.reading.sound_mechanism import check_mechanism
 from rigsight.rigs.reading.toml_places import Path as KeyPath
 from rigsight.rigs.reading.toml_places import Place, toml_error, value_places
@@ -37,10 +38,12 @@ def read_rig_file(path: Path) -> Rig:
         text = path.read_text("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not text in UTF-8 (byte {error.start}).") from None
-    return rig_of_text(text, str(path))
+    return rig_of_text(text, str(path), folder=path.parent)
 
 
-def rig_of_text(text: str, source: str = "rig file", *, check_units: bool = True) -> Rig:
+def rig_of_text(
+    text: str, source: str = "rig file", *, check_units: bool = True, folder: Path | None = None
+) -> Rig:
     """Return the rig that a text declares.
 
     Parameters
@@ -51,6 +54,8 @@ def rig_of_text(text: str, source: str = "rig file", *, check_units: bool = True
         How messages call it.
     check_units
         False for a text whose units are known to add up.
+    folder
+        In which the model of a simulator is looked for.
 
     Raises
     ------
@@ -63,6 +68,8 @@ def rig_of_text(text: str, source: str = "rig file", *, check_units: bool = True
         raise InputError(f"{source}{toml_error(error)}") from None
     except RecursionError:
         raise InputError(f"{source}: is no valid TOML: its arrays are nested too deep.") from None
+    if folder is not None:
+        content = with_whole_path(content, folder)
     return _rig_of(content, value_places(text), source, check_units)
 
 
@@ -110,6 +117,7 @@ def _rig_of(
 
 def _checked(declaration: Declaration, check_units: bool) -> Rig:
     check_declared_names(declaration)
+    check_simulator(declaration)
     check_names_read(declaration)
     order = signal_order(declaration)
     if check_units:

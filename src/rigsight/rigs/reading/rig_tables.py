@@ -85,6 +85,18 @@ class _StateTable(_Table):
     about: Text = ""
 
 
+class SimulatorTable(_Table):
+    """``[simulator]``: another program that moves bodies, its model, and what coordinates and parameters are called there."""
+
+    kind: Text
+    file: Text
+    digest: Text | None = None
+    coordinates: dict[str, Text] = {}
+    parameters: dict[str, Text] = {}
+    rates: dict[str, Text] = {}
+    forces: dict[str, Text] = {}
+
+
 class RigTable(_Table):
     """The whole file."""
 
@@ -96,6 +108,7 @@ class RigTable(_Table):
     alternatives: dict[str, _AlternativeTable] = {}
     coordinates: dict[str, _CoordinateTable] = {}
     energy: _EnergyTable = _EnergyTable()
+    simulator: SimulatorTable | None = None
     joints: dict[str, _JointTable] = {}
     drives: dict[str, _DriveTable] = {}
     sensors: dict[str, _SensorTable] = {}

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import MachineError
+from rigsight.simulate.compiled.simulated_bodies import connect
 from rigsight.simulate.input_hold import HeldInput
 from rigsight.simulate.structure import Structure
 
@@ -83,6 +84,8 @@ class Kernel:
                 f"The compiled kernel {path} cannot be loaded ({error}). "
                 "Its folder must allow programs to be run from it; set RIGSIGHT_CACHE_DIR to one that does."
             ) from error
+        connect(structure, loaded)
+        self._bodies = structure.rig.mechanism.bodies
         self._one = loaded.simulate_one
         self._one.restype = _INT
         self._one.argtypes = [
@@ -152,6 +155,7 @@ class Kernel:
             p.ctypes.data, x.ctypes.data, tolerance, out.ctypes.data, n_samples,
             None if steps is None else steps.ctypes.data,
         )  # fmt: skip
+        self._check_bodies()
         return status, out, x[: state.size]
 
     def simulate_lanes(
@@ -185,6 +189,7 @@ class Kernel:
             c.ctypes.data, c.shape[0] - 1, held.interval, held.per_sample, substeps.ctypes.data, 0.0,
             p.ctypes.data, p.shape[0], n_sets, x.ctypes.data, out.ctypes.data,
         )  # fmt: skip
+        self._check_bodies()
         return out
 
     def normal_equations(self, records: Sequence[FittedRecord], p: Floats, states: Floats) -> Floats:
@@ -219,6 +224,7 @@ class Kernel:
             ctypes.addressof(listed), len(records), p.ctypes.data, p.shape[0], n_sets, x.ctypes.data,
             products.ctypes.data,
         )  # fmt: skip
+        self._check_bodies()
         if failed:
             raise MachineError(f"There is no memory to simulate {n_sets} parameter sets side by side.")
         return products
@@ -289,6 +295,11 @@ class Kernel:
         self._carry([record], p, dp, state[None], dstate, None, out.ctypes.data)
         return out
 
+    def _check_bodies(self) -> None:
+        """Raise what another program reported while the kernel asked it."""
+        if self._bodies is not None:
+            self._bodies.program.check()
+
     def _carry(
         self, records: Sequence[FittedRecord], p: Floats, dp: Floats, states: Floats, dstates: Floats,
         products: int | None, out: int | None,
@@ -304,6 +315,7 @@ class Kernel:
             ctypes.addressof(listed), len(records), p.ctypes.data, dp.ctypes.data, p.size, x.ctypes.data, dx.ctypes.data,
             n_directions, products, out,
         )  # fmt: skip
+        self._check_bodies()
         if failed:
             raise MachineError(f"There is no memory to simulate {n_directions} derivatives side by side.")
 

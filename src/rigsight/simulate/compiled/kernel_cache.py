@@ -1,45 +1,15 @@
-"""Structure -> compiled kernels, kept on disk under the hash of all that their machine code depends on.
-
-A stale kernel is impossible: the name of a library is the hash of its C text, the compiler, its options and the processor. A
-damaged one is found by a checksum before it is loaded, and made anew.
-"""
+"""Structure -> compiled kernels, made once and kept."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import os
-import platform
-import sys
-import tempfile
 import threading
-from functools import cache
-from pathlib import Path
 
-from rigsight.errors import InputError, MachineError
-from rigsight.simulate.compiled.compiler import Compiler, c_compilers, first_library, library_suffix
+from rigsight.libraries import is_kept, library_file
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import kernel_source
+from rigsight.simulate.compiled.simulated_bodies import include_folders
 from rigsight.simulate.structure import Structure
-
-CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
-FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
-"""Options that follow those of the engine and so replace them, to see whether a result depends on them: ``-O1``."""
-# Vectors are written out where they pay; those that a compiler finds by itself in the few states of one set cost a third.
-# No options that let a compiler take numbers for finite or reorder sums: motions beyond the range of numbers are detected, and
-# results are to differ from compiler to compiler by rounding alone.
-OPTIONS = (
-    "-std=gnu11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
-    "-fno-tree-slp-vectorize", "-w",
-)  # fmt: skip
-"""What every compiled model is compiled with; kernels, which stay on this machine, add what its processor can."""
-_OWN_PROCESSOR = {
-    "x86_64": "-march=native",
-    "AMD64": "-march=native",
-    "aarch64": "-mcpu=native",
-    "arm64": "-mcpu=native",
-}
-_CHECKSUM_SIZE = 64
 
 _kernels: dict[str, Kernel] = {}
 _by_identity: dict[int, tuple[Structure, str]] = {}
@@ -48,33 +18,6 @@ _texts: dict[int, tuple[Structure, str]] = {}
 _lock = threading.Lock()
 _made: dict[str, threading.Lock] = {}
 """Who makes a kernel; another one may be compiled at the same time."""
-
-
-def cache_folder() -> Path:
-    """Return where compiled kernels live: $RIGSIGHT_CACHE_DIR, else the platform's place for a user's caches.
-
-    Raises
-    ------
-    InputError
-        If the variable is not set and nobody knows a home folder.
-    """
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen:
-        return Path(chosen)
-    name = {"win32": "LOCALAPPDATA", "darwin": ""}.get(sys.platform, "XDG_CACHE_HOME")
-    base = os.environ.get(name)
-    return (Path(base) if base else _caches_at_home()) / "rigsight" / "kernels"
-
-
-def _caches_at_home() -> Path:
-    inside = {"win32": "AppData/Local", "darwin": "Library/Caches"}.get(sys.platform, ".cache")
-    try:
-        return Path.home() / inside
-    except RuntimeError:
-        # A container that runs under a number without a name.
-        raise InputError(
-            f"There is no home folder to keep compiled kernels in. Set {CACHE_VARIABLE} to a folder that can be written."
-        ) from None
 
 
 def kernel_of(structure: Structure) -> Kernel:
@@ -100,7 +43,7 @@ def kernel_of(structure: Structure) -> Kernel:
         own = _made.setdefault(key, threading.Lock())
     with own:
         if key not in _kernels:
-            _kernels[key] = Kernel(_library_file(text), structure)
+            _kernels[key] = Kernel(library_file(text, include_folders(structure)), structure)
         _by_identity[id(structure)] = (structure, key)
         _texts.pop(id(structure), None)
         return _kernels[key]
@@ -116,7 +59,7 @@ def compiled(structure: Structure) -> bool:
     if _loaded(structure) is not None:
         return True
     text = _text(structure)
-    return any(_sound(_path(text, compiler)) for compiler in c_compilers())
+    return is_kept(text)
 
 
 def _text(structure: Structure) -> str:
@@ -124,81 +67,3 @@ def _text(structure: Structure) -> str:
     if known is None or known[0] is not structure:
         known = _texts[id(structure)] = (structure, kernel_source(structure))
     return known[1]
-
-
-def _library_file(text: str) -> Path:
-    """Return a sound library of a C text, with the first compiler that has or can make one."""
-    for compiler in c_compilers():
-        path = _path(text, compiler)
-        if _sound(path):
-            return path
-    compiler, content = first_library({"kernel.c": text}, kernel_options())
-    path = _path(text, compiler)
-    _write(path, content)
-    return path
-
-
-def kernel_options() -> tuple[str, ...]:
-    """Return what kernels of this machine are compiled with."""
-    own = _OWN_PROCESSOR.get(platform.machine())
-    return (*OPTIONS, *((own,) if own else ()), *os.environ.get(FLAGS_VARIABLE, "").split())
-
-
-def _path(text: str, compiler: Compiler) -> Path:
-    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(kernel_options()), _processor())
-    name = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
-    return cache_folder() / f"{name}{library_suffix()}"
-
-
-@cache
-def _processor() -> str:
-    """Return what tells this processor from others that cannot run its code."""
-    told = f"{platform.machine()} {platform.processor()}"
-    with contextlib.suppress(OSError):
-        first = Path("/proc/cpuinfo").read_text("utf-8", errors="replace").partition("\n\n")[0]
-        names = (
-            "vendor_id",
-            "cpu family",
-            "model",
-            "model name",
-            "stepping",
-            "flags",
-            "Features",
-            "CPU part",
-        )
-        lines = [line for line in first.splitlines() if line.partition(":")[0].strip() in names]
-        told = "\n".join([told, *lines])
-    return told
-
-
-def _sound(path: Path) -> bool:
-    """Return True for a library that is whole: loading a part of one would end the process."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return False
-    body, checksum = content[:-_CHECKSUM_SIZE], content[-_CHECKSUM_SIZE:]
-    return hashlib.sha256(body).hexdigest().encode() == checksum
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Write a library whole or not at all; its checksum stands behind it, where loaders do not look."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-                file.write(hashlib.sha256(content).hexdigest().encode())
-            Path(part).replace(path)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        # Another process was quicker and has it loaded; some systems then let nobody replace it.
-        if _sound(path):
-            return
-        raise MachineError(
-            f"Cannot keep compiled kernels in {path.parent} ({error.strerror}). "
-            f"Set {CACHE_VARIABLE} to a folder that can be written."
-        ) from error

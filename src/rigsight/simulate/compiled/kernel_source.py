@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from rigsight.simulate.compiled.c_functions import filled, template
 from rigsight.simulate.compiled.kernel_equations import KernelEquations
+from rigsight.simulate.compiled.simulated_bodies import bodies_text, lane_bodies_text
 from rigsight.simulate.compiled.tangent_equations import carries_tangents, tangent_fragments
 from rigsight.simulate.structure import Structure
 
@@ -71,13 +72,19 @@ def kernel_source(structure: Structure) -> str:
     text = equations.text("const double *p", [f"p[{i}]" for i in range(len(structure.parameters))])
     head = [
         _ENGINE.format(n_parameters=max(1, len(structure.parameters))),
+        bodies_text(structure),
         text,
         accurate_integrator(equations),
     ]
     if structure.histories:
         return "\n".join([*head, template("one_late.c.txt")])
     tangents = carries_tangents(equations)
-    lanes = {"LANES": str(LANES), "TANGENTS": str(int(tangents)), **equations.lane_fragments()}
+    lanes = {
+        "LANES": str(LANES),
+        "TANGENTS": str(int(tangents)),
+        "LANE_SIMULATED": lane_bodies_text(structure),
+        **equations.lane_fragments(),
+    }
     parts = _LANES_OF_FRICTIONS if equations.has_several_frictions else _LANES
     return "\n".join(
         [

@@ -53,6 +53,15 @@ class CPrinter(PowersAsProducts, C99CodePrinter):  # type: ignore[misc]
     def _print_limited(self, expr: sp.Function) -> str:
         return f"within({', '.join(map(self._print, expr.args))})"
 
+    def _print_simulated(self, expr: sp.Function) -> str:
+        _, index, *arguments = expr.args
+        return f"simulated(0, {int(index)}, (const double[]){{{', '.join(map(self._print, arguments))}}})"
+
+    def _print_simulated_slope(self, expr: sp.Function) -> str:
+        _, index, by, *arguments = expr.args
+        listed = ", ".join(map(self._print, arguments))
+        return f"simulated_slope(0, {int(index)}, {int(by)}, (const double[]){{{listed}}})"
+
 
 class LanePrinter(CPrinter):
     """The same for vectors: every function is the vector's own, with a ``v_`` in front, and takes vectors alone."""
@@ -105,6 +114,16 @@ class LanePrinter(CPrinter):
 
     def _print_limited(self, expr: sp.Function) -> str:
         return self._call("within", *expr.args)
+
+    def _print_simulated(self, expr: sp.Function) -> str:
+        _, index, *arguments = expr.args
+        listed = ", ".join(map(self._vector, arguments))
+        return f"v_simulated({int(index)}, {len(arguments)}, (const lanes[]){{{listed}}})"
+
+    def _print_simulated_slope(self, expr: sp.Function) -> str:
+        _, index, by, *arguments = expr.args
+        listed = ", ".join(map(self._vector, arguments))
+        return f"v_simulated_slope({int(index)}, {int(by)}, {len(arguments)}, (const lanes[]){{{listed}}})"
 
 
 C = Language(CPrinter(), "const double {} = {};", "{} = {};")

@@ -1,0 +1,166 @@
+"""C text -> library, kept on disk under the hash of all that its machine code depends on.
+
+A stale one is impossible: the name of a library is the hash of its C text, the compiler, its options and the processor. A
+damaged one is found by a checksum before it is loaded, and made anew.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from rigsight.errors import InputError, MachineError
+from rigsight.libraries.compiler import Compiler, c_compilers, first_library, library_suffix
+
+CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
+FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
+"""Options that follow those of the engine and so replace them, to see whether a result depends on them: ``-O1``."""
+# Vectors are written out where they pay; those that a compiler finds by itself in the few states of one set cost a third.
+# No options that let a compiler take numbers for finite or reorder sums: motions beyond the range of numbers are detected, and
+# results are to differ from compiler to compiler by rounding alone.
+OPTIONS = (
+    "-std=gnu11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
+    "-fno-tree-slp-vectorize", "-w",
+)  # fmt: skip
+"""What every compiled model is compiled with; kernels, which stay on this machine, add what its processor can."""
+_OWN_PROCESSOR = {
+    "x86_64": "-march=native",
+    "AMD64": "-march=native",
+    "aarch64": "-mcpu=native",
+    "arm64": "-mcpu=native",
+}
+_CHECKSUM_SIZE = 64
+
+
+def cache_folder() -> Path:
+    """Return where compiled kernels live: $RIGSIGHT_CACHE_DIR, else the platform's place for a user's caches.
+
+    Raises
+    ------
+    InputError
+        If the variable is not set and nobody knows a home folder.
+    """
+    chosen = os.environ.get(CACHE_VARIABLE)
+    if chosen:
+        return Path(chosen)
+    name = {"win32": "LOCALAPPDATA", "darwin": ""}.get(sys.platform, "XDG_CACHE_HOME")
+    base = os.environ.get(name)
+    return (Path(base) if base else _caches_at_home()) / "rigsight" / "kernels"
+
+
+def _caches_at_home() -> Path:
+    inside = {"win32": "AppData/Local", "darwin": "Library/Caches"}.get(sys.platform, ".cache")
+    try:
+        return Path.home() / inside
+    except RuntimeError:
+        # A container that runs under a number without a name.
+        raise InputError(
+            f"There is no home folder to keep compiled kernels in. Set {CACHE_VARIABLE} to a folder that can be written."
+        ) from None
+
+
+def library_file(text: str, included: Sequence[str] = ()) -> Path:
+    """Return a sound library of a C text, with the first compiler that has or can make one.
+
+    Parameters
+    ----------
+    text
+        C, which is a library by itself.
+    included
+        Folders of headers that are not the compiler's.
+
+    Raises
+    ------
+    InputError
+        If there is no C compiler.
+    MachineError
+        If the cache folder cannot be written, or the compiler fails.
+    """
+    for compiler in c_compilers():
+        path = _path(text, compiler)
+        if _sound(path):
+            return path
+    compiler, content = first_library(
+        {"kernel.c": text}, (*kernel_options(), *(f"-I{folder}" for folder in included))
+    )
+    path = _path(text, compiler)
+    _write(path, content)
+    return path
+
+
+def is_kept(text: str) -> bool:
+    """Return True if this machine holds a sound library of a C text already."""
+    return any(_sound(_path(text, compiler)) for compiler in c_compilers())
+
+
+def kernel_options() -> tuple[str, ...]:
+    """Return what kernels of this machine are compiled with."""
+    own = _OWN_PROCESSOR.get(platform.machine())
+    return (*OPTIONS, *((own,) if own else ()), *os.environ.get(FLAGS_VARIABLE, "").split())
+
+
+def _path(text: str, compiler: Compiler) -> Path:
+    parts = (text, " ".join(compiler.command), compiler.identity, " ".join(kernel_options()), _processor())
+    name = hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+    return cache_folder() / f"{name}{library_suffix()}"
+
+
+@cache
+def _processor() -> str:
+    """Return what tells this processor from others that cannot run its code."""
+    told = f"{platform.machine()} {platform.processor()}"
+    with contextlib.suppress(OSError):
+        first = Path("/proc/cpuinfo").read_text("utf-8", errors="replace").partition("\n\n")[0]
+        names = (
+            "vendor_id",
+            "cpu family",
+            "model",
+            "model name",
+            "stepping",
+            "flags",
+            "Features",
+            "CPU part",
+        )
+        lines = [line for line in first.splitlines() if line.partition(":")[0].strip() in names]
+        told = "\n".join([told, *lines])
+    return told
+
+
+def _sound(path: Path) -> bool:
+    """Return True for a library that is whole: loading a part of one would end the process."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return False
+    body, checksum = content[:-_CHECKSUM_SIZE], content[-_CHECKSUM_SIZE:]
+    return hashlib.sha256(body).hexdigest().encode() == checksum
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a library whole or not at all; its checksum stands behind it, where loaders do not look."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.write(hashlib.sha256(content).hexdigest().encode())
+            Path(part).replace(path)
+        except BaseException:
+            Path(part).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        # Another process was quicker and has it loaded; some systems then let nobody replace it.
+        if _sound(path):
+            return
+        raise MachineError(
+            f"Cannot keep compiled kernels in {path.parent} ({error.strerror}). "
+            f"Set {CACHE_VARIABLE} to a folder that can be written."
+        ) from error

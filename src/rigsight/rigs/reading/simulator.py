@@ -1,0 +1,98 @@
+"""What does a rig file leave to another program? Its bodies, by what they are called there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigsight.errors import InputError, nearest
+from rigsight.rigs.reading.declaration import Declaration
+from rigsight.simulators import KINDS, Bodies
+from rigsight.simulators.bodies import file_digest
+
+_KEY = "simulator"
+
+
+def check_simulator(declaration: Declaration) -> None:
+    """Refuse a simulator of an unknown kind, and names in its table that are not declared.
+
+    Raises
+    ------
+    InputError
+        With the place of the name.
+    """
+    table, own = declaration.table, declaration.table.simulator
+    if own is None:
+        return
+    if own.kind not in KINDS:
+        declaration.refuse(
+            (_KEY, "kind"),
+            f"'{own.kind}' is no simulator.{nearest(own.kind, KINDS)} Allowed: {', '.join(KINDS)}",
+        )
+    free = [name for name, coordinate in table.coordinates.items() if coordinate.prescribed_by is None]
+    if len(free) < len(table.coordinates) or not free:
+        declaration.refuse(
+            (_KEY,), "every coordinate of a simulated rig is a degree of freedom; take out prescribed_by"
+        )
+    for key in ("coordinates", "rates", "forces"):
+        for name in getattr(own, key):
+            if name not in free:
+                declaration.refuse(
+                    (_KEY, key, name),
+                    f"there is no coordinate '{name}'.{nearest(name, free)} Declared: {', '.join(free)}",
+                )
+    numbers = declaration.names("constants", "parameters")
+    for name in own.parameters:
+        if name not in numbers:
+            declaration.refuse(
+                (_KEY, "parameters", name),
+                f"'{name}' is no constant and no parameter of this file.{nearest(name, numbers)} Declare it",
+            )
+
+
+def simulated_bodies(declaration: Declaration) -> Bodies | None:
+    """Return the bodies that a rig file leaves to another program, or None; the program is opened to see that it has them.
+
+    Raises
+    ------
+    InputError
+        With the place of the simulator's file, if it or a name in it cannot be found.
+    """
+    table, own = declaration.table, declaration.table.simulator
+    if own is None:
+        return None
+    free = list(table.coordinates)
+    is_file = own.kind != "python"
+    try:
+        bodies = Bodies(
+            own.kind,
+            own.file,
+            (own.digest or file_digest(Path(own.file))) if is_file else "",
+            tuple(own.coordinates.get(name, name) for name in free),
+            tuple(own.parameters.values()),
+            *(
+                tuple(table.get(name, "") for name in free) if table else ()
+                for table in (own.rates, own.forces)
+            ),
+        )
+        _ = bodies.program
+    except InputError as error:
+        declaration.refuse((_KEY, "file"), str(error).removesuffix("."))
+    return bodies
+
+
+def with_whole_path(content: dict[str, object], folder: Path) -> dict[str, object]:
+    """Return the tables of a rig file with the simulator's model by its absolute path, so that results find it.
+
+    Parameters
+    ----------
+    content
+        The tables.
+    folder
+        Of the rig file.
+    """
+    own = content.get(_KEY)
+    if not isinstance(own, dict) or own.get("kind") == "python" or not isinstance(own.get("file"), str):
+        return content
+    path = (folder / str(own["file"])).resolve()
+    digest = {"digest": file_digest(path)} if path.is_file() else {}
+    return {**content, _KEY: {**own, "file": path.as_posix(), **digest}}

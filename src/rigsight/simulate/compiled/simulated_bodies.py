@@ -1,0 +1,34 @@
+"""What another program computes of a rig, as C functions that its equations call."""
+
+from __future__ import annotations
+
+import ctypes
+from importlib.resources import files
+
+from rigsight.simulate.structure import Structure
+
+
+def bodies_text(structure: Structure) -> str:
+    """Return the C text of a structure's simulated bodies; nothing where there are none."""
+    bodies = structure.rig.mechanism.bodies
+    return "" if bodies is None else bodies.c_text
+
+
+def lane_bodies_text(structure: Structure) -> str:
+    """Return the same for parameter sets side by side."""
+    if structure.rig.mechanism.bodies is None:
+        return ""
+    return files("rigsight.simulators").joinpath("templates", "lane_simulated.c.txt").read_text("utf-8")
+
+
+def include_folders(structure: Structure) -> tuple[str, ...]:
+    """Return the folders of the headers that `bodies_text` includes."""
+    bodies = structure.rig.mechanism.bodies
+    return () if bodies is None else bodies.program.include_folders
+
+
+def connect(structure: Structure, library: ctypes.CDLL) -> None:
+    """Give a loaded kernel what it asks another program with."""
+    bodies = structure.rig.mechanism.bodies
+    if bodies is not None:
+        bodies.program.connect(library)

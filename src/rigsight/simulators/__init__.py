@@ -1,0 +1,16 @@
+"""Bodies that another program simulates: their inertia and the forces between them, as leaves of a rig's equations."""
+
+from rigsight.simulators.bodies import KINDS, Bodies, bodies_of
+from rigsight.simulators.leaf import force_leaf, mass_leaf, simulated, simulated_slope
+from rigsight.simulators.python_program import give_function
+
+__all__ = [
+    "KINDS",
+    "Bodies",
+    "bodies_of",
+    "force_leaf",
+    "give_function",
+    "mass_leaf",
+    "simulated",
+    "simulated_slope",
+]

@@ -1,0 +1,237 @@
+"""Which bodies does another program simulate, by what names, and what can it be asked?
+
+``M(q, p) q'' = f + h(q, q', f, p)``: the program gives the mass matrix M and the force h of weight, gyration and whatever else it
+has between and on the bodies; f are the forces of the rig's drives and joints. Numbers p are parameters of its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.libraries import library_file
+
+Floats = NDArray[np.float64]
+
+STEP = 1e-6
+"""Step of a difference, relative to what is moved or in its SI unit: rounding and curvature both leave 1e-6 or less."""
+KINDS = ("mujoco", "fmu", "python")
+"""Programs that can be asked."""
+
+
+class Program(Protocol):
+    """A program that is open."""
+
+    @property
+    def reads_forces(self) -> bool:
+        """Whether h depends on f, as it does with contacts and other constraints."""
+
+    @property
+    def c_text(self) -> str:
+        """C functions ``bodies_mass`` and ``bodies_force`` of the arguments of a leaf, and ``connect``."""
+
+    @property
+    def include_folders(self) -> tuple[str, ...]:
+        """Folders of the headers that `c_text` includes."""
+
+    def connect(self, library: ctypes.CDLL) -> None:
+        """Give a library that holds `c_text` what it asks the program with."""
+
+    def check(self) -> None:
+        """Raise what went wrong while it was asked from C.
+
+        Raises
+        ------
+        InputError
+            If something did.
+        """
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What another program simulates of a rig.
+
+    Attributes
+    ----------
+    kind
+        One of `KINDS`.
+    file
+        Absolute path of its model; of Python, how messages call the object.
+    digest
+        Hash of the file: another file is another rig.
+    coordinates
+        What the rig's degrees of freedom are called there, in their order.
+    parameters
+        What parameters and constants of the rig are called there, in the order of the rig's.
+    rates, forces
+        Of an FMU, the names of the states that are rates of the coordinates, and of the inputs that are forces along them.
+    """
+
+    kind: str
+    file: str
+    digest: str
+    coordinates: tuple[str, ...]
+    parameters: tuple[str, ...] = ()
+    rates: tuple[str, ...] = ()
+    forces: tuple[str, ...] = ()
+
+    @cached_property
+    def key(self) -> int:
+        """A number that no other bodies have: sympy and C can carry it."""
+        key = int(hashlib.sha256(repr(self).encode()).hexdigest()[:12], 16)
+        _known.setdefault(key, self)
+        return key
+
+    @property
+    def n(self) -> int:
+        """Number of degrees of freedom."""
+        return len(self.coordinates)
+
+    @cached_property
+    def c_text(self) -> str:
+        """C functions ``simulated`` and ``simulated_slope``, which ask the program and remember its last answers."""
+        text = files("rigsight.simulators").joinpath("templates", "simulated.c.txt").read_text("utf-8")
+        fragments = {
+            "KEY": str(self.key),
+            "N": str(self.n),
+            "P": str(len(self.parameters)),
+            "GIVEN": str(self.n_given),
+            "STEP": repr(STEP),
+            "PROGRAM": self.program.c_text,
+        }
+        for key, fragment in fragments.items():
+            text = text.replace(f"<<{key}>>", fragment)
+        return text
+
+    @property
+    def n_given(self) -> int:
+        """What a force goes with, for each degree of freedom: coordinate and rate, and the rig's own force if it counts."""
+        return 3 if self.program.reads_forces else 2
+
+    @cached_property
+    def answers(self) -> Answers:
+        """The program, asked for numbers."""
+        return Answers(self)
+
+    @cached_property
+    def program(self) -> Program:
+        """The program, opened once.
+
+        Raises
+        ------
+        InputError
+            If it is not installed, or its model cannot be read or lacks a name.
+        """
+        if self.digest and file_digest(Path(self.file)) != self.digest:
+            raise InputError(
+                f"{self.file} has changed since this rig was read; its numbers belong to another model."
+            )
+        program: Program = _openers()[self.kind](self)
+        return program
+
+
+class Answers:
+    """Numbers of bodies at many places, by a library of their own.
+
+    Parameters
+    ----------
+    bodies
+        What is simulated elsewhere.
+
+    Raises
+    ------
+    MachineError
+        If the library cannot be compiled or loaded.
+    """
+
+    def __init__(self, bodies: Bodies) -> None:
+        self._bodies = bodies
+        folders = bodies.program.include_folders
+        library = ctypes.CDLL(str(library_file(f"{_HEAD}{bodies.c_text}{_ANSWERS}", folders)))
+        bodies.program.connect(library)
+        self._answer = library.answer
+        self._answer.restype = None
+        self._answer.argtypes = [ctypes.c_int, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+
+    def at(self, arguments: Floats, *, is_force: bool) -> Floats:
+        """Return the lower half of the mass matrix, or the forces, shape (n_values, n_places).
+
+        Parameters
+        ----------
+        arguments
+            Those of a leaf, shape (n_arguments, n_places).
+        is_force
+            Which of the two.
+
+        Raises
+        ------
+        InputError
+            If the program fails.
+        """
+        n = self._bodies.n
+        places = np.ascontiguousarray(arguments.T, dtype=np.float64)
+        found = np.empty((places.shape[0], n if is_force else n * (n + 1) // 2))
+        self._answer(int(is_force), places.shape[0], places.ctypes.data, found.ctypes.data)
+        self._bodies.program.check()
+        return np.ascontiguousarray(found.T)
+
+
+_HEAD = """#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+"""
+_ANSWERS = """
+EXPORT void answer(int is_force, long count, const double *a, double *value) {
+    double mass[BODIES_MASSES];
+    long i;
+    for (i = 0; i < count; i++) {
+        if (is_force) bodies_force(a + i * BODIES_FORCE_ARGUMENTS, value + i * BODIES_N, mass);
+        else bodies_mass(a + i * BODIES_MASS_ARGUMENTS, value + i * BODIES_MASSES);
+    }
+}
+"""
+
+_known: dict[int, Bodies] = {}
+"""Bodies by their key, of which numbers alone stand in equations."""
+
+
+def bodies_of(key: int) -> Bodies:
+    """Return the bodies of a key."""
+    return _known[key]
+
+
+def file_digest(path: Path) -> str:
+    """Return the hash of a model's file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _openers() -> dict[str, Callable[[Bodies], Any]]:
+    from rigsight.simulators.fmu_program import FmuProgram
+    from rigsight.simulators.mujoco_program import MujocoProgram
+    from rigsight.simulators.python_program import PythonProgram
+
+    return {"mujoco": MujocoProgram, "fmu": FmuProgram, "python": PythonProgram}

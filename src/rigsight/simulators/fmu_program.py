@@ -1,0 +1,176 @@
+"""Bodies of an FMU for Model Exchange (FMI 2 and 3): it gives rates of its states, and takes forces along coordinates.
+
+FMI 2.0.5 (2024) and 3.0.2 (2024), Model Exchange: modelica-association.org.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import shutil
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from rigsight.errors import InputError, nearest
+from rigsight.simulators.bodies import Bodies
+
+_FUNCTIONS = {
+    "2": (
+        "Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode", "ExitInitializationMode",
+        "NewDiscreteStates", "EnterContinuousTimeMode", "SetReal", "SetContinuousStates", "GetDerivatives",
+    ),
+    "3": (
+        "InstantiateModelExchange", "FreeInstance", "EnterInitializationMode", "ExitInitializationMode",
+        "UpdateDiscreteStates", "EnterContinuousTimeMode", "SetFloat64", "SetContinuousStates", "GetContinuousStateDerivatives",
+    ),
+}  # fmt: skip
+"""What the C text calls, in the order of its table."""
+
+
+class _Told(ctypes.Structure):
+    """``fmu_told`` of the C text."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p), ("token", ctypes.c_char_p), ("resources", ctypes.c_char_p),
+        ("places", ctypes.c_void_p), ("forces", ctypes.c_void_p), ("parameters", ctypes.c_void_p),
+        ("failed", ctypes.c_void_p),
+    )  # fmt: skip
+
+
+class FmuProgram:
+    """An open FMU.
+
+    Parameters
+    ----------
+    bodies
+        Its file, and the names of states, of the inputs that take forces, and of parameters.
+
+    Attributes
+    ----------
+    reads_forces
+        False: forces enter accelerations linearly, as those of mechanics without contacts do.
+
+    Raises
+    ------
+    InputError
+        If FMPy is not installed, or the FMU is not for Model Exchange, not for this machine, or lacks a name.
+    """
+
+    reads_forces = False
+
+    def __init__(self, bodies: Bodies) -> None:
+        self._file = bodies.file
+        try:
+            from fmpy import extract, platform, read_model_description, sharedLibraryExtension
+        except ImportError:
+            raise InputError("Simulations by an FMU need FMPy: pip install 'rigsight[fmu]'.") from None
+        try:
+            description = read_model_description(bodies.file)
+        except Exception as error:
+            raise InputError(f"{bodies.file} is no FMU that FMPy reads: {error}") from None
+        if description.modelExchange is None:
+            raise InputError(
+                f"{bodies.file} is an FMU for Co-Simulation alone. Effects act while it moves, so its rates are asked for: "
+                "export it for Model Exchange."
+            )
+        self._version = description.fmiVersion[0]
+        self._variables = {variable.name: variable for variable in description.modelVariables}
+        states = [unknown.variable.derivative.name for unknown in description.derivatives]
+        rates = bodies.rates
+        self._places = [self._state(name, states) for name in (*bodies.coordinates, *rates)]
+        others = [state for index, state in enumerate(states) if index not in self._places]
+        if others:
+            raise InputError(
+                f"{bodies.file} has states that are no coordinate and no rate of the rig: {', '.join(others)}. "
+                "Name them in [simulator.coordinates] and [simulator.rates], or leave them out of the FMU."
+            )
+        self._forces = [self._reference(name, "input", "[simulator.forces]") for name in bodies.forces]
+        self._parameters = [
+            self._reference(name, "parameter", "[simulator.parameters]") for name in bodies.parameters
+        ]
+        folder = extract(bodies.file)
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+        identifier = description.modelExchange.modelIdentifier
+        found = sorted(Path(folder).glob(f"binaries/*/{identifier}{sharedLibraryExtension}"))
+        own = [path for path in found if path.parent.name in (platform, _platform_of_3())]
+        if not own:
+            raise InputError(f"{bodies.file} holds no binary for this machine ({platform}).")
+        try:
+            self._library = ctypes.CDLL(str(own[0]))
+        except OSError as error:
+            raise InputError(f"{bodies.file}: its binary cannot be loaded: {error}") from None
+        resources = Path(folder) / "resources"
+        where = resources.as_uri() if self._version == "2" else f"{resources}/"
+        self._failed = ctypes.c_int(0)
+        self._strings = [
+            text.encode() for text in (identifier, description.guid or description.instantiationToken, where)
+        ]
+        self._n_states = len(states)
+        self._kept: list[Any] = []
+
+    def _state(self, name: str, states: list[str]) -> int:
+        if name not in states:
+            raise InputError(
+                f"{self._file} has no state '{name}'.{nearest(name, states)} States: {', '.join(states)}."
+            )
+        return states.index(name)
+
+    def _reference(self, name: str, causality: str, table: str) -> int:
+        known = [own for own, variable in self._variables.items() if variable.causality == causality]
+        if name not in known:
+            what = f"has no {causality} '{name}'" if name else f"needs a force for each coordinate in {table}"
+            raise InputError(
+                f"{self._file} {what}.{nearest(name, known)} It has: {', '.join(known) or 'none'}."
+            )
+        return int(self._variables[name].valueReference)
+
+    @property
+    def c_text(self) -> str:
+        """See `Program.c_text`."""
+        folder = files("rigsight.simulators").joinpath("templates")
+        text = folder.joinpath("fmu.c.txt").read_text("utf-8") + folder.joinpath("probed.c.txt").read_text(
+            "utf-8"
+        )
+        return text.replace("<<VERSION>>", self._version).replace("<<STATES>>", str(self._n_states))
+
+    @property
+    def include_folders(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def connect(self, library: ctypes.CDLL) -> None:
+        """See `Program.connect`."""
+        names = [f"fmi{self._version}{name}" for name in _FUNCTIONS[self._version]]
+        try:
+            addresses = [ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value for name in names]
+        except AttributeError as error:
+            raise InputError(f"{self._file}: its binary lacks a function of FMI: {error}") from None
+        table = (ctypes.c_void_p * len(addresses))(*addresses)
+        places = (ctypes.c_int * len(self._places))(*self._places)
+        forces = (ctypes.c_uint * len(self._forces))(*self._forces)
+        parameters = (ctypes.c_uint * max(1, len(self._parameters)))(*self._parameters)
+        told = _Told(
+            *self._strings,
+            *(ctypes.addressof(array) for array in (places, forces, parameters)),
+            ctypes.addressof(self._failed),
+        )
+        library.connect.restype = None
+        library.connect(table, ctypes.byref(told))
+        # The library keeps the addresses.
+        self._kept.append((table, places, forces, parameters, told))
+
+    def check(self) -> None:
+        """See `Program.check`."""
+        if self._failed.value:
+            status, self._failed.value = self._failed.value, 0
+            raise InputError(f"{self._file}: the FMU failed with status {status} of FMI.")
+
+
+def _platform_of_3() -> str:
+    """Return how FMI 3 calls this machine: ``x86_64-linux``."""
+    import platform
+
+    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    system = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}.get(platform.system(), "")
+    return f"{machine}-{system}"

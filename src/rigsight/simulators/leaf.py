@@ -1,0 +1,134 @@
+"""What another program computes, as functions in symbolic equations that have derivatives and numbers."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from rigsight.simulators.bodies import STEP, Bodies, bodies_of
+
+Floats = NDArray[np.float64]
+
+_MOST_REMEMBERED = 16
+
+_lock = threading.Lock()
+_remembered: OrderedDict[tuple[Any, ...], Floats] = OrderedDict()
+"""Values by what they were computed of: each entry of a mass matrix asks for the same."""
+
+
+class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """``simulated(key, index, *arguments)``: see `mass_leaf` and `force_leaf`."""
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """Return the slope by one of the arguments."""
+        key, index, *arguments = self.args
+        if argindex < 3:
+            return sp.Integer(0)
+        return simulated_slope(key, index, sp.Integer(argindex - 3), *arguments)
+
+    @staticmethod
+    def _imp_(key: Any, index: Any, *arguments: Any) -> Any:
+        return _shaped(_values(int(key), _is_force(key, index), arguments)[_row(key, index)], arguments)
+
+
+class simulated_slope(sp.Function):  # type: ignore[misc]  # noqa: N801
+    """``simulated_slope(key, index, argument, *arguments)``: its derivative by one argument; how that changes is left out."""
+
+    is_real = True
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:  # noqa: ARG002
+        """Return zero: only first derivatives are asked for."""
+        return sp.Integer(0)
+
+    @staticmethod
+    def _imp_(key: Any, index: Any, by: Any, *arguments: Any) -> Any:
+        by = int(by)
+        here = np.asarray(arguments[by], dtype=np.float64)
+        step = STEP * np.maximum(np.abs(here), 1.0)
+        moved = [*arguments[:by], here + step, *arguments[by + 1 :]]
+        before, behind = (
+            _values(int(key), _is_force(key, index), own)[_row(key, index)] for own in (arguments, moved)
+        )
+        return _shaped((behind - before) / step, arguments)
+
+
+def mass_leaf(bodies: Bodies, row: int, column: int, q: Sequence[sp.Expr], p: Sequence[sp.Expr]) -> sp.Expr:
+    """Return an entry of the mass matrix.
+
+    Parameters
+    ----------
+    bodies
+        What is simulated elsewhere.
+    row, column
+        Of the entry.
+    q, p
+        Coordinates and parameters.
+    """
+    i, j = max(row, column), min(row, column)
+    return simulated(sp.Integer(bodies.key), sp.Integer(i * (i + 1) // 2 + j), *q, *p)
+
+
+def force_leaf(
+    bodies: Bodies,
+    row: int,
+    q: Sequence[sp.Expr],
+    v: Sequence[sp.Expr],
+    f: Sequence[sp.Expr],
+    p: Sequence[sp.Expr],
+) -> sp.Expr:
+    """Return the force along a coordinate that the bodies' weight, gyration and constraints put on it.
+
+    Parameters
+    ----------
+    bodies
+        What is simulated elsewhere.
+    row
+        Number of the coordinate.
+    q, v, f, p
+        Coordinates, rates, forces of drives and joints, and parameters; f is read only where bodies touch or are bound.
+    """
+    index = sp.Integer(bodies.n * (bodies.n + 1) // 2 + row)
+    return simulated(sp.Integer(bodies.key), index, *q, *v, *(f if bodies.program.reads_forces else ()), *p)
+
+
+def _n_mass(key: Any) -> int:
+    n = bodies_of(int(key)).n
+    return n * (n + 1) // 2
+
+
+def _is_force(key: Any, index: Any) -> bool:
+    return int(index) >= _n_mass(key)
+
+
+def _row(key: Any, index: Any) -> int:
+    return int(index) - (_n_mass(key) if _is_force(key, index) else 0)
+
+
+def _shaped(values: Floats, arguments: Sequence[Any]) -> Any:
+    shape = np.broadcast_shapes(*(np.shape(argument) for argument in arguments))
+    return values.reshape(shape) if shape else float(values[0])
+
+
+def _values(key: int, is_force: bool, arguments: Sequence[Any]) -> Floats:
+    """Return the lower half of the mass matrix, or the forces, shape (n_values, n_points)."""
+    columns = np.atleast_2d(
+        np.stack(np.broadcast_arrays(*(np.asarray(a, dtype=np.float64).ravel() for a in arguments)))
+    )
+    asked = (key, is_force, columns.shape, columns.tobytes())
+    with _lock:
+        if asked in _remembered:
+            _remembered.move_to_end(asked)
+            return _remembered[asked]
+        found = bodies_of(key).answers.at(columns, is_force=is_force)
+        _remembered[asked] = found
+        if len(_remembered) > _MOST_REMEMBERED:
+            _remembered.popitem(last=False)
+        return found

@@ -1,0 +1,224 @@
+"""Bodies of a MuJoCo model, with its contacts, limits, equalities and tendons; joints and actuators are the rig's own."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError, nearest
+from rigsight.simulators.bodies import Bodies
+
+if TYPE_CHECKING:
+    import mujoco
+
+Floats = NDArray[np.float64]
+
+_FUNCTIONS = (
+    "mj_copyModel", "mj_makeData", "mj_setConst", "mj_kinematics", "mj_comPos", "mj_makeM", "mj_fullM",
+    "mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint",
+    "mj_comVel", "mj_passive", "mj_rne",
+)  # fmt: skip
+"""What the C text calls, in the order of its table."""
+_OBJECTS = {
+    "body": "nbody",
+    "jnt": "njnt",
+    "dof": "nv",
+    "geom": "ngeom",
+    "tendon": "ntendon",
+    "eq": "neq",
+    "pair": "npair",
+}
+"""Beginnings of the fields of a model whose rows have names."""
+
+
+class MujocoProgram:
+    """An open MuJoCo model.
+
+    Parameters
+    ----------
+    bodies
+        Its file, and the names of joints and fields.
+
+    Raises
+    ------
+    InputError
+        If MuJoCo is not installed, cannot read the file, or has no such joint or field.
+    """
+
+    def __init__(self, bodies: Bodies) -> None:
+        self._bodies = bodies
+        self._model = bodies_alone(opened(Path(bodies.file)))
+        self._places = [self._coordinate(name) for name in bodies.coordinates]
+        if len(self._places) != self._model.nv:
+            others = [self._model.joint(i).name for i in range(self._model.njnt)]
+            raise InputError(
+                f"{bodies.file} moves by {self._model.nv} coordinates, and the rig names {len(self._places)} of them. "
+                f"Joints: {', '.join(others)}."
+            )
+        self._fields = [self._field(name) for name in bodies.parameters]
+        self.reads_forces = has_constraints(self._model)
+        """Whether bodies can touch, or joints, tendons and equalities are bound."""
+        model = self._model
+        self._is_plain = not (self.reads_forces or model.ntendon or model.nflex or model.nplugin)
+
+    def _coordinate(self, name: str) -> tuple[int, int]:
+        import mujoco
+
+        index = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_JOINT, name)
+        known = [self._model.joint(i).name for i in range(self._model.njnt)]
+        if index < 0:
+            raise InputError(
+                f"{self._bodies.file} has no joint '{name}'.{nearest(name, known)} Joints: {', '.join(known)}."
+            )
+        if int(self._model.jnt_type[index]) not in (
+            int(mujoco.mjtJoint.mjJNT_HINGE),
+            int(mujoco.mjtJoint.mjJNT_SLIDE),
+        ):
+            raise InputError(
+                f"{self._bodies.file}: joint '{name}' is no hinge and no slide; a coordinate is one of these."
+            )
+        return int(self._model.jnt_qposadr[index]), int(self._model.jnt_dofadr[index])
+
+    def _field(self, name: str) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+        """Return the array of a field, and the place in it: of ``body_ipos hand 2`` the row of the body, and 2."""
+        wanted = (
+            f"{self._bodies.file}: '{name}' is no number of the model. Write a field, the name of what has it, and of a vector "
+            "the number of the entry from 0: 'body_mass hand', 'body_ipos hand 2'."
+        )
+        words = name.split()
+        field = (
+            getattr(self._model, words[0], None) if words and re.fullmatch(r"[a-z]+_\w+", words[0]) else None
+        )
+        kind = words[0].partition("_")[0] if words else ""
+        if (
+            not isinstance(field, np.ndarray)
+            or field.dtype != np.float64
+            or kind not in _OBJECTS
+            or len(words) < 2
+        ):
+            raise InputError(wanted)
+        accessor = getattr(self._model, {"eq": "equality", "jnt": "joint", "dof": "joint"}.get(kind, kind))
+        try:
+            own = accessor(words[1])
+            row = int(own.dofadr[0]) if kind == "dof" else int(own.id)
+            place = (row, *map(int, words[2:]))
+            if np.ndim(field[place]) != 0:
+                raise InputError(wanted)
+        except (KeyError, IndexError, ValueError) as error:
+            raise InputError(f"{wanted} MuJoCo: {error}") from None
+        return field, place
+
+    @property
+    def c_text(self) -> str:
+        """See `Program.c_text`."""
+        import mujoco
+
+        text = files("rigsight.simulators").joinpath("templates", "mujoco.c.txt").read_text("utf-8")
+        text = text.replace("<<VERSION>>", mujoco.__version__)
+        for key, flag in {"<<CONSTRAINED>>": self.reads_forces, "<<PLAIN>>": self._is_plain}.items():
+            text = text.replace(key, str(int(flag)))
+        return text
+
+    @property
+    def include_folders(self) -> tuple[str, ...]:
+        """See `Program.include_folders`."""
+        return ((Path(_package_file()).parent / "include").as_posix(),)
+
+    def connect(self, library: ctypes.CDLL) -> None:
+        """See `Program.connect`."""
+        mujoco_library = ctypes.CDLL(_library())
+        functions = [ctypes.cast(getattr(mujoco_library, name), ctypes.c_void_p).value for name in _FUNCTIONS]
+        origin = self._model.qpos0.ctypes.data
+        offsets = [_address(field, place) - origin for field, place in self._fields]
+        table = (ctypes.c_void_p * len(_FUNCTIONS))(*functions)
+        places = (ctypes.c_int * (2 * len(self._places)))(*(i for place in self._places for i in place))
+        moved = (ctypes.c_long * max(1, len(offsets)))(*offsets)
+        library.connect.restype = None
+        library.connect(table, ctypes.c_void_p(self._model._address), places, moved)
+        # The library keeps the addresses.
+        self._kept = (*getattr(self, "_kept", ()), table, places, moved, mujoco_library)
+
+    def check(self) -> None:
+        """Nothing can go wrong: MuJoCo warns, and goes on."""
+
+
+def opened(path: Path) -> mujoco.MjModel:
+    """Return a model.
+
+    Raises
+    ------
+    InputError
+        If MuJoCo is not installed or cannot read the file.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("Simulations by MuJoCo need it: pip install 'rigsight[mujoco]'.") from None
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise InputError(f"{path}: MuJoCo cannot read it: {error}") from None
+
+
+def bodies_alone(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a model without what the rig says itself: dampers, springs and dry friction of joints, and actuators.
+
+    Parameters
+    ----------
+    model
+        It is changed.
+    """
+    import mujoco
+
+    model.dof_damping[:] = 0.0
+    if not has_constraints(model):
+        model.dof_armature[:] = 0.0
+    model.dof_frictionloss[:] = 0.0
+    model.jnt_stiffness[:] = 0.0
+    for name in ("dof_dampingpoly", "jnt_stiffnesspoly"):
+        if hasattr(model, name):
+            getattr(model, name)[:] = 0.0
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    return model
+
+
+def has_constraints(model: mujoco.MjModel) -> bool:
+    """Return True for a model in which bodies can touch, or joints, tendons and equalities are bound."""
+    import mujoco
+
+    off = mujoco.mjtDisableBit
+    flags = int(model.opt.disableflags)
+    if flags & int(off.mjDSBL_CONSTRAINT):
+        return False
+    touches = bool(np.any(model.geom_contype) and np.any(model.geom_conaffinity)) or model.npair > 0
+    return bool(
+        (touches and not flags & int(off.mjDSBL_CONTACT))
+        or (np.any(model.jnt_limited) and not flags & int(off.mjDSBL_LIMIT))
+        or (np.any(model.tendon_limited) and not flags & int(off.mjDSBL_LIMIT))
+        or np.any(model.tendon_frictionloss)
+        or (model.neq > 0 and not flags & int(off.mjDSBL_EQUALITY))
+    )
+
+
+def _address(field: NDArray[np.float64], place: tuple[int, ...]) -> int:
+    return int(field.ctypes.data) + sum(int(s) * i for s, i in zip(field.strides, place, strict=True))
+
+
+def _package_file() -> str:
+    import mujoco
+
+    return str(mujoco.__file__)
+
+
+def _library() -> str:
+    folder = Path(_package_file()).parent
+    found = sorted(p for pattern in ("libmujoco*", "mujoco.dll") for p in folder.glob(pattern))
+    if not found:
+        raise InputError(f"The library of MuJoCo was not found in {folder}.")
+    return str(found[0])

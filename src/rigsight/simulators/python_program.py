@@ -1,0 +1,107 @@
+"""Bodies of a function of Python that gives accelerations: named on the command line or in code, never by a campaign alone."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from rigsight.errors import InputError
+from rigsight.simulators.bodies import Bodies
+
+Accelerations = Callable[..., Any]
+"""``accelerations(q, v, forces, parameters)``: coordinates, rates and forces along coordinates, shape (n,) each, and parameters
+by name -> accelerations, shape (n,). Forces enter linearly."""
+
+_given: dict[str, Accelerations] = {}
+_DOUBLES = ctypes.POINTER(ctypes.c_double)
+_CALL = ctypes.CFUNCTYPE(None, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
+
+
+def give_function(name: str, accelerations: Accelerations) -> None:
+    """Let rigs whose simulator is called so be simulated by a function.
+
+    Parameters
+    ----------
+    name
+        What a rig file calls it: ``file = "arm"`` beside ``kind = "python"``.
+    accelerations
+        See `Accelerations`.
+    """
+    _given[name] = accelerations
+
+
+class PythonProgram:
+    """A function of Python.
+
+    Parameters
+    ----------
+    bodies
+        What it is called, and what parameters are called in it.
+
+    Attributes
+    ----------
+    reads_forces
+        False: forces enter accelerations linearly.
+
+    Raises
+    ------
+    InputError
+        If no such function was given.
+    """
+
+    reads_forces = False
+
+    def __init__(self, bodies: Bodies) -> None:
+        if bodies.file not in _given:
+            raise InputError(
+                f"the simulator '{bodies.file}' is a function of Python, and a rig file runs no code. Name it: "
+                "--simulator FILE.py:FUNCTION, or rigsight.simulators.give_function in Python."
+            )
+        self._bodies = bodies
+        self._error: BaseException | None = None
+        self._call = _CALL(self._answer)
+
+    def _answer(self, q: Any, v: Any, f: Any, p: Any, a: Any) -> None:
+        bodies = self._bodies
+        n, numbers = bodies.n, dict(zip(bodies.parameters, p[: len(bodies.parameters)], strict=True))
+        own = [np.ctypeslib.as_array(values, (n,)).copy() for values in (q, v, f)]
+        try:
+            found = np.asarray(_given[bodies.file](*own, numbers), dtype=np.float64)
+            if found.shape != (n,):
+                raise ValueError(f"it returned the shape {found.shape}, wanted is ({n},)")
+        # What a user's function raises would vanish in C; `check` raises it.
+        except Exception as error:
+            self._error = error
+            found = np.full(n, np.nan)
+        for i in range(n):
+            a[i] = found[i]
+
+    @property
+    def c_text(self) -> str:
+        """See `Program.c_text`."""
+        folder = files("rigsight.simulators").joinpath("templates")
+        return folder.joinpath("function.c.txt").read_text("utf-8") + folder.joinpath(
+            "probed.c.txt"
+        ).read_text("utf-8")
+
+    @property
+    def include_folders(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def connect(self, library: ctypes.CDLL) -> None:
+        """See `Program.connect`."""
+        library.connect.restype = None
+        library.connect(self._call)
+
+    def check(self) -> None:
+        """See `Program.check`."""
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise InputError(
+                f"The simulator '{self._bodies.file}' failed: {type(error).__name__}: {error}"
+            ) from error

@@ -1,0 +1,200 @@
+"""Rigs that MuJoCo, an FMU or a function of Python moves: do they move as the same equations do that rigsight derives?"""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from rigsight.effects import effect_named
+from rigsight.errors import InputError
+from rigsight.records import Record
+from rigsight.rigs import read_rig_file, rig_of_tables
+from rigsight.rigs.reading.rig_file import rig_of_text
+from rigsight.simulate import compose, parameter_vector, record_input, simulate, simulate_sets
+from rigsight.simulate.side_by_side import simulate_tangents
+from rigsight.simulators import give_function
+
+_SPEC = importlib.util.spec_from_file_location("cart_pendulum", Path(__file__).parent / "cart_pendulum.py")
+cart = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(cart)
+
+DT, N = 0.005, 400
+VALUES = {"m_p": 0.23, "k_u": 2.1, "d_c": 1.4, "k_c": 26.0, "d_p": 0.005}
+WAYS = ("mujoco", "fmu 2.0", "fmu 3.0", "python")
+
+
+def record(n: int = N) -> Record:
+    t = DT * np.arange(n)
+    return Record("sweep", DT, {"u": 3.0 * np.sin(2 * np.pi * (0.5 + 0.5 * t) * t)}, {"u": "V"}, hold="foh")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("simulators")
+
+
+def rig_of(way: str, folder: Path):
+    file = folder / f"{way.replace(' ', '_')}.toml"
+    kind, _, version = way.partition(" ")
+    if kind == "native":
+        text = cart.NATIVE
+    elif kind == "mujoco":
+        (folder / "cart.xml").write_text(cart.MJCF)
+        text = cart.MUJOCO.replace("FILE", "cart.xml")
+    elif kind == "fmu":
+        text = cart.FMU.replace("FILE", cart.written_fmu(folder / f"cart_{version}.fmu", version).name)
+    else:
+        give_function("cart", cart.accelerations)
+        text = cart.PYTHON
+    file.write_text(cart.RIG + text)
+    return read_rig_file(file)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("effects", [(), ("coulomb_friction",), ("backlash", "input_delay")])
+def test_it_moves_as_the_same_equations(way, effects, folder):
+    chosen = [effect_named(name) for name in effects]
+    values = {**VALUES, "T_c": 0.8, "g": 0.01, "T_d": 0.02}
+    run = record(150 if way == "python" else N)
+    ours, theirs = (
+        simulate(compose(rig, chosen), values, run, accuracy=1e-8)
+        for rig in (rig_of("native", folder), rig_of(way, folder))
+    )
+    for name in ("cart", "angle"):
+        assert np.ptp(ours[name]) > 0.01
+        np.testing.assert_allclose(theirs[name], ours[name], rtol=0.0, atol=1e-8 * np.ptp(ours[name]))
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_derivatives_by_parameters_and_states_are_those_of_the_same_equations(way, folder):
+    run = record(60)
+    found = []
+    for rig in (rig_of("native", folder), rig_of(way, folder)):
+        structure = compose(rig)
+        p, held = parameter_vector(structure, VALUES), record_input(structure, run)
+        n, width = len(structure.states), p.size
+        dp, dx = (
+            np.hstack([np.eye(width), np.zeros((width, n))]),
+            np.hstack([np.zeros((n, width)), np.eye(n)]),
+        )
+        state = np.array([0.02, 0.3, 0.1, -0.5])
+        found.append(simulate_tangents(structure, held, p, dp, state, dx, run.n_samples, 2))
+    size = np.max(np.abs(found[0]), axis=0, keepdims=True)
+    np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=2e-5 * float(np.max(size)))
+    assert np.all(np.abs(found[1] - found[0]) <= 1e-4 * size + 1e-9)
+
+
+@pytest.mark.parametrize("way", ["mujoco", "fmu 2.0"])
+def test_parameter_sets_side_by_side_do_not_get_into_each_others_way(way, folder):
+    structure = compose(rig_of(way, folder))
+    run = record(50)
+    held = record_input(structure, run)
+    masses = np.linspace(0.1, 0.4, 5)
+    p = np.array([parameter_vector(structure, {**VALUES, "m_p": mass}) for mass in masses]).T
+    out = simulate_sets(structure, held, p, np.zeros((4, 5)), run.n_samples, 3)
+    for i, mass in enumerate(masses):
+        one = simulate(structure, {**VALUES, "m_p": mass}, run, np.zeros(4), accuracy=1e-9)
+        np.testing.assert_allclose(out[:, 1, i], one["angle"], rtol=0.0, atol=1e-5 * np.ptp(one["angle"]))
+
+
+def test_contacts_limits_and_tendons_stay_in_mujoco(folder):
+    import mujoco
+
+    xml = """
+    <mujoco><compiler angle="radian"/><option timestep="0.0001" integrator="RK4"/>
+      <worldbody>
+        <body><joint name="a" type="slide" axis="1 0 0" range="-0.015 0.2" damping="2" armature="0.1"/>
+          <geom type="sphere" size="0.02" mass="0.5" contype="0" conaffinity="0"/><site name="s"/></body>
+        <body pos="0.3 0 0"><joint name="b" type="slide" axis="1 0 0" damping="1"/>
+          <geom type="sphere" size="0.02" mass="0.2" contype="0" conaffinity="0"/><site name="t"/></body>
+      </worldbody>
+      <tendon><spatial name="cable" stiffness="40" damping="0.2" springlength="0.3">
+        <site site="s"/><site site="t"/></spatial></tendon>
+      <actuator><motor name="push" joint="a"/></actuator>
+    </mujoco>"""
+    path = folder / "limited.xml"
+    path.write_text(xml)
+    tables = {
+        "name": "limited",
+        "inputs": {"u": {"unit": "N"}},
+        "parameters": {
+            "d_a": {"unit": "N s/m", "default": 2.0},
+            "d_b": {"unit": "N s/m", "default": 1.0},
+            "k": {"unit": "N/m", "default": 40.0},
+        },
+        "coordinates": {"a": {"unit": "m"}, "b": {"unit": "m"}},
+        "joints": {"a": {"motion": "a", "damping": "d_a"}, "b": {"motion": "b", "damping": "d_b"}},
+        "drives": {"push": {"signal": "u", "force": "push", "along": "a"}},
+        "sensors": {"at_a": {"reads": "a", "unit": "m"}, "at_b": {"reads": "b", "unit": "m"}},
+        "simulator": {"kind": "mujoco", "file": str(path), "parameters": {"k": "tendon_stiffness cable"}},
+    }
+    structure = compose(rig_of_tables(tables, "limited"))
+    n = 200
+    u = 6.0 * np.sin(2 * np.pi * 0.8 * DT * np.arange(n))
+    run = Record("r", DT, {"u": u}, {"u": "N"}, hold="zoh")
+    for stiffness in (40.0, 80.0):
+        ours = simulate(structure, {"d_a": 2.0, "d_b": 1.0, "k": stiffness}, run, np.zeros(4), accuracy=1e-7)
+        model = mujoco.MjModel.from_xml_string(xml.replace('stiffness="40"', f'stiffness="{stiffness}"'))
+        data, theirs = mujoco.MjData(model), np.empty((n, 2))
+        for row, now in zip(theirs, u, strict=True):
+            row[:] = data.qpos
+            data.ctrl[0] = now
+            mujoco.mj_step(model, data, round(DT / model.opt.timestep))
+        assert np.min(theirs[:, 0]) < -0.015
+        for i, name in enumerate(("at_a", "at_b")):
+            np.testing.assert_allclose(ours[name], theirs[:, i], rtol=0.0, atol=2e-3 * np.ptp(theirs[:, i]))
+
+
+def test_two_models_are_two_rigs_and_a_changed_file_is_told(folder):
+    first = rig_of("mujoco", folder)
+    (folder / "cart.xml").write_text(cart.MJCF.replace('mass="0.8"', 'mass="0.9"'))
+    second = read_rig_file(folder / "mujoco.toml")
+    assert first.mechanism.bodies.key != second.mechanism.bodies.key
+    assert not first.mechanism.mass_matrix.atoms(sp.Function) & second.mechanism.mass_matrix.atoms(
+        sp.Function
+    )
+
+
+@pytest.mark.parametrize(
+    ("way", "old", "new", "message"),
+    [
+        ("mujoco", '"slide"', '"slid"', r"has no joint 'slid'. Did you mean 'slide'"),
+        ("mujoco", "body_mass pendulum", "body_mass pendul", "is no number of the model"),
+        ("mujoco", "body_mass pendulum", "mass", "is no number of the model"),
+        ("mujoco", 'kind = "mujoco"', 'kind = "mujoko"', "is no simulator. Did you mean 'mujoco'"),
+        ("mujoco", "cart.xml", "card.xml", "card.xml cannot be read: No such file"),
+        ("fmu 2.0", '"position"', '"place"', "has no state 'place'"),
+        ("fmu 2.0", '"torque"', '"moment"', "has no input 'moment'"),
+        ("fmu 2.0", '"pendulum.mass"', '"mass"', "has no parameter 'mass'"),
+        ("fmu 2.0", 'm_p = "pend', 'm_q = "pend', "'m_q' is no constant and no parameter"),
+        ("python", 'file = "cart"', 'file = "card"', "is a function of Python, and a rig file runs no code"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(way, old, new, message, folder):
+    rig_of(way, folder)
+    text = (folder / f"{way.replace(' ', '_')}.toml").read_text()
+    assert old in text
+    with pytest.raises(InputError, match=message) as told:
+        rig_of_text(text.replace(old, new), "cart.toml", folder=folder)
+    assert "cart.toml, line" in str(told.value)
+
+
+def test_an_fmu_for_co_simulation_alone_is_refused(folder):
+    cart.written_fmu(folder / "slave.fmu", kind="CoSimulation")
+    text = cart.RIG + cart.FMU.replace("FILE", "slave.fmu")
+    with pytest.raises(InputError, match="export it for Model Exchange"):
+        rig_of_text(text, folder=folder)
+
+
+def test_what_a_program_reports_while_it_runs_reaches_the_user(folder):
+    run = record(20)
+    with pytest.raises(InputError, match="failed with status 3 of FMI"):
+        simulate(compose(rig_of("fmu 2.0", folder)), {**VALUES, "m_p": -1.0}, run, np.zeros(4))
+    rig = rig_of("python", folder)
+    give_function("cart", lambda *_: 1 / 0)
+    with pytest.raises(InputError, match="ZeroDivisionError"):
+        simulate(compose(rig), VALUES, run, np.zeros(4))
