@@ -29,6 +29,7 @@ MOVED = {
     "experiments/engine_accuracy/README.md": "experiments/engine_accuracy.md",
     "experiments/rounding/README.md": "experiments/rounding.md",
     "experiments/robots/README.md": "experiments/robots.md",
+    "experiments/simulators/README.md": "experiments/simulators.md",
     "experiments/sensitivities/README.md": "experiments/sensitivities.md",
     "experiments/places/README.md": "experiments/places.md",
     "experiments/adequacy/README.md": "experiments/adequacy.md",

@@ -128,3 +128,47 @@ def test_a_model_of_the_robot_is_written_back(tmp_path: Path, run: Run) -> None:
     code, stdout, _ = run("export", model, "--to", "isaac", "--mjcf", CART, "--out", tmp_path / "cart.yaml")
     assert code == 0
     assert "friction: 0.2" in (tmp_path / "cart.yaml").read_text("utf-8")
+
+
+def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run) -> None:
+    model, folder = tmp_path / "robot.xml", tmp_path / "stage"
+    limited = CART.read_text("utf-8").replace('damping="0.5"', 'damping="0.5" range="-1 1" limited="true"')
+    model.write_text(limited, "utf-8")
+    folder.mkdir()
+    t = 0.01 * np.arange(200)
+    rows = np.column_stack([t, np.sin(t), 0.1 * np.sin(t), 0.3 + 0.01 * np.sin(t)])
+    np.savetxt(
+        folder / "a.csv", rows, delimiter=",", header="t,push_ctrl,slider_position,hinge_angle", comments=""
+    )
+    code, stdout, _ = run("init", folder, "--mjcf", model, "--as-it-is")
+    assert code == 0
+    assert "it moves as MuJoCo does" in stdout
+    assert "Not taken over" not in stdout
+    text = (folder / "robot.toml").read_text("utf-8")
+    assert '[simulator]\nkind = "mujoco"\nfile = "../robot.xml"' in text
+    campaign = folder / "campaign.toml"
+    assert 'simulator = "mujoco"' in campaign.read_text("utf-8")
+    said = campaign.read_text("utf-8")
+    campaign.write_text(said.replace('simulator = "mujoco"', 'simulator = "fmu"'), "utf-8")
+    code, _, stderr = run("identify", folder, "--out", tmp_path / "out")
+    assert code == 2
+    assert "simulator is 'fmu'; the rig file leaves its bodies to mujoco" in stderr
+    campaign.write_text(said.replace('simulator = "mujoco"', "#"), "utf-8")
+    code, _, stderr = run("identify", folder, "--out", tmp_path / "out")
+    assert code == 2
+    assert 'write simulator = "mujoco"' in stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--mjcf", CART, "--as-it-is", "--gear", "hinge=50"), "a gear splits a joint in two"),
+        (("--as-it-is",), "--as-it-is is of a robot's model"),
+    ],
+)
+def test_options_that_contradict_each_other_are_told(
+    options: tuple[object, ...], message: str, tmp_path: Path, run: Run
+) -> None:
+    code, stdout, stderr = run("init", tmp_path, *options)
+    assert (code, stdout) == (2, "")
+    assert message in stderr

@@ -41,7 +41,7 @@ def test_numbers_of_joints_are_parameters_and_those_of_bodies_and_drives_constan
 
 def test_the_text_declares_the_same_rig() -> None:
     draft = draft_rig(load_model(MODELS / "spatial_arm.xml"), "spatial arm")
-    text = rig_text(draft, "spatial_arm.xml")
+    text = rig_text(draft, "spatial_arm.xml", Path())
     assert tomllib.loads(text) == draft.tables
     assert draft.rig.name == "spatial_arm"
     assert {"link_2_mass", "plate_mass", "hand_inertia_xx"} <= set(draft.tables["constants"])

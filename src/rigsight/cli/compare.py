@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
@@ -34,6 +34,7 @@ def compare(
     step_seconds: Annotated[
         float, typer.Option(metavar="SECONDS", help="How long a step is compared, from its begin on.")
     ] = 4.0,
+    simulator: Simulators = None,
     jobs: Jobs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -45,7 +46,9 @@ def compare(
     """
     with told(debug), listening(quiet) as listener:
         from rigsight.workflow.compare import run_compare
+        from rigsight.workflow.own.own_simulators import own_simulators
 
+        own_simulators(simulator or [])
         comparison = run_compare(
             campaign,
             model,

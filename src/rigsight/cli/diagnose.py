@@ -18,6 +18,7 @@ from rigsight.cli.options import (
     Quiet,
     ResultsFolder,
     Seed,
+    Simulators,
     effect_names,
 )
 from rigsight.cli.terminal import command_line, show, show_files, show_json
@@ -38,6 +39,7 @@ def diagnose(
     ] = None,
     effects: OwnEffects = None,
     rigs: OwnRigs = None,
+    simulator: Simulators = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     json: Json = False,
@@ -52,7 +54,9 @@ def diagnose(
         from rigsight.workflow.diagnose import run_diagnose
         from rigsight.workflow.own.own_effects import named, own_effects
         from rigsight.workflow.own.own_rigs import own_rigs
+        from rigsight.workflow.own.own_simulators import own_simulators
 
+        own_simulators(simulator or [])
         own = own_effects(effects or [], listener=listener)
         diagnosis = run_diagnose(
             campaign,

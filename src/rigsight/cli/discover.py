@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Seed
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
@@ -30,6 +30,7 @@ def discover(
     one_by_one: Annotated[
         bool, typer.Option("--one-by-one", help="Discover on each estimation record alone as well.")
     ] = False,
+    simulator: Simulators = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     json: Json = False,
@@ -42,7 +43,9 @@ def discover(
     """
     with told(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover
+        from rigsight.workflow.own.own_simulators import own_simulators
 
+        own_simulators(simulator or [])
         found = run_discover(
             campaign,
             out,

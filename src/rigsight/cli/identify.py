@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder
+from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
 from rigsight.workflow.progress_display import listening
 
@@ -33,6 +33,7 @@ def identify(
             help="Width in frequency wished for: of a local band, or between averaged frequencies.",
         ),
     ] = None,
+    simulator: Simulators = None,
     jobs: Jobs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -45,7 +46,9 @@ def identify(
     """
     with told(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify
+        from rigsight.workflow.own.own_simulators import own_simulators
 
+        own_simulators(simulator or [])
         identification = run_identify(
             campaign, out, method=method, resolution=resolution, n_jobs=jobs, listener=listener
         )

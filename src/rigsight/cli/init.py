@@ -49,6 +49,13 @@ def init(
             help="A joint of the model whose gear gives way, in N m/rad (N/m): play at it can be found then. May be repeated.",
         ),
     ] = None,
+    as_it_is: Annotated[
+        bool,
+        typer.Option(
+            "--as-it-is",
+            help="Leave the model's bodies to MuJoCo: contacts, ranges, equalities and tendons too. Diagnoses take longer.",
+        ),
+    ] = False,
     rigs: OwnRigs = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -60,13 +67,16 @@ def init(
     --mjcf, writes the rig file of a robot's model as well, and checks it against MuJoCo.
     """
     if mjcf is not None:
-        _init_from_mjcf(folder or Path(), mjcf, gear, model, rigs, json=json, quiet=quiet, debug=debug)
+        _init_from_mjcf(
+            folder or Path(), mjcf, gear, model, rigs, as_it_is=as_it_is, json=json, quiet=quiet, debug=debug
+        )
         return
     with told(debug):
         from rigsight.errors import InputError
 
-        if gear:
-            raise InputError("--gear is of a joint of a robot's model; name the model with --mjcf.")
+        if gear or as_it_is:
+            option = "--gear is of a joint" if gear else "--as-it-is is"
+            raise InputError(f"{option} of a robot's model; name the model with --mjcf.")
         if folder is None:
             raise InputError("Name the FOLDER that holds the measured files, or a model with --mjcf.")
         from rigsight.workflow.campaigns.init import run_init
@@ -107,6 +117,7 @@ def _init_from_mjcf(
     model: str | None,
     rigs: list[Path] | None,
     *,
+    as_it_is: bool,
     json: bool,
     quiet: bool,
     debug: bool,
@@ -117,7 +128,9 @@ def _init_from_mjcf(
 
         if model is not None or rigs:
             raise InputError("--mjcf gives the rig; leave out --model and --rigs.")
-        written = run_init_from_mjcf(folder, file, gears=dict(map(_gear, gears or [])), listener=listener)
+        written = run_init_from_mjcf(
+            folder, file, gears=dict(map(_gear, gears or [])), as_it_is=as_it_is, listener=listener
+        )
     draft, run = written.draft, written.run
     if not run.agrees:
         typer.echo(

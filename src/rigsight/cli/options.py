@@ -37,6 +37,15 @@ OwnRigs = Annotated[
         help="A file that declares a rig of your own, which is then known by its name. May be repeated.",
     ),
 ]
+Simulators = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--simulator",
+        metavar="FILE.py:FUNCTION",
+        show_default="none",
+        help="A function of Python that moves the bodies of a rig whose file says so; its file is run. May be repeated.",
+    ),
+]
 Seed = Annotated[
     int,
     typer.Option("--seed", min=0, max=2**63 - 1, help="Seed of everything random."),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet
+from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
@@ -74,6 +74,7 @@ def simulate(
     ] = None,
     effects: OwnEffects = None,
     rigs: OwnRigs = None,
+    simulator: Simulators = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -86,8 +87,10 @@ def simulate(
     with told(debug), listening(quiet):
         from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs
+        from rigsight.workflow.own.own_simulators import own_simulators
         from rigsight.workflow.simulate import run_simulate
 
+        own_simulators(simulator or [])
         simulated = run_simulate(
             model,
             record,

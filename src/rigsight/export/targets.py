@@ -133,6 +133,12 @@ def export_model(
         If the target is unknown or has no words for an effect, hold or name, or if an FMU cannot be compiled.
     """
     chosen = TARGETS[check_option("Target", target, TARGETS)]
+    bodies = model.structure.rig.mechanism.bodies
+    if bodies is not None:
+        raise InputError(
+            f"The bodies of '{model.structure.rig.name}' are moved by {bodies.kind} ({bodies.file}), and have no equations "
+            f"to write as {target}. Effects and numbers of a MuJoCo model go back with --to mjcf."
+        )
     if source_only and target not in _FMUS:
         raise InputError(f"--source-only is of an FMU; '{target}' is source anyway. Leave it out.")
     if chosen.named:

@@ -80,7 +80,8 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     off = mujoco.mjtDisableBit
     own = copy.copy(model)
     own.opt.timestep, own.opt.integrator = STEP, int(mujoco.mjtIntegrator.mjINT_RK4)
-    for flag in (off.mjDSBL_CONTACT, off.mjDSBL_EQUALITY, off.mjDSBL_LIMIT, off.mjDSBL_FRICTIONLOSS):
+    binding = () if draft.is_as_it_is else (off.mjDSBL_CONTACT, off.mjDSBL_EQUALITY, off.mjDSBL_LIMIT)
+    for flag in (*binding, off.mjDSBL_FRICTIONLOSS):
         own.opt.disableflags |= int(flag)
     own.actuator_delay[:] = 0.0
     # The same filter, which the method of fourth order integrates as well: MuJoCo's exact one is of first order beside it.

@@ -34,7 +34,7 @@ class RobotFile:
     draft: RigDraft
 
 
-def read_robot(path: Path, gears: Mapping[str, float] | None = None) -> RobotFile:
+def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is: bool = False) -> RobotFile:
     """Read an MJCF or URDF file; a URDF, which has no actuators, gets a force or torque at every joint.
 
     Parameters
@@ -43,6 +43,8 @@ def read_robot(path: Path, gears: Mapping[str, float] | None = None) -> RobotFil
         The file.
     gears
         Name of a joint -> stiffness of its gear [N m/rad or N/m].
+    as_it_is
+        Leave the bodies to MuJoCo, with all that binds them.
 
     Raises
     ------
@@ -52,7 +54,13 @@ def read_robot(path: Path, gears: Mapping[str, float] | None = None) -> RobotFil
     spec = load_spec(path)
     model = spec.compile()
     try:
-        draft = draft_rig(model, path.stem, with_drives=path.suffix.lower() == ".urdf", gears=gears)
+        draft = draft_rig(
+            model,
+            path.stem,
+            with_drives=path.suffix.lower() == ".urdf",
+            gears=gears,
+            as_it_is=path.resolve().as_posix() if as_it_is else None,
+        )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     return RobotFile(spec, model, draft)

@@ -99,6 +99,15 @@ def force_leaf(
     return simulated(sp.Integer(bodies.key), index, *q, *v, *(f if bodies.program.reads_forces else ()), *p)
 
 
+def place_of(leaf: sp.Expr) -> tuple[int, ...]:
+    """Return row and column of a leaf that is an entry of the mass matrix, and the row of one that is a force."""
+    key, index = leaf.args[:2]
+    if _is_force(key, index):
+        return (_row(key, index),)
+    row = next(i for i in range(bodies_of(int(key)).n) if int(index) < (i + 1) * (i + 2) // 2)
+    return row, int(index) - row * (row + 1) // 2
+
+
 def _n_mass(key: Any) -> int:
     n = bodies_of(int(key)).n
     return n * (n + 1) // 2

@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from rigsight.errors import InputError
 from rigsight.rigs import Rig, rig_of_tables
 from rigsight.robots.drafting.declared_numbers import DeclaredNumbers, Field
 from rigsight.robots.drafting.drive_tables import drive_of, plain_drive
-from rigsight.robots.drafting.energies import energies_of
+from rigsight.robots.drafting.energies import Energies, energies_of
 from rigsight.robots.drafting.gears import gear_table, split_joints
 from rigsight.robots.drafting.joint_tables import armature, joint_table, way_unit
 from rigsight.robots.drafting.naming import Names
+from rigsight.robots.drafting.simulator_table import simulator_table
 from rigsight.robots.reading.actuators import actuators_of
 from rigsight.robots.reading.left_out import left_out_of
 from rigsight.robots.reading.sensors import TreeSensor, sensors_of
 from rigsight.robots.reading.tree import TreeJoint, bodies_of, gravity_of
+from rigsight.simulators import has_constraints
 
 if TYPE_CHECKING:
     import mujoco
@@ -81,6 +84,11 @@ class RigDraft:
         return joint + sum(gear.joint < joint for gear in self.gears.values())
 
     @property
+    def is_as_it_is(self) -> bool:
+        """True if bodies are left to MuJoCo."""
+        return "simulator" in self.tables
+
+    @property
     def rig(self) -> Rig:
         """The rig."""
         return rig_of_tables(self.tables, "the rig of the model")
@@ -92,10 +100,12 @@ def draft_rig(
     *,
     with_drives: bool = False,
     gears: Mapping[str, float] | None = None,
+    as_it_is: str | None = None,
 ) -> RigDraft:
     """Return the rig file of a MuJoCo model.
 
-    Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants.
+    Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants. Bodies that are
+    left to MuJoCo have no masses and lengths in the rig file, and nothing that binds them is left out.
 
     Parameters
     ----------
@@ -107,6 +117,8 @@ def draft_rig(
         Give a model without actuators a force or torque at every joint: a URDF has none.
     gears
         Name of a joint -> stiffness of its gear, through which its rotor moves the body; other joints move it rigidly.
+    as_it_is
+        Path of the model's file, as the rig file is to name it, if its bodies are left to MuJoCo.
 
     Raises
     ------
@@ -117,6 +129,10 @@ def draft_rig(
     numbers = DeclaredNumbers(names)
     rig_name = names.free(name, "rig")
     gears = gears or {}
+    if gears and as_it_is is not None:
+        raise InputError(
+            "a gear splits a joint in two, which a simulation as it is does not have; leave one of them out"
+        )
     bodies, plays = split_joints(model, bodies_of(model), gears)
     actuators, drives_left_out = actuators_of(model)
     sensors, sensors_left_out = sensors_of(model, actuators)
@@ -141,10 +157,16 @@ def draft_rig(
         if joint.index in plays:
             play = coordinates[plays[joint.index].index]
             joint_tables[f"{q}_gear"] = gear_table(model, joint, q, play, gears[joint.name], numbers)
-    called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
-    symbols = [sp.Symbol(q, real=True) for q in coordinates]
-    energies = energies_of(bodies, called, symbols, gravity_of(model), numbers)
     rotors = [armature(model, joint, q, numbers) for joint, q in own]
+    if as_it_is is not None and has_constraints(model):
+        # What binds bodies goes with all that they move, rotors too, so they stay in MuJoCo.
+        rotors = []
+    if as_it_is is None:
+        called = [names.free(body.name or f"body_{body.index}", "body") for body in bodies]
+        symbols = [sp.Symbol(q, real=True) for q in coordinates]
+        energies = energies_of(bodies, called, symbols, gravity_of(model), numbers)
+    else:
+        energies = Energies()
     shown = _sensor_tables(sensors, joints, coordinates, names, numbers)
     tables: dict[str, Any] = {
         "name": rig_name,
@@ -157,6 +179,7 @@ def draft_rig(
             "kinetic": _sum(*energies.kinetic, *rotors),
             "potential": _sum(*energies.potential),
         },
+        "simulator": {} if as_it_is is None else simulator_table(model, as_it_is, own, numbers.fields),
         "signals": {signal: _sum(value) for signal, value in energies.signals.items()},
         "states": {name: state for drive in drives for name, state in drive.states.items()},
         "joints": joint_tables,
@@ -176,7 +199,7 @@ def draft_rig(
         {name: sensor.index for name, sensor, _ in shown},
         numbers.fields,
         numbers.values,
-        (*left_out_of(model), *drives_left_out, *sensors_left_out),
+        (*left_out_of(model, as_it_is=as_it_is is not None), *drives_left_out, *sensors_left_out),
         tuple(notes),
     )
 

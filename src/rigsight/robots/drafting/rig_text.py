@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 from rigsight.errors import InputError
 from rigsight.robots.drafting.draft import RigDraft
 
 
-def rig_text(draft: RigDraft, source: str) -> str:
+def rig_text(draft: RigDraft, source: str, folder: Path) -> str:
     """Return the text of a rig file.
 
     Parameters
@@ -15,6 +18,8 @@ def rig_text(draft: RigDraft, source: str) -> str:
         The rig of a model.
     source
         How the text calls the file of the model.
+    folder
+        Where the text will stand.
 
     Raises
     ------
@@ -31,7 +36,11 @@ def rig_text(draft: RigDraft, source: str) -> str:
     if draft.left_out:
         lines += ["Not taken over:", *(f"- {what}" for what in draft.left_out)]
     head = "\n".join(f"# {line}" for line in "\n".join(lines).split("\n"))
-    return f"{_printable(head)}\n\n{tomli_w.dumps(draft.tables)}"
+    tables = dict(draft.tables)
+    if draft.is_as_it_is:
+        beside = Path(os.path.relpath(tables["simulator"]["file"], folder.resolve())).as_posix()
+        tables["simulator"] = {**tables["simulator"], "file": beside}
+    return f"{_printable(head)}\n\n{tomli_w.dumps(tables)}"
 
 
 def _printable(text: str) -> str:

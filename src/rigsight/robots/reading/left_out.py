@@ -12,9 +12,31 @@ _LISTED = 3
 """Names that one line lists; the rest is counted."""
 
 
-def left_out_of(model: mujoco.MjModel) -> list[str]:
-    """Return in words what is not taken over of a model, apart from its actuators and sensors."""
+def left_out_of(model: mujoco.MjModel, *, as_it_is: bool = False) -> list[str]:
+    """Return in words what is not taken over of a model, apart from its actuators and sensors.
+
+    Parameters
+    ----------
+    model
+        Compiled.
+    as_it_is
+        True if its bodies stay in MuJoCo, and with them all that binds them.
+    """
     found = [f"the option that switches {what} off: the rig has it" for what in _switched_off(model)]
+    if not as_it_is:
+        found += _between_bodies(model)
+    if any(model.jnt_springyield):
+        found.append("springs that yield")
+    if any(model.jnt_actfrclimited):
+        names = [
+            model.joint(j).name or f"number {j}" for j in range(model.njnt) if model.jnt_actfrclimited[j]
+        ]
+        found.append(f"range of the actuators' force at joints: {_listed(names)}")
+    return found
+
+
+def _between_bodies(model: mujoco.MjModel) -> list[str]:
+    found = []
     touching = _touching(model)
     if touching:
         found.append(f"contacts between bodies: {_listed(touching)}")
@@ -31,13 +53,6 @@ def left_out_of(model: mujoco.MjModel) -> list[str]:
         found.append(f"{model.ntendon} tendon{'' if model.ntendon == 1 else 's'}")
     if model.opt.density or model.opt.viscosity:
         found.append("forces of the fluid around the bodies (density, viscosity)")
-    if any(model.jnt_springyield):
-        found.append("springs that yield")
-    if any(model.jnt_actfrclimited):
-        names = [
-            model.joint(j).name or f"number {j}" for j in range(model.njnt) if model.jnt_actfrclimited[j]
-        ]
-        found.append(f"range of the actuators' force at joints: {_listed(names)}")
     if model.nflex or model.nplugin:
         found.append("deformable bodies and plugins")
     return found

@@ -124,6 +124,7 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
                 before.beside(label(definition.owner)) if short in names.values() else short
             )
     names |= _of_elimination(structure, names.values())
+    names |= _of_bodies(structure)
     for output in tree.outputs:
         names[output_symbol(output.name)] = _free(declared_name(output.name), names)
     return names
@@ -163,6 +164,21 @@ def _of_elimination(structure: Structure, taken: Iterable[ShownName]) -> dict[sp
         names[load] = ShownName("h", (str(i + 1),))
     every = set(taken)
     return {s: name.beside("motion") if name in every else name for s, name in names.items()}
+
+
+def _of_bodies(structure: Structure) -> dict[sp.Symbol, ShownName]:
+    """Return the names of the masses and forces that another program gives."""
+    bodies, n = structure.rig.mechanism.bodies, len(structure.tree.motion.coordinates)
+    if bodies is None:
+        return {}
+    masses = [(i, j) for i in range(n) for j in range(i + 1)]
+    names = {simulated_symbol(at): ShownName("M", (*(str(i + 1) for i in at), bodies.kind)) for at in masses}
+    return names | {simulated_symbol((i,)): ShownName("h", (str(i + 1), bodies.kind)) for i in range(n)}
+
+
+def simulated_symbol(place: tuple[int, ...]) -> sp.Symbol:
+    """Return the symbol that stands for what another program gives: row and column of a mass, or the row of a force."""
+    return sp.Symbol(" ".join(("simulated", *map(str, place))), real=True)
 
 
 def _signal_names(structure: Structure) -> dict[str, ShownName]:

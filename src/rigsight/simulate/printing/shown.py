@@ -17,8 +17,10 @@ from rigsight.simulate.printing.names import (
     output_symbol,
     rate_symbol,
     shown_names,
+    simulated_symbol,
 )
 from rigsight.simulate.structure import Structure
+from rigsight.simulators import place_of, simulated
 
 
 class moved(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -136,7 +138,7 @@ def shown_equations(structure: Structure, label: Callable[[str], str] = in_words
     ]
     motion = _motion(structure) if structure.elimination is None else _motion_in_parts(structure)
     every = [*motion, *effects, *_states(structure), *_outputs(structure, names)]
-    every = [replace(e, terms=tuple(map(with_limits, e.terms))) for e in every]
+    every = [replace(e, terms=tuple(map(with_limits, e.terms))) for e in map(_by_name, every)]
     owners = dict.fromkeys([None, *(equation.owner for equation in every)])
     return ShownEquations(names, tuple(e for owner in owners for e in every if e.owner == owner))
 
@@ -164,7 +166,7 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
     def flat(expression: sp.Expr) -> sp.Expr:
         return expression.xreplace(values).xreplace(numbers)
 
-    every = [*_motion(structure), *_states(structure), *_outputs(structure, names)]
+    every = [*map(_by_name, _motion(structure)), *_states(structure), *_outputs(structure, names)]
     flattened = (
         replace(
             equation,
@@ -176,6 +178,21 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
         for equation in every
     )
     return ShownEquations(names, tuple(flattened))
+
+
+def _by_name(equation: ShownEquation) -> ShownEquation:
+    """Return an equation with what another program gives by a name: nobody can read what it is made of."""
+
+    def named(expression: sp.Expr) -> sp.Expr:
+        leaves = expression.atoms(simulated)
+        return expression.xreplace({leaf: simulated_symbol(place_of(leaf)) for leaf in leaves})
+
+    return replace(
+        equation,
+        left=named(equation.left),
+        terms=tuple(map(named, equation.terms)),
+        inertia=tuple((named(mass), rate) for mass, rate in equation.inertia),
+    )
 
 
 def _motion(structure: Structure) -> list[ShownEquation]:

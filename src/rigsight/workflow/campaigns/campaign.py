@@ -215,10 +215,31 @@ def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig
     if table.model is not None and table.file is not None:
         raise InputError(f"{where.at('rig', 'file')}: stands beside rig.model; give one of the two.")
     if table.file is not None:
-        return read_rig_file(inside(path, where.at("rig", "file"), table.file))
-    if table.model is None:
+        rig = read_rig_file(inside(path, where.at("rig", "file"), table.file))
+    elif table.model is not None:
+        rig = rig_named(where, table.model, known_rigs(own_rigs))
+    else:
         raise InputError(f"{where.at('rig', 'model')}: is missing. Write {WHICH_RIG}")
-    return rig_named(where, table.model, known_rigs(own_rigs))
+    _check_simulator(rig, table, where)
+    return rig
+
+
+def _check_simulator(rig: Rig, table: RigTable, where: Where) -> None:
+    """Refuse a campaign that says otherwise than its rig what simulates it: an FMU is a program that is run."""
+    bodies = rig.mechanism.bodies
+    own = None if bodies is None else bodies.kind
+    if table.simulator == own:
+        return
+    if own is None:
+        raise InputError(
+            f"{where.at('rig', 'simulator')}: is '{table.simulator}', but the rig's own equations move it. Take the line out, or "
+            "give the rig file a [simulator]."
+        )
+    got = "is missing" if table.simulator is None else f"is '{table.simulator}'"
+    key = where.at("rig", "simulator") if table.simulator is not None else where.at("rig")
+    raise InputError(
+        f'{key}: simulator {got}; the rig file leaves its bodies to {own}: write simulator = "{own}".'
+    )
 
 
 def of_first_record(given: GivenSimulation, records: Sequence[Record]) -> tuple[dict[str, float], str]:

@@ -42,10 +42,11 @@ class ColumnTable(FileTable):
 
 
 class RigTable(FileTable):
-    """``[rig]``: which rig, the effects that the simulation in question has, its known constants and its parameters."""
+    """``[rig]``: which rig, what simulates it, the effects of the simulation in question, its constants and parameters."""
 
     model: str | None = None
     file: Annotated[str, Field(min_length=1)] | None = None
+    simulator: str | None = None
     effects: list[str] = []
     constants: dict[str, Number] = {}
     parameters: dict[str, Number] = {}

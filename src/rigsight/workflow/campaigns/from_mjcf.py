@@ -40,6 +40,7 @@ def run_init_from_mjcf(
     model_file: str | Path,
     *,
     gears: Mapping[str, float] | None = None,
+    as_it_is: bool = False,
     listener: Listener = silent,
 ) -> ModelDraft:
     """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files.
@@ -52,6 +53,8 @@ def run_init_from_mjcf(
         MJCF or URDF.
     gears
         Name of a joint -> stiffness of its gear [N m/rad or N/m].
+    as_it_is
+        Leave the bodies to MuJoCo: contacts, ranges, equalities and tendons too.
     listener
         Told what is being done: equations of many joints take their time.
 
@@ -61,13 +64,13 @@ def run_init_from_mjcf(
         If the model cannot be read or taken over, a file is in the way, or nothing can be written there.
     """
     folder, source = Path(folder), Path(model_file)
-    robot = read_robot(source, gears)
+    robot = read_robot(source, gears, as_it_is=as_it_is)
     draft = robot.draft
     stage = Stage(f"Equations of {len(draft.tables['coordinates'])} coordinates", 2, listener)
     rig = draft.rig
     stage.finished("derived")
     path = folder / f"{rig.name}.toml"
-    text = rig_text(draft, source.name)
+    text = rig_text(draft, source.name, folder)
     # Once records are there, the same command goes on with the campaign.
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")

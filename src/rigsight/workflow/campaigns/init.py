@@ -223,10 +223,12 @@ def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str])
             f"# guessed from the channels: {rig.summary} Others: {', '.join(others)} (init --model); or a rig file of your own: "
             'file = "..." instead (rigsight rigs NAME prints one to begin with)'
         )
+    bodies = rig.mechanism.bodies
+    simulator = [] if bodies is None else [f'simulator = "{bodies.kind}"  # it moves the bodies']
     if file is None:
-        return ["[rig]", f'model = "{rig.name}"  {remark}']
+        return ["[rig]", f'model = "{rig.name}"  {remark}', *simulator]
     inside = file.resolve().relative_to(folder.resolve()).as_posix()
-    return ["[rig]", f"file = {quoted(inside)}  {remark}"]
+    return ["[rig]", f"file = {quoted(inside)}  {remark}", *simulator]
 
 
 def _copied(folder: Path, file: Path) -> dict[str, str]:

@@ -8,26 +8,24 @@ from __future__ import annotations
 import ast
 import importlib.metadata
 import textwrap
-import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 
 from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import AT, CATALOGUE, Effect, placed
-from rigsight.errors import InputError, RigsightError, check_option
-from rigsight.records.formats.ordinary_file import file_size
+from rigsight.errors import InputError, check_option
 from rigsight.simulate.printing.text import text
 from rigsight.workflow.own.effect_declaration import declaration_faults, equations
 from rigsight.workflow.own.effect_promises import broken_promises
+from rigsight.workflow.own.python_file import run_python_file
 from rigsight.workflow.progress import Listener, Stage, silent
 
 ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
 CHECKING = "Checking own effects"
 _LONGEST_EQUATION = 160
-_LARGEST_FILE = 1_000_000
+_MISSING = "--effects names a Python file. One effect of the catalogue alone is tried with --effect."
 
 
 @dataclass(frozen=True)
@@ -139,25 +137,7 @@ def _check_parents(own: OwnEffect, taken: Iterable[str]) -> None:
 
 def _loaded(path: Path) -> list[OwnEffect]:
     """Run a Python file and return the effects that it declares, in the order of declaration."""
-    source = _source(path)
-    try:
-        tree = ast.parse(source, filename=str(path))
-        code = compile(tree, str(path), "exec", dont_inherit=True)
-    except SyntaxError as error:
-        raise InputError(f"{path.name}, line {error.lineno}: is not valid Python: {error.msg}.") from None
-    except ValueError as error:
-        raise InputError(f"{path.name}: is not valid Python: {error}.") from None
-    except (RecursionError, MemoryError):
-        raise InputError(f"{path.name}: is nested deeper than Python reads.") from None
-    module = ModuleType(f"rigsight_own_effects_{path.stem}")
-    module.__file__ = str(path)
-    try:
-        exec(code, module.__dict__)
-    except (Exception, SystemExit) as error:
-        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-        where = f"{path.name}, line {lines[-1]}" if lines else path.name
-        kind = "" if isinstance(error, RigsightError) else f"{type(error).__name__}: "
-        raise InputError(f"{where}: running the file failed: {kind}{error}") from None
+    module, tree = run_python_file(path, "the Python file with the effects", _MISSING)
     lines_of = _assignments(tree)
     declared = [
         OwnEffect(value, f"{path.name}, line {lines_of[name]}" if name in lines_of else path.name)
@@ -169,21 +149,6 @@ def _loaded(path: Path) -> list[OwnEffect]:
             f"{path.name}: declares no effect. Give it at least one: MY_EFFECT = Effect(name=..., ...) at the top level."
         )
     return declared
-
-
-def _source(path: Path) -> str:
-    if path.exists() and file_size(path, "the Python file with the effects") > _LARGEST_FILE:
-        raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB: it is no file of effects.")
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}).") from None
-    except FileNotFoundError:
-        raise InputError(
-            f"{path} does not exist; --effects names a Python file. One effect of the catalogue alone is tried with --effect."
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
 
 
 def _assignments(tree: ast.Module) -> dict[str, int]:
