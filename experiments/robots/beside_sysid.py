@@ -10,10 +10,10 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from blind_in_mujoco import DT, NOISE, STEP, drawn, write_records
 from mujoco import sysid
 from numpy.typing import NDArray
 
-from blind_in_mujoco import DT, NOISE, STEP, drawn, write_records
 from rigsight.robots import sensor_readings
 
 HELD = round(DT / STEP)
@@ -48,16 +48,25 @@ def fitted(xml: str, folder: Path, fields: tuple[str, ...]) -> tuple[mujoco.MjMo
             parameter.value[:] = max(here, 0.02)
             params.add(parameter)
     runs = records_of(folder, model)[:2]
+    # It stamps a reading with the time at the end of the step that it begins.
     controls, shown, states = [], [], []
     for goals, readings in runs:
         held = np.repeat(goals, HELD, axis=0)
         controls.append(
-            sysid.TimeSeries(STEP * np.arange(len(held)), held, sysid.TimeSeries.compute_all_control_mapping(model))
+            sysid.TimeSeries(
+                STEP * np.arange(len(held)), held, sysid.TimeSeries.compute_all_control_mapping(model)
+            )
         )
         shown.append(
-            sysid.TimeSeries(DT * np.arange(len(goals)), readings, sysid.TimeSeries.compute_all_sensor_mapping(model))
+            sysid.TimeSeries(
+                DT * np.arange(len(goals)) + STEP,
+                readings,
+                sysid.TimeSeries.compute_all_sensor_mapping(model),
+            )
         )
-        states.append(sysid.create_initial_state(model, np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.na)))
+        states.append(
+            sysid.create_initial_state(model, np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.na))
+        )
     sequences = sysid.ModelSequences("arm", spec, ["run_1", "run_2"], states, controls, shown)
     begun = time.perf_counter()
     best, _ = sysid.optimize(
@@ -94,7 +103,9 @@ def row(seed: int, out: Path, results: Path) -> str:
     before = error(mujoco.MjModel.from_xml_string(trial.model), folder)
     numbers, spent = fitted(trial.model, folder, ("damping", "armature"))
     dry, _ = fitted(trial.model, folder, ("damping", "armature", "frictionloss"))
-    told = json.loads((results / f"trial_{seed:02d}" / "results" / "diagnosis.json").read_text(encoding="utf-8"))
+    told = json.loads(
+        (results / f"trial_{seed:02d}" / "results" / "diagnosis.json").read_text(encoding="utf-8")
+    )
     seconds = json.loads((results / f"trial_{seed:02d}.json").read_text(encoding="utf-8"))["seconds"]
     candidate = told["candidates"][0]
     named = ", ".join(json.loads((results / f"trial_{seed:02d}.json").read_text(encoding="utf-8"))["named"])

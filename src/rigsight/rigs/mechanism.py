@@ -63,6 +63,8 @@ class Joint:
         What else resists: constant, or a known law.
     inertia
         Inertia that moves with it; None for what the kinetic energy gives.
+    damps_spring
+        Whether its damper is squeezed with the spring and not by the motion: behind a play, both act in contact alone.
     about
         What it is.
     """
@@ -74,6 +76,7 @@ class Joint:
     rest: sp.Expr = sp.S.Zero
     force: sp.Expr = sp.S.Zero
     inertia: sp.Expr | None = None
+    damps_spring: bool = False
     about: str = ""
 
 

@@ -129,7 +129,7 @@ def carries_tangents(structure: Structure) -> bool:
 
 def differs_at_events(structure: Structure) -> bool:
     """Return True where differences of sets have to be long: events and steps of each set lie elsewhere by a tolerance."""
-    if structure.is_shifted or structure.histories:
+    if structure.is_shifted or structure.histories or structure.jumps_at_a_place:
         return True
     return bool(freeze(structure).frictions) and not carries_tangents(structure)
 

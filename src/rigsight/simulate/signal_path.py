@@ -271,7 +271,7 @@ class _Path:
         """Return the forces that resist the motion of a joint; the states of its effects are appended."""
         signals = self._signals(joint)
         effects = self._at(joint.name, Place.DYNAMICS, Place.DISTURBANCE)
-        spring = self._spring(effects, signals, memories)
+        spring, squeezed = self._spring(effects, signals, memories)
         static = self._bound(
             joint.force.xreplace({c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates})
         )
@@ -289,7 +289,8 @@ class _Path:
                 carried.append(torque)
             torques.append(torque)
             memories += self._states(effect, signals)
-        damping, force = self._bound(joint.damping) * signals["v"], self._bound(joint.force)
+        damped = squeezed if joint.damps_spring else signals["v"]
+        damping, force = self._bound(joint.damping) * damped, self._bound(joint.force)
         return tuple(term for term in (damping, spring, *torques, force) if term != 0)
 
     def _signals(self, joint: Joint) -> dict[str, sp.Expr]:
@@ -320,8 +321,16 @@ class _Path:
 
     def _spring(
         self, effects: Sequence[Effect], signals: Mapping[str, sp.Expr], memories: list[FirstOrderState]
-    ) -> sp.Expr:
-        """Chain what stands between displacement and spring, then what changes the spring's torque."""
+    ) -> tuple[sp.Expr, sp.Expr]:
+        """Chain what stands between displacement and spring, then what changes the spring's torque.
+
+        Returns
+        -------
+        torque
+            Of the spring.
+        rate
+            At which it is squeezed.
+        """
         deflection, rate = signals["x"], signals["v"]
         for effect in effects:
             if effect.deflection is not None:
@@ -347,7 +356,7 @@ class _Path:
                     Kind.SPRING, effect, self._binder.effect(effect, effect.spring, chained)
                 )
                 memories += self._states(effect, chained)
-        return torque
+        return torque, rate
 
     def _followers(self) -> list[FirstOrderState]:
         """Return the rig's own states; effects change the rate of the one that follows the motion."""

@@ -10,7 +10,7 @@ import sympy as sp
 
 from rigsight.effects import Effect
 from rigsight.parameters import Parameter
-from rigsight.rigs import Rig
+from rigsight.rigs import Rig, joint_of
 from rigsight.simulate.elimination import Elimination, steps_to_accelerations
 from rigsight.simulate.equation_tree import EquationTree, late, rate_within
 
@@ -218,6 +218,14 @@ class Structure:
                 )
             found[sensor] = found.get(sensor, sp.Integer(0)) + effect.measured_late.xreplace(values)
         return found
+
+    @property
+    def jumps_at_a_place(self) -> bool:
+        """Whether a force jumps where a motion gets somewhere: a damper that is squeezed with a spring, behind a play."""
+        return any(
+            effect.deflection is not None and joint_of(self.rig, effect).damps_spring
+            for effect in self.effects
+        )
 
     @property
     def first_shown_late(self) -> sp.Expr | None:

@@ -86,6 +86,7 @@ def _mechanism(declaration: Declaration, order: list[Path]) -> Mechanism:
                 name,
                 **{part: sympy(("joints", name, part)) for part in JOINT_PARTS},
                 inertia=None if own.inertia is None else sympy(("joints", name, "inertia")),
+                damps_spring=own.damps_spring,
                 about=own.about,
             )
             for name, own in table.joints.items()

@@ -62,6 +62,7 @@ class _JointTable(_Table):
     rest: Formula = 0.0
     force: Formula = 0.0
     inertia: Formula | None = None
+    damps_spring: bool = False
     about: Text = ""
 
 

@@ -100,6 +100,8 @@ def gear_table(
             f"stiffness of the gear of {name}",
             Field("gear", joint.index, "stiffness"),
         ),
+        # Teeth that do not touch damp nothing.
+        "damps_spring": True,
         "damping": numbers.parameter(
             f"{name}_gear_damping",
             damping,

@@ -26,10 +26,16 @@ def carries_tangents(equations: KernelEquations) -> bool:
     constants, and half as much where functions are costly, because these are computed once. Under dry friction they cost
     the same, and a difference would need a long step: reversals are located to a tolerance. Where states have ends the
     derivative at one place tells little of the next, however exact it is. Joints that stick and let go together take differences:
-    how one lets go changes when the next does.
+    how one lets go changes when the next does. Where a force jumps at a place, as that of a damper behind a play, derivatives
+    along the motion do not know that another motion gets there sooner.
     """
     structure = equations.structure
-    if equations.limits or structure.is_shifted or equations.has_several_frictions:
+    if (
+        structure.jumps_at_a_place
+        or equations.limits
+        or structure.is_shifted
+        or equations.has_several_frictions
+    ):
         return False
     expressions = (*equations.lane_rates, *equations.outputs, *equations.lane_steps.values())
     return bool(equations.frozen.frictions) or any(
