@@ -75,6 +75,8 @@ class Bodies:
         What parameters and constants of the rig are called there, in the order of the rig's.
     rates, forces
         Of an FMU, the names of the states that are rates of the coordinates, and of the inputs that are forces along them.
+    without_armature
+        Of MuJoCo, whether the inertia of rotors at joints is left to the rig.
     """
 
     kind: str
@@ -84,6 +86,7 @@ class Bodies:
     parameters: tuple[str, ...] = ()
     rates: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
+    without_armature: bool = False
 
     @cached_property
     def key(self) -> int:

@@ -111,9 +111,8 @@ class FmuProgram:
 
     def _state(self, name: str, states: list[str]) -> int:
         if name not in states:
-            raise InputError(
-                f"{self._file} has no state '{name}'.{nearest(name, states)} States: {', '.join(states)}."
-            )
+            wanted = f"has no state '{name}'" if name else "needs each coordinate's rate in [simulator.rates]"
+            raise InputError(f"{self._file} {wanted}.{nearest(name, states)} States: {', '.join(states)}.")
         return states.index(name)
 
     def _reference(self, name: str, causality: str, table: str) -> int:

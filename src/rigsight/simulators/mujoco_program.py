@@ -53,7 +53,7 @@ class MujocoProgram:
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
-        self._model = bodies_alone(opened(Path(bodies.file)))
+        self._model = bodies_alone(opened(Path(bodies.file)), without_armature=bodies.without_armature)
         self._places = [self._coordinate(name) for name in bodies.coordinates]
         if len(self._places) != self._model.nv:
             others = [self._model.joint(i).name for i in range(self._model.njnt)]
@@ -166,18 +166,20 @@ def opened(path: Path) -> mujoco.MjModel:
         raise InputError(f"{path}: MuJoCo cannot read it: {error}") from None
 
 
-def bodies_alone(model: mujoco.MjModel) -> mujoco.MjModel:
+def bodies_alone(model: mujoco.MjModel, *, without_armature: bool) -> mujoco.MjModel:
     """Return a model without what the rig says itself: dampers, springs and dry friction of joints, and actuators.
 
     Parameters
     ----------
     model
         It is changed.
+    without_armature
+        Leave out the inertia of rotors as well.
     """
     import mujoco
 
     model.dof_damping[:] = 0.0
-    if not has_constraints(model):
+    if without_armature:
         model.dof_armature[:] = 0.0
     model.dof_frictionloss[:] = 0.0
     model.jnt_stiffness[:] = 0.0

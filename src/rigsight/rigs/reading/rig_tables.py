@@ -92,6 +92,7 @@ class SimulatorTable(_Table):
     kind: Text
     file: Text
     digest: Text | None = None
+    without_armature: bool = False
     coordinates: dict[str, Text] = {}
     parameters: dict[str, Text] = {}
     rates: dict[str, Text] = {}

@@ -33,6 +33,10 @@ def check_simulator(declaration: Declaration) -> None:
         declaration.refuse(
             (_KEY,), "every coordinate of a simulated rig is a degree of freedom; take out prescribed_by"
         )
+    others = {"rates": own.rates, "forces": own.forces, "without_armature": own.without_armature}
+    for key, wanted in {"rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}.items():
+        if others[key] and own.kind != wanted:
+            declaration.refuse((_KEY, key), f"it is of {wanted}, and this is {own.kind}; take it out")
     for key in ("coordinates", "rates", "forces"):
         for name in getattr(own, key):
             if name not in free:
@@ -69,10 +73,9 @@ def simulated_bodies(declaration: Declaration) -> Bodies | None:
             (own.digest or file_digest(Path(own.file))) if is_file else "",
             tuple(own.coordinates.get(name, name) for name in free),
             tuple(own.parameters.values()),
-            *(
-                tuple(table.get(name, "") for name in free) if table else ()
-                for table in (own.rates, own.forces)
-            ),
+            rates=tuple(own.rates.get(name, "") for name in free),
+            forces=tuple(own.forces.get(name, "") for name in free),
+            without_armature=own.without_armature,
         )
         _ = bodies.program
     except InputError as error:

@@ -49,10 +49,12 @@ def simulator_table(
         for name, own in fields.items()
         if own[0].attribute == "armature" and has_constraints(model)
     }
+    rotors = any(own[0].attribute == "armature" for own in fields.values())
     coordinates = {q: joint.name for joint, q in joints if joint.name != q}
     return {
         "kind": "mujoco",
         "file": file,
+        **({"without_armature": True} if rotors and not parameters else {}),
         **({"coordinates": coordinates} if coordinates else {}),
         **({"parameters": parameters} if parameters else {}),
     }
