@@ -164,7 +164,7 @@ class Diagnosis:
         Share of the squared gap of the re-identified equations that the best push at each joint, drive and sensor takes away, the
         largest first; empty on a rig with one motion.
     missing_force
-        What sparse regression makes of the force that is lacking on a rig with one motion, where no effect explains the gap.
+        What sparse regression makes of the missing force on a rig with one motion, where no effect explains the gap.
     joint_forces
         The force that would have to be missing at each joint of any other rig then, the likeliest first.
     adequate

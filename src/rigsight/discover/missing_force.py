@@ -28,7 +28,7 @@ _WORTH_TELLING = 0.02
 
 @dataclass(frozen=True)
 class ShapeTerm:
-    """A term of the force that is lacking.
+    """A term of the missing force.
 
     Attributes
     ----------
@@ -67,10 +67,10 @@ class MissingForce:
     def sentence(self) -> str:
         """The finding in words."""
         if not self.terms:
-            return "No product of displacement x and velocity v describes the force that is lacking."
+            return "No product of displacement x and velocity v describes the missing force."
         told = " and ".join(f"{t.coefficient:.3g} {t.term} ({t.unit})" for t in self.terms)
         return (
-            f"Along these records the force that is lacking goes as {told} in displacement x and velocity v: "
+            f"Along these records the missing force is about {told}, with the displacement x and the velocity v: "
             f"that explains {self.share:.0%} of what the equations leave."
         )
 

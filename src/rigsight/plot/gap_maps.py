@@ -227,7 +227,7 @@ def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
 
 @in_style
 def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
-    """Draw the error over the plane of displacement and velocity and, where it is known, the force that is lacking.
+    """Draw the error over the plane of displacement and velocity and, where it is known, the missing force.
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ def time_base(
     span = abs(stamps[-1] - stamps[0])
     if not (span == 0.0 or span >= SHORTEST_TIME) or not np.max(np.abs(stamps)) <= LARGEST_NUMBER:
         raise InputError(
-            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}, which nobody measures. Check the column "
+            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}; no clock does. Check the column "
             "that time is read from, and its type."
         )
     index = np.arange(stamps.size, dtype=np.float64)

@@ -68,8 +68,8 @@ def refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64
         largest = float(np.max(np.abs(samples)))
         if largest > LARGEST_NUMBER:
             raise InputError(
-                f"{path.name}, column '{table.labels[signal]}': {signal} is as large as {largest:.3g}, which nobody measures "
-                f"(up to {LARGEST_NUMBER:g} is read). Check the column and its type."
+                f"{path.name}, column '{table.labels[signal]}': {signal} is as large as {largest:.3g}; "
+                f"no sensor shows more than {LARGEST_NUMBER:g}. Check the column and its type."
             )
 
 

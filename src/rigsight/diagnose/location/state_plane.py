@@ -2,7 +2,7 @@
 
 The force that the re-identified equations lack is ``m e'' + d e' + k e`` of their residual e: the initial transient and the
 drive obey the equations and cancel. Effects that the simulation has already are linearized away: beside them the map shows the
-shape of what is lacking, not its exact size. It is formed from the residual up to the frequency
+shape of the missing force, not its exact size. It is formed from the residual up to the frequency
 at which that stands out of the noise.
 """
 
@@ -30,7 +30,7 @@ NOTHING = float("nan")
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """Displacement, velocity and the force that is lacking of one record, shape (n_samples,) each, and the noise of the force."""
+    """Displacement, velocity and the missing force of one record, shape (n_samples,) each, and the noise of the force."""
 
     x: NDArray[np.float64]
     v: NDArray[np.float64]
@@ -40,7 +40,7 @@ class _Motion:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """A motion and the force that is lacking there, of all records one after the other.
+    """A motion and the missing force there, of all records one after the other.
 
     Attributes
     ----------
