@@ -98,7 +98,7 @@ def diagnose(
     found = examine(task, effects, rng, n_jobs, say, prepare, memory)
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         notes.append(
-            f"A model's error is {_least_left(found):.2g} of what the sensors show while the input rests. So the rig moved there, "
+            f"A model's error is {_least_left(found):.2g} of what the sensors show while the input rests. The rig moved there, "
             "in its play or driven by a disturbance, and the noise floor is taken from the top of the spectrum instead."
         )
         found = examine(task, effects, rng, n_jobs, say, prepare, memory, at_rest=False)

@@ -27,6 +27,9 @@ _SEED = 0
 def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
     """Return the models, the nearest of them in the lowest basin that was found.
 
+    Each also starts from the numbers that the rig has in the nearest one: what the rig weighs does not depend on what it lacks.
+    Where a model explains the records, that is all that is tried with the others.
+
     Parameters
     ----------
     context
@@ -34,33 +37,36 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
     models
         Fitted and scored.
     """
-    usable = [
-        m
-        for m in models
-        if m.residuals and np.isfinite(m.error_over_noise) and m.error_over_noise > VERDICT.exact
-    ]
-    best = min((m.error_over_noise for m in models if m.residuals), default=np.inf)
-    if best <= VERDICT.exact:
+    usable = [m for m in models if m.residuals and np.isfinite(m.error_over_noise)]
+    ranked = sorted(usable, key=lambda model: model.error_over_noise)
+    if not ranked:
         return list(models)
-    nearest = sorted(usable, key=lambda model: model.error_over_noise)[: SEARCH.basin_models]
-    found = dict(
-        zip(
-            map(id, nearest),
-            context.threads.side_by_side(lambda own: _lowest(context, own), nearest),
-            strict=True,
-        )
-    )
+    leader = ranked[0]
+    is_explained = leader.error_over_noise <= VERDICT.exact
+    nearest = [m for m in ranked if m.error_over_noise > VERDICT.exact][: SEARCH.basin_models]
+
+    def lowest(own: Scored) -> Scored:
+        starts = [] if is_explained else _starts(own)
+        return _lowest(context, own, starts if own is leader else [*starts, _on_rig_of(leader, own)])
+
+    found = dict(zip(map(id, nearest), context.threads.side_by_side(lowest, nearest), strict=True))
     return [found.get(id(model), model) for model in models]
 
 
-def _lowest(context: FitContext, model: Scored) -> Scored:
+def _on_rig_of(leader: Scored, model: Scored) -> dict[str, float]:
+    """Return the numbers of a model with those of the rig as another model has them."""
+    fit, rig = model.fit, {p.name for p in model.fit.structure.rig.parameters}
+    return {**fit.values, **{name: value for name, value in leader.fit.values.items() if name in rig}}
+
+
+def _lowest(context: FitContext, model: Scored, starts: Sequence[dict[str, float]]) -> Scored:
     fit = model.fit
     rough = context.problem(fit.structure, context.estimation, LOOK_ACCURACY)
 
     def roughly(values: dict[str, float]) -> FitResult:
         return rough.fit(values, fit.free, None, SEARCH.basin_evaluations, _TOLERANCE, finish=False)
 
-    lowest = min(map(roughly, [fit.values, *_starts(model)]), key=lambda found: found.cost)
+    lowest = min(map(roughly, [fit.values, *starts]), key=lambda found: found.cost)
     # Roughly simulated, so that what looks lower may not be: the finished fit decides.
     if not _is_lower(lowest, fit):
         return model
