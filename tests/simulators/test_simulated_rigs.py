@@ -213,3 +213,9 @@ def test_what_a_program_reports_while_it_runs_reaches_the_user(folder):
     give_function("cart", lambda *_: 1 / 0)
     with pytest.raises(InputError, match="ZeroDivisionError"):
         simulate(compose(rig), VALUES, run, np.zeros(4))
+
+
+def test_reading_a_rig_file_runs_no_fmu(folder, monkeypatch):
+    monkeypatch.setattr("rigsight.simulators.fmu_program.ctypes.CDLL", None)
+    cart.written_fmu(folder / "looked_at.fmu")
+    assert rig_of_text(cart.RIG + cart.FMU.replace("FILE", "looked_at.fmu"), folder=folder).name

@@ -96,10 +96,7 @@ class FmuProgram:
         own = [path for path in found if path.parent.name in (platform, _platform_of_3())]
         if not own:
             raise InputError(f"{bodies.file} holds no binary for this machine ({platform}).")
-        try:
-            self._library = ctypes.CDLL(str(own[0]))
-        except OSError as error:
-            raise InputError(f"{bodies.file}: its binary cannot be loaded: {error}") from None
+        self._binary = own[0]
         resources = Path(folder) / "resources"
         where = resources.as_uri() if self._version == "2" else f"{resources}/"
         self._failed = ctypes.c_int(0)
@@ -141,8 +138,13 @@ class FmuProgram:
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""
         names = [f"fmi{self._version}{name}" for name in _FUNCTIONS[self._version]]
+        # Only what simulates runs the FMU: a rig file that is looked at runs nothing.
         try:
-            addresses = [ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value for name in names]
+            binary = ctypes.CDLL(str(self._binary))
+        except OSError as error:
+            raise InputError(f"{self._file}: its binary cannot be loaded: {error}") from None
+        try:
+            addresses = [ctypes.cast(getattr(binary, name), ctypes.c_void_p).value for name in names]
         except AttributeError as error:
             raise InputError(f"{self._file}: its binary lacks a function of FMI: {error}") from None
         table = (ctypes.c_void_p * len(addresses))(*addresses)
@@ -157,7 +159,7 @@ class FmuProgram:
         library.connect.restype = None
         library.connect(table, ctypes.byref(told))
         # The library keeps the addresses.
-        self._kept.append((table, places, forces, parameters, told))
+        self._kept.append((binary, table, places, forces, parameters, told))
 
     def check(self) -> None:
         """See `Program.check`."""

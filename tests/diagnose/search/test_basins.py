@@ -69,3 +69,14 @@ def test_a_wrong_effect_keeps_the_only_basin_that_it_has(bench: FitContext) -> N
     model = fitted(bench, effect_named("cubic_stiffness"), {**TRUE, "k_3": 0.1})
     assert model.error_over_noise > 2.0
     assert in_lowest_basins(bench, [model])[0] is model
+
+
+def test_a_rival_beside_wrong_numbers_of_the_rig_gets_those_of_the_best(bench: FitContext) -> None:
+    coulomb = effect_named("coulomb_friction")
+    best, right = fitted(bench, STRIBECK, TRUE), fitted(bench, coulomb, {**TRUE, "T_c": 2e-3})
+    stuck = fitted(bench, coulomb, {**TRUE, "T_c": 2e-3, "k": 3.0, "m": 0.3}, 1)
+    assert best.error_over_noise < 1.03
+    assert stuck.error_over_noise > 2.0 * right.error_over_noise
+    same, found = in_lowest_basins(bench, [best, stuck])
+    assert same is best
+    assert found.error_over_noise < 1.2 * right.error_over_noise

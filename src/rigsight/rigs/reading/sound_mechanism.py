@@ -17,7 +17,9 @@ def check_mechanism(declaration: Declaration, mechanism: Mechanism) -> None:
     InputError
         With the place of the expression.
     """
-    _check_mass(declaration, mechanism)
+    # An FMU is a program, and reading a rig file runs none.
+    if mechanism.bodies is None or mechanism.bodies.kind != "fmu":
+        _check_mass(declaration, mechanism)
     _check_that_forces_act(declaration, mechanism)
     _check_sensors(declaration, mechanism)
     _check_feedback(declaration, mechanism)
