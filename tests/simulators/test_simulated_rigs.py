@@ -172,6 +172,16 @@ def test_two_models_are_two_rigs_and_a_changed_file_is_told(folder):
         ("mujoco", '"slide"', '"slid"', r"has no joint 'slid'. Did you mean 'slide'"),
         ("mujoco", "body_mass pendulum", "body_mass pendul", "is no number of the model"),
         ("mujoco", "body_mass pendulum", "mass", "is no number of the model"),
+        ("mujoco", "body_mass pendulum", "body_ipos pendulum -1", "is no number of the model"),
+        (
+            "mujoco",
+            "body_mass pendulum",
+            "dof_frictionloss slide",
+            "follows from other numbers of the model, or counts nowhere",
+        ),
+        ("mujoco", "body_mass pendulum", "body_subtreemass cart", "follows from other numbers"),
+        ("mujoco", '"hinge"', '"slide"', "'slide' stands there twice"),
+        ("mujoco", 'file = "cart.xml"', 'file = "a\\u0000b"', "is no name of a file"),
         ("mujoco", 'kind = "mujoco"', 'kind = "mujoko"', "is no simulator. Did you mean 'mujoco'"),
         ("mujoco", "cart.xml", "card.xml", "card.xml cannot be read: No such file"),
         ("fmu 2.0", '"position"', '"place"', "has no state 'place'"),
@@ -196,6 +206,95 @@ def test_what_is_wrong_is_told_with_its_place(way, old, new, message, folder):
     with pytest.raises(InputError, match=message) as told:
         rig_of_text(text.replace(old, new), "cart.toml", folder=folder)
     assert "cart.toml, line" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (('x = "force"', 'phi = "torque"'), ('x = "torque"', 'phi = "force"'), "no mass matrix follows"),
+        (
+            ('x = "speed"', 'phi = "turning"'),
+            ('x = "turning"', 'phi = "speed"'),
+            "have to belong to the coordinates",
+        ),
+    ],
+)
+def test_names_of_an_fmu_that_are_swapped_are_told(old, new, message, folder):
+    rig_of("fmu 2.0", folder)
+    text = (folder / "fmu_2.0.toml").read_text()
+    for before, after in zip(old, new, strict=True):
+        text = text.replace(before, after)
+    start = np.array([0.02, 0.3, 0.1, -0.5])
+    with pytest.raises(InputError, match=message):
+        simulate(compose(rig_of_text(text, folder=folder)), VALUES, record(20), start)
+
+
+def test_an_fmu_that_switches_at_events_is_refused(folder):
+    import zipfile
+
+    path = cart.written_fmu(folder / "events.fmu")
+    with zipfile.ZipFile(path) as fmu:
+        content = {name: fmu.read(name) for name in fmu.namelist()}
+    with zipfile.ZipFile(path, "w") as fmu:
+        for name, text in content.items():
+            fmu.writestr(name, text.replace(b'numberOfEventIndicators="0"', b'numberOfEventIndicators="2"'))
+    with pytest.raises(InputError, match="switches at events"):
+        rig_of_text(cart.RIG + cart.FMU.replace("FILE", "events.fmu"), folder=folder)
+
+
+def test_a_file_that_the_model_includes_counts(folder):
+    (folder / "whole.xml").write_text('<mujoco><include file="part.xml"/></mujoco>')
+    keys = []
+    for length in (0.3, 0.6):
+        (folder / "part.xml").write_text(cart.MJCF.replace(f"0 0 {-0.3}", f"0 0 {-length}"))
+        text = cart.RIG.replace("cart_and_pendulum", f"cart_{int(10 * length)}")
+        rig = rig_of_text(text + cart.MUJOCO.replace("FILE", "whole.xml"), folder=folder)
+        keys.append(rig.mechanism.bodies.key)
+    assert keys[0] != keys[1]
+
+
+def test_a_function_that_is_given_anew_is_asked_anew(folder):
+    structure = compose(rig_of("python", folder))
+    run, start = record(20), np.array([0.02, 0.3, 0.1, -0.5])
+    before = simulate(structure, VALUES, run, start)["angle"]
+    give_function("cart", lambda q, v, f, p: 2.0 * cart.accelerations(q, v, f, p))
+    again = simulate(structure, VALUES, run, start)["angle"]
+    give_function("cart", cart.accelerations)
+    same = simulate(structure, VALUES, run, start)["angle"]
+    assert np.max(np.abs(again - before)) > 1e-3
+    np.testing.assert_array_equal(same, before)
+
+
+def test_ctrl_c_in_a_function_ends_the_command(folder):
+    rig = rig_of("python", folder)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    give_function("cart", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(compose(rig), VALUES, record(20), np.zeros(4))
+
+
+def test_the_inertia_of_a_tendon_is_that_of_the_place(folder):
+    import mujoco
+
+    xml = cart.MJCF.replace(
+        "</worldbody>",
+        '<site name="a" pos="0.5 0 0.2"/></worldbody><tendon><spatial name="rope" armature="0.5">'
+        '<site site="a"/><site site="b"/></spatial></tendon>',
+    ).replace('<joint name="hinge"', '<site name="b" pos="0 0 -0.2"/><joint name="hinge"')
+    (folder / "rope.xml").write_text(xml)
+    rig = rig_of_text(cart.RIG + cart.MUJOCO.replace("FILE", "rope.xml"), folder=folder)
+    model = mujoco.MjModel.from_xml_string(xml)
+    data, wanted = mujoco.MjData(model), np.zeros((2, 2))
+    answers = rig.mechanism.bodies.answers
+    for q in ([0.1, 0.4], [-0.3, -1.0]):
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fullM(model, data, wanted)
+        found = answers.at(np.array([[*q, 0.2]]).T, is_force=False)[:, 0]
+        np.testing.assert_allclose(found, [wanted[0, 0], wanted[1, 0], wanted[1, 1]], rtol=1e-12)
 
 
 def test_an_fmu_for_co_simulation_alone_is_refused(folder):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
+from rigsight.cli.options import Debug, Json, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.workflow.progress_display import listening
 
@@ -57,6 +57,7 @@ def init(
         ),
     ] = False,
     rigs: OwnRigs = None,
+    simulator: Simulators = None,
     json: Json = False,
     quiet: Quiet = False,
     debug: Debug = False,
@@ -80,7 +81,9 @@ def init(
         if folder is None:
             raise InputError("Name the FOLDER that holds the measured files, or a model with --mjcf.")
         from rigsight.workflow.campaigns.init import run_init
+        from rigsight.workflow.own.own_simulators import own_simulators
 
+        own_simulators(simulator or [])
         draft = run_init(folder, model=model, rig_files=rigs or [])
     if json:
         show_as_json(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, OwnRigs
+from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
 
 
@@ -22,6 +22,7 @@ def list_rigs(
         typer.Option("--picture", metavar="FILE", help="Draw the rig NAME instead, into a PNG or SVG file."),
     ] = None,
     rigs: OwnRigs = None,
+    simulator: Simulators = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
@@ -33,7 +34,9 @@ def list_rigs(
         from rigsight.errors import InputError, check_option
         from rigsight.rigs import rig_file_text
         from rigsight.workflow.own.own_rigs import known_rigs, own_rigs
+        from rigsight.workflow.own.own_simulators import own_simulators
 
+        own_simulators(simulator or [])
         files = own_rigs(rigs or [])
         known = known_rigs(files.values())
         if picture is not None:

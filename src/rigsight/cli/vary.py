@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigsight.cli.exit_codes import told
-from rigsight.cli.options import Debug, Json, Quiet, ResultsFolder
+from rigsight.cli.options import Debug, Json, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
 from rigsight.workflow.progress_display import listening
@@ -54,6 +54,7 @@ def vary(
         str | None,
         typer.Option("--output", metavar="NAME", show_default="the first", help="Sensor that answers."),
     ] = None,
+    simulator: Simulators = None,
     out: ResultsFolder = Path("vary"),
     json: Json = False,
     quiet: Quiet = False,
@@ -64,8 +65,10 @@ def vary(
     Writes vary.svg, vary.png (vary_NAME.svg, ... where several parameters are named) and vary.json into DIR, all or none.
     """
     with told(debug), listening(quiet) as listener:
+        from rigsight.workflow.own.own_simulators import own_simulators
         from rigsight.workflow.vary import run_vary, table_text
 
+        own_simulators(simulator or [])
         if (lowest is None) != (highest is None):
             raise InputError("--lowest and --highest go together: give both, or neither.")
         band = None if lowest is None or highest is None else (lowest, highest)

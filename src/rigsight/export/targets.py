@@ -135,9 +135,10 @@ def export_model(
     chosen = TARGETS[check_option("Target", target, TARGETS)]
     bodies = model.structure.rig.mechanism.bodies
     if bodies is not None:
+        back = " Effects and numbers go back with --to mjcf." if bodies.kind == "mujoco" else ""
         raise InputError(
             f"The bodies of '{model.structure.rig.name}' are moved by {bodies.kind} ({bodies.file}), and have no equations "
-            f"to write as {target}. Effects and numbers of a MuJoCo model go back with --to mjcf."
+            f"to write as {target}.{back}"
         )
     if source_only and target not in _FMUS:
         raise InputError(f"--source-only is of an FMU; '{target}' is source anyway. Leave it out.")

@@ -135,7 +135,7 @@ class Bodies:
         InputError
             If it is not installed, or its model cannot be read or lacks a name.
         """
-        if self.digest and file_digest(Path(self.file)) != self.digest:
+        if self.digest and model_digest(self.kind, Path(self.file)) != self.digest:
             raise InputError(
                 f"{self.file} has changed since this rig was read; its numbers belong to another model."
             )
@@ -213,13 +213,27 @@ _known: dict[int, Bodies] = {}
 """Bodies by their key, of which numbers alone stand in equations."""
 
 
+_forgetting: list[Callable[[], None]] = []
+
+
+def forget() -> None:
+    """Drop all answers that are remembered in Python."""
+    for drop in _forgetting:
+        drop()
+
+
+def when_forgetting(drop: Callable[[], None]) -> None:
+    """Let a memory of answers be dropped by `forget`."""
+    _forgetting.append(drop)
+
+
 def bodies_of(key: int) -> Bodies:
     """Return the bodies of a key."""
     return _known[key]
 
 
-def file_digest(path: Path) -> str:
-    """Return the hash of a model's file.
+def model_digest(kind: str, path: Path) -> str:
+    """Return the hash of a model: of MuJoCo's as it is compiled, with all files that it includes.
 
     Raises
     ------
@@ -227,9 +241,16 @@ def file_digest(path: Path) -> str:
         If it cannot be read.
     """
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    except ValueError as error:
+        raise InputError(f"{str(path)!r} is no name of a file: {error}.") from None
+    if kind == "mujoco":
+        from rigsight.simulators.mujoco_program import compiled_model
+
+        content = compiled_model(path)
+    return hashlib.sha256(content).hexdigest()
 
 
 def _openers() -> dict[str, Callable[[Bodies], Any]]:

@@ -26,6 +26,12 @@ _FUNCTIONS = {
     ),
 }  # fmt: skip
 """What the C text calls, in the order of its table."""
+_WHY = {
+    -1: "no mass matrix follows from its accelerations: states in [simulator.rates] and inputs in [simulator.forces] have to "
+    "belong to the coordinates beside which they stand, and forces have to enter linearly",
+    -2: "a state in [simulator.rates] is not the rate of the coordinate beside which it stands",
+}
+"""What the C text finds wrong."""
 
 
 class _Told(ctypes.Structure):
@@ -74,6 +80,11 @@ class FmuProgram:
                 f"{bodies.file} is an FMU for Co-Simulation alone. Effects act while it moves, so its rates are asked for: "
                 "export it for Model Exchange."
             )
+        if description.numberOfEventIndicators or getattr(description, "eventIndicators", None):
+            raise InputError(
+                f"{bodies.file} switches at events (stops, contacts, dry friction), which are not looked for in it. Leave them "
+                "out of the FMU, and declare them at joints of the rig file."
+            )
         self._version = description.fmiVersion[0]
         self._variables = {variable.name: variable for variable in description.modelVariables}
         states = [unknown.variable.derivative.name for unknown in description.derivatives]
@@ -113,7 +124,13 @@ class FmuProgram:
         return states.index(name)
 
     def _reference(self, name: str, causality: str, table: str) -> int:
-        known = [own for own, variable in self._variables.items() if variable.causality == causality]
+        known = [
+            own
+            for own, variable in self._variables.items()
+            if variable.causality == causality
+            and variable.type in ("Real", "Float64")
+            and not getattr(variable, "dimensions", None)
+        ]
         if name not in known:
             what = f"has no {causality} '{name}'" if name else f"needs a force for each coordinate in {table}"
             raise InputError(
@@ -165,7 +182,8 @@ class FmuProgram:
         """See `Program.check`."""
         if self._failed.value:
             status, self._failed.value = self._failed.value, 0
-            raise InputError(f"{self._file}: the FMU failed with status {status} of FMI.")
+            why = _WHY.get(status, f"the FMU failed with status {status} of FMI")
+            raise InputError(f"{self._file}: {why}.")
 
 
 def _platform_of_3() -> str:

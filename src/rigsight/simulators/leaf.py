@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.simulators.bodies import STEP, Bodies, bodies_of
+from rigsight.simulators.bodies import STEP, Bodies, bodies_of, when_forgetting
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ _MOST_REMEMBERED = 16
 _lock = threading.Lock()
 _remembered: OrderedDict[tuple[Any, ...], Floats] = OrderedDict()
 """Values by what they were computed of: each entry of a mass matrix asks for the same."""
+when_forgetting(_remembered.clear)
 
 
 class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801

@@ -108,11 +108,30 @@ class MujocoProgram:
             own = accessor(words[1])
             row = int(own.dofadr[0]) if kind == "dof" else int(own.id)
             place = (row, *map(int, words[2:]))
-            if np.ndim(field[place]) != 0:
+            if np.ndim(field[place]) != 0 or min(place) < 0:
                 raise InputError(wanted)
         except (KeyError, IndexError, ValueError) as error:
             raise InputError(f"{wanted} MuJoCo: {error}") from None
+        if not self._is_kept(field, place):
+            raise InputError(
+                f"{self._bodies.file}: '{name}' follows from other numbers of the model, or counts nowhere in its bodies. "
+                "Dry friction is declared at a joint of the rig file."
+            )
         return field, place
+
+    def _is_kept(self, field: NDArray[np.float64], place: tuple[int, ...]) -> bool:
+        """Return True for a number that stays what it is set to, and that the bodies are asked with."""
+        import mujoco
+
+        if np.shares_memory(field, self._model.dof_frictionloss):
+            return False
+        before, other = float(field[place]), 1.25 * float(field[place]) + 0.5
+        field[place] = other
+        mujoco.mj_setConst(self._model, mujoco.MjData(self._model))
+        kept = float(field[place]) == other
+        field[place] = before
+        mujoco.mj_setConst(self._model, mujoco.MjData(self._model))
+        return kept
 
     @property
     def c_text(self) -> str:
@@ -164,6 +183,22 @@ def opened(path: Path) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise InputError(f"{path}: MuJoCo cannot read it: {error}") from None
+
+
+def compiled_model(path: Path) -> bytes:
+    """Return a model as MuJoCo compiles it.
+
+    Raises
+    ------
+    InputError
+        As `opened`.
+    """
+    model = opened(path)
+    import mujoco
+
+    content = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    return content.tobytes()
 
 
 def bodies_alone(model: mujoco.MjModel, *, without_armature: bool) -> mujoco.MjModel:

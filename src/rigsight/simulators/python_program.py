@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.simulators.bodies import Bodies
+from rigsight.simulators.bodies import Bodies, forget
 
 Accelerations = Callable[..., Any]
 """``accelerations(q, v, forces, parameters)``: coordinates, rates and forces along coordinates, shape (n,) each, and parameters
 by name -> accelerations, shape (n,). Forces enter linearly."""
 
 _given: dict[str, Accelerations] = {}
+_open: dict[str, list[PythonProgram]] = {}
+NO_MASS = -1
+"""Left by C where what accelerations show is no mass matrix."""
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 _CALL = ctypes.CFUNCTYPE(None, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
 
@@ -32,6 +35,9 @@ def give_function(name: str, accelerations: Accelerations) -> None:
         See `Accelerations`.
     """
     _given[name] = accelerations
+    for program in _open.get(name, ()):
+        program.forget()
+    forget()
 
 
 class PythonProgram:
@@ -58,12 +64,15 @@ class PythonProgram:
     def __init__(self, bodies: Bodies) -> None:
         if bodies.file not in _given:
             raise InputError(
-                f"the simulator '{bodies.file}' is a function of Python, and a rig file runs no code. Name it: "
-                "--simulator FILE.py:FUNCTION, or rigsight.simulators.give_function in Python."
+                f"the simulator '{bodies.file}' is a function of Python, and a rig file runs no code. Name it on the command "
+                "line, --simulator FILE.py:FUNCTION, or in Python by rigsight.simulators.give_function."
             )
         self._bodies = bodies
         self._error: BaseException | None = None
         self._call = _CALL(self._answer)
+        self._failed = ctypes.c_int(0)
+        self._libraries: list[ctypes.CDLL] = []
+        _open.setdefault(bodies.file, []).append(self)
 
     def _answer(self, q: Any, v: Any, f: Any, p: Any, a: Any) -> None:
         bodies = self._bodies
@@ -96,12 +105,26 @@ class PythonProgram:
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""
         library.connect.restype = None
-        library.connect(self._call)
+        library.connect(self._call, ctypes.byref(self._failed))
+        self._libraries.append(library)
+
+    def forget(self) -> None:
+        """Let libraries forget what another function answered."""
+        for library in self._libraries:
+            library.bodies_forget()
 
     def check(self) -> None:
         """See `Program.check`."""
-        if self._error is not None:
-            error, self._error = self._error, None
+        (error, self._error), failed = (self._error, None), bool(self._failed.value)
+        self._failed.value = 0
+        if isinstance(error, Exception):
             raise InputError(
                 f"The simulator '{self._bodies.file}' failed: {type(error).__name__}: {error}"
             ) from error
+        if error is not None:
+            raise error
+        if failed:
+            raise InputError(
+                f"The simulator '{self._bodies.file}' gives accelerations from which no mass matrix follows: forces have to enter "
+                "linearly, each along its own coordinate."
+            )

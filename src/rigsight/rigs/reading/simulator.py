@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from rigsight.errors import InputError, nearest
 from rigsight.rigs.reading.declaration import Declaration
 from rigsight.simulators import KINDS, Bodies
-from rigsight.simulators.bodies import file_digest
+from rigsight.simulators.bodies import model_digest
 
 _KEY = "simulator"
 
@@ -44,6 +45,15 @@ def check_simulator(declaration: Declaration) -> None:
                     (_KEY, key, name),
                     f"there is no coordinate '{name}'.{nearest(name, free)} Declared: {', '.join(free)}",
                 )
+        names = list(getattr(own, key).values())
+        for name, there in getattr(own, key).items():
+            if names.count(there) > 1:
+                declaration.refuse(
+                    (_KEY, key, name), f"'{there}' stands there twice; each has one of its own"
+                )
+    for name, there in own.parameters.items():
+        if list(own.parameters.values()).count(there) > 1:
+            declaration.refuse((_KEY, "parameters", name), f"'{there}' is given by two numbers; take one out")
     numbers = declaration.names("constants", "parameters")
     for name in own.parameters:
         if name not in numbers:
@@ -70,7 +80,7 @@ def simulated_bodies(declaration: Declaration) -> Bodies | None:
         bodies = Bodies(
             own.kind,
             own.file,
-            (own.digest or file_digest(Path(own.file))) if is_file else "",
+            (own.digest or model_digest(own.kind, Path(own.file))) if is_file else "",
             tuple(own.coordinates.get(name, name) for name in free),
             tuple(own.parameters.values()),
             rates=tuple(own.rates.get(name, "") for name in free),
@@ -96,6 +106,9 @@ def with_whole_path(content: dict[str, object], folder: Path) -> dict[str, objec
     own = content.get(_KEY)
     if not isinstance(own, dict) or own.get("kind") == "python" or not isinstance(own.get("file"), str):
         return content
-    path = (folder / str(own["file"])).resolve()
-    digest = {"digest": file_digest(path)} if path.is_file() else {}
-    return {**content, _KEY: {**own, "file": path.as_posix(), **digest}}
+    # What is wrong with the file is told with its place, once the tables are read.
+    with contextlib.suppress(ValueError):
+        own = {**own, "file": (folder / str(own["file"])).resolve().as_posix()}
+    with contextlib.suppress(InputError):
+        own = {**own, "digest": model_digest(str(own.get("kind")), Path(str(own["file"])))}
+    return {**content, _KEY: own}

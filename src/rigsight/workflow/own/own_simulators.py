@@ -25,6 +25,7 @@ def own_simulators(named: Iterable[str]) -> None:
     InputError
         If a file cannot be run or has no such function.
     """
+    taken: dict[str, str] = {}
     for one in named:
         file, colon, name = one.rpartition(":")
         if not colon or not file.endswith(".py") or not name:
@@ -37,4 +38,7 @@ def own_simulators(named: Iterable[str]) -> None:
             raise InputError(
                 f"{file} has no function '{name}'.{nearest(name, functions)} It has: {', '.join(functions) or 'none'}."
             )
+        if name in taken:
+            raise InputError(f"--simulator: {taken[name]} and {one} are called the same; rename one of them.")
+        taken[name] = one
         give_function(name, getattr(module, name))
