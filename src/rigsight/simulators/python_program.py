@@ -82,8 +82,8 @@ class PythonProgram:
             found = np.asarray(_given[bodies.file](*own, numbers), dtype=np.float64)
             if found.shape != (n,):
                 raise ValueError(f"it returned the shape {found.shape}, wanted is ({n},)")
-        # What a user's function raises would vanish in C; `check` raises it.
-        except Exception as error:
+        # What is raised here, Ctrl-C too, would vanish in C; `check` raises it.
+        except BaseException as error:
             self._error = error
             found = np.full(n, np.nan)
         for i in range(n):
@@ -125,6 +125,6 @@ class PythonProgram:
             raise error
         if failed:
             raise InputError(
-                f"The simulator '{self._bodies.file}' gives accelerations from which no mass matrix follows: forces have to enter "
-                "linearly, each along its own coordinate."
+                f"The simulator '{self._bodies.file}' gives accelerations from which no mass matrix follows: forces have to "
+                "enter linearly, each along its own coordinate."
             )
