@@ -18,6 +18,8 @@ PACKAGES = (
     "simulate",
     "frequency",
     "robots",
+    "simulators",
+    "libraries",
     "identify",
     "discover",
     "compare",

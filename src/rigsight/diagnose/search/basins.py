@@ -55,8 +55,10 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
 
 def _on_rig_of(leader: Scored, model: Scored) -> dict[str, float]:
     """Return the numbers of a model with those of the rig as another model has them."""
-    fit, rig = model.fit, {p.name for p in model.fit.structure.rig.parameters}
-    return {**fit.values, **{name: value for name, value in leader.fit.values.items() if name in rig}}
+    fit = model.fit
+    # What is held keeps its value: a constant force that somebody knows, beside an effect that would take it up.
+    own = {p.name for p in fit.structure.rig.parameters} & set(fit.free)
+    return {**fit.values, **{name: value for name, value in leader.fit.values.items() if name in own}}
 
 
 def _lowest(context: FitContext, model: Scored, starts: Sequence[dict[str, float]]) -> Scored:

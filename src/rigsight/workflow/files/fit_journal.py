@@ -38,8 +38,12 @@ class FitJournal:
         self._known: dict[str, Mapping[str, Any]] = {}
         self._lock = threading.Lock()
         self._going_on = going_on
-        self.recalled = 0
-        """Fits that did not have to be done again."""
+        self._again: set[str] = set()
+
+    @property
+    def recalled(self) -> int:
+        """Fits that did not have to be done again; one that is asked for twice is one."""
+        return len(self._again)
 
     def __enter__(self) -> Self:
         try:
@@ -67,9 +71,9 @@ class FitJournal:
         found = self._known.get(key)
         if found is not None:
             with self._lock:
-                self.recalled += 1
                 # Not before: a campaign that was changed since has the same path, and none of these fits.
-                is_first = self.recalled == 1
+                is_first = not self._again
+                self._again.add(key)
             if is_first and self._going_on is not None:
                 self._going_on(len(self._known))
         return found
