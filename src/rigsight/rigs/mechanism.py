@@ -1,4 +1,4 @@
-"""What is a rig made of? Coordinates and energies, and the joints, drives, sensors and states that act on them or read them."""
+"""Which equations of motion follow from a rig's coordinates, energies and other parts?"""
 
 from __future__ import annotations
 
@@ -11,147 +11,20 @@ import sympy as sp
 from sympy.simplify.fu import TR8
 
 from rigsight.rigs.coupled_inertia import has_short_inverse
+from rigsight.rigs.parts import (
+    Coordinate,
+    Drive,
+    Joint,
+    RateState,
+    Sensor,
+    acceleration,
+    applied_symbol,
+    force_symbol,
+)
 from rigsight.simulators import Bodies, force_leaf, mass_leaf
 
 _LONGEST_SHORTENED = 100
 """In operations. Shortening takes a millisecond for each, and nobody reads what is longer."""
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """A degree of freedom, or a motion that an input prescribes.
-
-    Attributes
-    ----------
-    symbol, rate
-        The coordinate and its time derivative.
-    unit
-        Its SI unit.
-    prescribed_by
-        Name of the input that it follows; None for a degree of freedom.
-    about
-        What it is.
-    """
-
-    symbol: sp.Symbol
-    rate: sp.Symbol
-    unit: str
-    prescribed_by: str | None = None
-    about: str = ""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return str(self.symbol.name)
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A place where effects of the dynamics act: a motion, and what resists it.
-
-    ``resisting force = stiffness * (motion - rest) + damping * d(motion) + force``
-
-    Attributes
-    ----------
-    name
-        Its name.
-    motion
-        Expression of the coordinates.
-    stiffness, damping, rest
-        Expressions of parameters and constants.
-    force
-        What else resists: constant, or a known law.
-    inertia
-        Inertia that moves with it; None for what the kinetic energy gives.
-    damps_spring
-        Whether its damper is squeezed with the spring and not by the motion: behind a play, both act in contact alone.
-    about
-        What it is.
-    """
-
-    name: str
-    motion: sp.Expr
-    stiffness: sp.Expr = sp.S.Zero
-    damping: sp.Expr = sp.S.Zero
-    rest: sp.Expr = sp.S.Zero
-    force: sp.Expr = sp.S.Zero
-    inertia: sp.Expr | None = None
-    damps_spring: bool = False
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class Drive:
-    """A place where effects of the actuator act: on the value of a signal, from which a generalized force follows.
-
-    Attributes
-    ----------
-    name
-        Its name, and that of its signal behind the effects.
-    signal
-        What it is told: an input, or a control law.
-    force
-        Expression of its own name and others.
-    along
-        Expression of the coordinates along which the force acts.
-    about
-        What it is.
-    """
-
-    name: str
-    signal: sp.Expr
-    force: sp.Expr
-    along: sp.Expr
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """A place where effects of the sensor act, and a column of a record.
-
-    Attributes
-    ----------
-    name
-        Its name, and that of its reading in control laws.
-    reads
-        What an ideal one shows.
-    unit
-        SI unit.
-    about
-        What it is.
-    """
-
-    name: str
-    reads: sp.Expr
-    unit: str
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class RateState:
-    """A first-order state: a filter, an integrator, a pressure.
-
-    Attributes
-    ----------
-    symbol
-        The state.
-    rate
-        Its time derivative.
-    unit
-        SI unit.
-    about
-        What it is.
-    """
-
-    symbol: sp.Symbol
-    rate: sp.Expr
-    unit: str
-    about: str = ""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return str(self.symbol.name)
 
 
 @dataclass(frozen=True)
@@ -395,26 +268,3 @@ def _shortened(expression: sp.Expr) -> sp.Expr:
         return expression
     other = sp.expand(TR8(sp.expand(expression)))
     return min(expression, other, key=sp.count_ops)
-
-
-def acceleration(coordinate: Coordinate) -> sp.Symbol:
-    """Return the symbol of the second time derivative of a prescribed coordinate."""
-    return sp.Symbol(f"dd({coordinate.name})", real=True)
-
-
-def applied_symbol(index: int) -> sp.Symbol:
-    """Return the symbol of what drives and joints put on a degree of freedom, where simulated bodies read it."""
-    return sp.Symbol(f"applied {index}", real=True)
-
-
-READING = "reading of "
-
-
-def reading_symbol(name: str) -> sp.Symbol:
-    """Return the symbol of what a sensor shows, where a control law reads it."""
-    return sp.Symbol(f"{READING}{name}", real=True)
-
-
-def force_symbol(name: str) -> sp.Symbol:
-    """Return the symbol of all that a joint resists with, where a sensor reads it."""
-    return sp.Symbol(f"force({name})", real=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from rigsight.rigs.mechanism import Coordinate, RateState
+from rigsight.rigs.parts import Coordinate, RateState
 
 
 @dataclass(frozen=True)

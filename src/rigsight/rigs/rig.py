@@ -13,8 +13,9 @@ from rigsight.effects import symbols
 from rigsight.effects.effect import Effect, Place
 from rigsight.parameters import Parameter
 from rigsight.rigs.evaluation import evaluated
-from rigsight.rigs.mechanism import Drive, Joint, Mechanism, RateState, Sensor
+from rigsight.rigs.mechanism import Mechanism
 from rigsight.rigs.one_motion import Follower, Motion, follower_of
+from rigsight.rigs.parts import Drive, Joint, RateState, Sensor
 from rigsight.rigs.signal import Signal
 from rigsight.units import unit_text
 

@@ -12,7 +12,7 @@ import sympy as sp
 
 from rigsight.effects import Effect, Energy, Place, placed_dimension
 from rigsight.effects import symbols as canonical
-from rigsight.rigs import Drive, Joint, Rig, Sensor, applied_symbol, force_symbol, reading_symbol
+from rigsight.rigs import Drive, Joint, Rig, Sensor, force_symbol, reading_symbol
 from rigsight.simulate.binder import Binder, state_symbol
 from rigsight.simulate.equation_tree import (
     Definition,
@@ -24,6 +24,7 @@ from rigsight.simulate.equation_tree import (
     late,
     shifted,
 )
+from rigsight.simulate.equations_of_motion import equations_of_motion
 from rigsight.simulate.observer_acceleration import measured_before, observer_acceleration
 from rigsight.simulate.structure import ahead_name, bandwidth_name, input_symbols
 from rigsight.units import at_place, size_of
@@ -133,7 +134,7 @@ class _Path:
         return EquationTree(
             inputs=self._inputs(),
             definitions=tuple(self._definitions),
-            motion=self._motion(resisting, states) if mechanism.free else EquationsOfMotion(),
+            motion=self._motion(resisting, states),
             states=states,
             outputs=tuple(Output(sensor.name, readings[sensor.name]) for sensor in mechanism.sensors),
         )
@@ -171,40 +172,10 @@ class _Path:
     def _motion(
         self, resisting: Mapping[str, tuple[sp.Expr, ...]], states: Sequence[FirstOrderState]
     ) -> EquationsOfMotion:
-        """Return Lagrange's equations with the forces of drives and joints by virtual work."""
-        mechanism, free = self._rig.mechanism, self._rig.mechanism.free
-        terms: list[list[sp.Expr]] = [[] for _ in free]
-        for drive in mechanism.drives:
-            self._add(terms, drive.along, [self._bound(drive.force)])
-        for joint in mechanism.joints:
-            self._add(terms, joint.motion, [-term for term in resisting[joint.name]])
-        for own, force in zip(terms, mechanism.generalized_forces, strict=True):
-            if force != 0:
-                own.append(self._bound(force))
-        self._add_bodies(terms)
-        mass = mechanism.mass_matrix.applyfunc(self._bound)
-        if self._bandwidths:
-            for own, force in zip(terms, mass * self._observer(states), strict=True):
-                own.append(force)
-        return EquationsOfMotion(
-            coordinates=tuple(c.symbol for c in free),
-            velocities=tuple(c.rate for c in free),
-            mass=sp.ImmutableMatrix(mass),
-            terms=tuple(map(tuple, terms)),
-            dimensions=("x",) if mechanism.has_one_motion else tuple(size_of(c.name) for c in free),
-            rate_dimensions=("x time^-1",)
-            if mechanism.has_one_motion
-            else tuple(size_of(c.rate.name) for c in free),
-        )
-
-    def _add_bodies(self, terms: Sequence[list[sp.Expr]]) -> None:
-        """Add what another program puts on the degrees of freedom, with what drives, joints and energies put on its bodies."""
-        mechanism = self._rig.mechanism
-        if mechanism.bodies is None:
-            return
-        applied = {applied_symbol(i): sp.Add(*own) for i, own in enumerate(terms)}
-        for own, force in zip(terms, mechanism.simulated_forces, strict=True):
-            own.append(self._bound(force).xreplace(applied))
+        if not self._rig.mechanism.free:
+            return EquationsOfMotion()
+        pulled = self._observer(states) if self._bandwidths else None
+        return equations_of_motion(self._rig, self._bound, resisting, pulled)
 
     def _observer(self, states: Sequence[FirstOrderState]) -> sp.Matrix:
         """Return the accelerations by which an observer follows what sensors showed, shape (n_degrees, 1)."""
@@ -225,11 +196,6 @@ class _Path:
                 bandwidth,
             )
         return found
-
-    def _add(self, terms: Sequence[list[sp.Expr]], along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
-        for own, coordinate in zip(terms, self._rig.mechanism.free, strict=True):
-            slope = self._bound(sp.diff(along, coordinate.symbol))
-            own += [slope * force for force in forces if slope != 0]
 
     def _bound(self, expression: sp.Expr) -> sp.Expr:
         """Bind an expression of the rig, drives and sensors as they are behind their effects."""

@@ -12,7 +12,8 @@ from rigsight.effects import Effect, Place, kind_of
 from rigsight.effects import symbols as canonical
 from rigsight.parameters import Parameter
 from rigsight.rigs import Drive, Joint, Rig, Sensor, Signal, force_symbol
-from rigsight.rigs.mechanism import Coordinate, Mechanism
+from rigsight.rigs.mechanism import Mechanism
+from rigsight.rigs.parts import Coordinate
 from rigsight.simulate import Structure, compose
 
 STIFFNESS = "k"

@@ -9,7 +9,7 @@ import sympy as sp
 from pydantic import ValidationError
 
 from rigsight.errors import InputError
-from rigsight.rigs.mechanism import reading_symbol
+from rigsight.rigs.parts import reading_symbol
 from rigsight.rigs.reading.expression_values import to_sympy
 from rigsight.rigs.reading.expressions import (
     Expression,

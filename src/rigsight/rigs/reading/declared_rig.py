@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import sympy as sp
 
 from rigsight.parameters import Parameter
-from rigsight.rigs.mechanism import Coordinate, Drive, Joint, Mechanism, RateState, Sensor
+from rigsight.rigs.mechanism import Mechanism
+from rigsight.rigs.parts import Coordinate, Drive, Joint, RateState, Sensor
 from rigsight.rigs.reading.declaration import DRIVE_PARTS, JOINT_PARTS, Declaration, Path
 from rigsight.rigs.reading.expressions import rate_name
 from rigsight.rigs.reading.rig_tables import ConstantTable, ParameterTable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from graphlib import CycleError, TopologicalSorter
 
-from rigsight.rigs.mechanism import READING
+from rigsight.rigs.parts import READING
 from rigsight.rigs.reading.declaration import Declaration, Path
 
 

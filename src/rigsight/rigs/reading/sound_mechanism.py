@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from rigsight.rigs.mechanism import Mechanism, force_symbol, reading_symbol
+from rigsight.rigs.mechanism import Mechanism
+from rigsight.rigs.parts import force_symbol, reading_symbol
 from rigsight.rigs.reading.declaration import Declaration
 from rigsight.rigs.reading.mass import dependent_coordinates, is_quadratic, negative_coordinates
 

@@ -1,0 +1,67 @@
+"""Which equations of motion do drives, joints, energies and simulated bodies make together?
+
+Lagrange's equations with the forces of drives and joints by virtual work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import sympy as sp
+
+from rigsight.rigs import Rig, applied_symbol
+from rigsight.simulate.equation_tree import EquationsOfMotion
+from rigsight.units import size_of
+
+Bound = Callable[[sp.Expr], sp.Expr]
+
+
+def equations_of_motion(
+    rig: Rig, bound: Bound, resisting: Mapping[str, tuple[sp.Expr, ...]], pulled: sp.Matrix | None = None
+) -> EquationsOfMotion:
+    """Return the equations of motion of a rig with n degrees of freedom.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    bound
+        Puts the symbols of a structure into an expression of the rig's declaration.
+    resisting
+        Joint -> the forces that resist its motion, bound already.
+    pulled
+        Accelerations by which an observer pulls the motion, shape (n, 1).
+    """
+    mechanism, free = rig.mechanism, rig.mechanism.free
+    terms: list[list[sp.Expr]] = [[] for _ in free]
+
+    def add(along: sp.Expr, forces: Sequence[sp.Expr]) -> None:
+        for own, coordinate in zip(terms, free, strict=True):
+            slope = bound(sp.diff(along, coordinate.symbol))
+            own += [slope * force for force in forces if slope != 0]
+
+    for drive in mechanism.drives:
+        add(drive.along, [bound(drive.force)])
+    for joint in mechanism.joints:
+        add(joint.motion, [-term for term in resisting[joint.name]])
+    for own, force in zip(terms, mechanism.generalized_forces, strict=True):
+        if force != 0:
+            own.append(bound(force))
+    if mechanism.bodies is not None:
+        # What binds bodies answers to all else that pushes them.
+        applied = {applied_symbol(i): sp.Add(*own) for i, own in enumerate(terms)}
+        for own, force in zip(terms, mechanism.simulated_forces, strict=True):
+            own.append(bound(force).xreplace(applied))
+    mass = sp.ImmutableMatrix(mechanism.mass_matrix.applyfunc(bound))
+    if pulled is not None:
+        for own, force in zip(terms, mass * pulled, strict=True):
+            own.append(force)
+    one = mechanism.has_one_motion
+    return EquationsOfMotion(
+        coordinates=tuple(c.symbol for c in free),
+        velocities=tuple(c.rate for c in free),
+        mass=mass,
+        terms=tuple(map(tuple, terms)),
+        dimensions=("x",) if one else tuple(size_of(c.name) for c in free),
+        rate_dimensions=("x time^-1",) if one else tuple(size_of(c.rate.name) for c in free),
+    )
