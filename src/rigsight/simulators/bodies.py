@@ -103,7 +103,7 @@ class Bodies:
     @cached_property
     def c_text(self) -> str:
         """C functions ``simulated`` and ``simulated_slope``, which ask the program and remember its last answers."""
-        text = files("rigsight.simulators").joinpath("templates", "simulated.c.txt").read_text("utf-8")
+        text = template("simulated.c.txt")
         fragments = {
             "KEY": str(self.key),
             "N": str(self.n),
@@ -136,8 +136,9 @@ class Bodies:
             If it is not installed, or its model cannot be read or lacks a name.
         """
         if self.digest and model_digest(self.kind, Path(self.file)) != self.digest:
+            included = ", what it includes or MuJoCo itself" if self.kind == "mujoco" else ""
             raise InputError(
-                f"{self.file} has changed since this rig was read; its numbers belong to another model."
+                f"{self.file}{included} has changed since this rig was read; its numbers belong to another model."
             )
         program: Program = _openers()[self.kind](self)
         return program
@@ -213,18 +214,9 @@ _known: dict[int, Bodies] = {}
 """Bodies by their key, of which numbers alone stand in equations."""
 
 
-_forgetting: list[Callable[[], None]] = []
-
-
-def forget() -> None:
-    """Drop all answers that are remembered in Python."""
-    for drop in _forgetting:
-        drop()
-
-
-def when_forgetting(drop: Callable[[], None]) -> None:
-    """Let a memory of answers be dropped by `forget`."""
-    _forgetting.append(drop)
+def template(name: str) -> str:
+    """Return the text of one of the fixed parts of C."""
+    return files("rigsight.simulators").joinpath("templates", name).read_text("utf-8")
 
 
 def bodies_of(key: int) -> Bodies:

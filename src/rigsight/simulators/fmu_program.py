@@ -8,12 +8,11 @@ from __future__ import annotations
 import atexit
 import ctypes
 import shutil
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError, nearest
-from rigsight.simulators.bodies import Bodies
+from rigsight.simulators.bodies import Bodies, template
 
 _FUNCTIONS = {
     "2": (
@@ -88,8 +87,7 @@ class FmuProgram:
         self._version = description.fmiVersion[0]
         self._variables = {variable.name: variable for variable in description.modelVariables}
         states = [unknown.variable.derivative.name for unknown in description.derivatives]
-        rates = bodies.rates
-        self._places = [self._state(name, states) for name in (*bodies.coordinates, *rates)]
+        self._places = [self._state(name, states) for name in (*bodies.coordinates, *bodies.rates)]
         others = [state for index, state in enumerate(states) if index not in self._places]
         if others:
             raise InputError(
@@ -141,15 +139,12 @@ class FmuProgram:
     @property
     def c_text(self) -> str:
         """See `Program.c_text`."""
-        folder = files("rigsight.simulators").joinpath("templates")
-        text = folder.joinpath("fmu.c.txt").read_text("utf-8") + folder.joinpath("probed.c.txt").read_text(
-            "utf-8"
-        )
+        text = template("fmu.c.txt") + template("probed.c.txt")
         return text.replace("<<VERSION>>", self._version).replace("<<STATES>>", str(self._n_states))
 
     @property
     def include_folders(self) -> tuple[str, ...]:
-        """None."""
+        """No headers beside those of the compiler."""
         return ()
 
     def connect(self, library: ctypes.CDLL) -> None:

@@ -11,16 +11,16 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from rigsight.simulators.bodies import STEP, Bodies, bodies_of, when_forgetting
+from rigsight.simulators.bodies import STEP, Bodies, bodies_of
 
 Floats = NDArray[np.float64]
 
 _MOST_REMEMBERED = 16
+"""A place and the moved ones around it, of two rigs with few coordinates."""
 
 _lock = threading.Lock()
 _remembered: OrderedDict[tuple[Any, ...], Floats] = OrderedDict()
 """Values by what they were computed of: each entry of a mass matrix asks for the same."""
-when_forgetting(_remembered.clear)
 
 
 class simulated(sp.Function):  # type: ignore[misc]  # noqa: N801
@@ -107,6 +107,12 @@ def place_of(leaf: sp.Expr) -> tuple[int, ...]:
         return (_row(key, index),)
     row = next(i for i in range(bodies_of(int(key)).n) if int(index) < (i + 1) * (i + 2) // 2)
     return row, int(index) - row * (row + 1) // 2
+
+
+def forget() -> None:
+    """Drop what is remembered: a function of Python may be another one now."""
+    with _lock:
+        _remembered.clear()
 
 
 def _n_mass(key: Any) -> int:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import re
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.errors import InputError, nearest
-from rigsight.simulators.bodies import Bodies
+from rigsight.simulators.bodies import Bodies, template
 
 if TYPE_CHECKING:
     import mujoco
@@ -25,15 +24,7 @@ _FUNCTIONS = (
     "mj_comVel", "mj_passive", "mj_rne",
 )  # fmt: skip
 """What the C text calls, in the order of its table."""
-_OBJECTS = {
-    "body": "nbody",
-    "jnt": "njnt",
-    "dof": "nv",
-    "geom": "ngeom",
-    "tendon": "ntendon",
-    "eq": "neq",
-    "pair": "npair",
-}
+_OBJECTS = ("body", "jnt", "dof", "geom", "tendon", "eq", "pair")
 """Beginnings of the fields of a model whose rows have names."""
 
 
@@ -64,6 +55,7 @@ class MujocoProgram:
         self._fields = [self._field(name) for name in bodies.parameters]
         self.reads_forces = has_constraints(self._model)
         """Whether bodies can touch, or joints, tendons and equalities are bound."""
+        self._kept: list[Any] = []
         model = self._model
         self._is_plain = not (self.reads_forces or model.ntendon or model.nflex or model.nplugin)
 
@@ -138,7 +130,7 @@ class MujocoProgram:
         """See `Program.c_text`."""
         import mujoco
 
-        text = files("rigsight.simulators").joinpath("templates", "mujoco.c.txt").read_text("utf-8")
+        text = template("mujoco.c.txt")
         text = text.replace("<<VERSION>>", mujoco.__version__)
         for key, flag in {"<<CONSTRAINED>>": self.reads_forces, "<<PLAIN>>": self._is_plain}.items():
             text = text.replace(key, str(int(flag)))
@@ -157,11 +149,11 @@ class MujocoProgram:
         offsets = [_address(field, place) - origin for field, place in self._fields]
         table = (ctypes.c_void_p * len(_FUNCTIONS))(*functions)
         places = (ctypes.c_int * (2 * len(self._places)))(*(i for place in self._places for i in place))
-        moved = (ctypes.c_long * max(1, len(offsets)))(*offsets)
+        moved = (ctypes.c_longlong * max(1, len(offsets)))(*offsets)
         library.connect.restype = None
         library.connect(table, ctypes.c_void_p(self._model._address), places, moved)
         # The library keeps the addresses.
-        self._kept = (*getattr(self, "_kept", ()), table, places, moved, mujoco_library)
+        self._kept.append((table, places, moved, mujoco_library))
 
     def check(self) -> None:
         """Nothing can go wrong: MuJoCo warns, and goes on."""

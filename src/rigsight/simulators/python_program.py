@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.simulators.bodies import Bodies, forget
+from rigsight.simulators.bodies import Bodies, template
+from rigsight.simulators.leaf import forget
 
 Accelerations = Callable[..., Any]
 """``accelerations(q, v, forces, parameters)``: coordinates, rates and forces along coordinates, shape (n,) each, and parameters
@@ -18,8 +18,6 @@ by name -> accelerations, shape (n,). Forces enter linearly."""
 
 _given: dict[str, Accelerations] = {}
 _open: dict[str, list[PythonProgram]] = {}
-NO_MASS = -1
-"""Left by C where what accelerations show is no mass matrix."""
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 _CALL = ctypes.CFUNCTYPE(None, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
 
@@ -92,14 +90,11 @@ class PythonProgram:
     @property
     def c_text(self) -> str:
         """See `Program.c_text`."""
-        folder = files("rigsight.simulators").joinpath("templates")
-        return folder.joinpath("function.c.txt").read_text("utf-8") + folder.joinpath(
-            "probed.c.txt"
-        ).read_text("utf-8")
+        return template("function.c.txt") + template("probed.c.txt")
 
     @property
     def include_folders(self) -> tuple[str, ...]:
-        """None."""
+        """No headers beside those of the compiler."""
         return ()
 
     def connect(self, library: ctypes.CDLL) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from importlib.resources import files
 
 from rigsight.simulate.structure import Structure
+from rigsight.simulators.bodies import template
 
 
 def bodies_text(structure: Structure) -> str:
@@ -18,7 +18,7 @@ def lane_bodies_text(structure: Structure) -> str:
     """Return the same for parameter sets side by side."""
     if structure.rig.mechanism.bodies is None:
         return ""
-    return files("rigsight.simulators").joinpath("templates", "lane_simulated.c.txt").read_text("utf-8")
+    return template("lane_simulated.c.txt")
 
 
 def include_folders(structure: Structure) -> tuple[str, ...]:
