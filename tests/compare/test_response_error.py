@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigsight.compare import response_error, response_floor, signal_paths
+from rigsight.compare import Floor, response_error, response_floor, signal_paths
 from rigsight.compare.response_error import measured_responses, simulated_response
+from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import log_sweep
 from rigsight.frequency import FrequencyResponse
@@ -18,6 +19,7 @@ from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR
 from rigsight.simulate import compose, simulate
 
 LINEAR = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
+LIGHT = {**LINEAR, "m": 1.0, "d": 1.5, "k": 400.0}
 
 
 def response(
@@ -66,13 +68,42 @@ def test_only_lines_that_both_have_are_compared() -> None:
         response_error(response([1.0], [1.0]), response([2.0], [1.0]))
 
 
-def test_the_floor_is_the_half_of_the_variance_that_lies_along_the_value() -> None:
-    floor = response_floor(response([1.0, 2.0], [1.0, 2.0j], [2.0 * 0.01**2, 2.0 * 0.01**2]))
-    assert floor is not None
-    assert floor.magnitude == pytest.approx(0.01)
-    assert floor.phase == pytest.approx(math.sqrt((0.01**2 + 0.005**2) / 2.0))
-    assert floor.decibel == pytest.approx(floor.phase * 20.0 / math.log(10.0))
-    assert response_floor(response([1.0], [1.0])) is None
+@pytest.mark.parametrize("seconds", [20.0, 80.0])
+def test_the_floor_is_the_error_of_the_true_model_however_nonlinear_the_rig_is(seconds: float) -> None:
+    dt = 4e-3
+    t = dt * np.arange(round(seconds / dt))
+    friction = effect_named("coulomb_friction")
+    bare = Record("sweep", dt, {"u": log_sweep(t, 3.0, 3.0, 90.0)}, {"u": "N", "x": "m"}, kind="sweep")
+    clean = simulate(compose(AXIS, [friction]), {**LIGHT, "T_c": 0.6}, bare)
+    floor = Floor("x", "m", 0.01 * float(np.std(clean["x"])), "known")
+    rng = np.random.default_rng(1)
+    noisy = clean.with_signals(x=clean["x"] + floor.noise(t.size, dt, rng))
+    noisier = [noisy.with_signals(x=noisy["x"] + floor.noise(t.size, dt, rng)) for _ in range(4)]
+    (path,) = signal_paths(AXIS)
+    measured = measured_responses(noisy, (path,), "local_rational")[0][path.name]
+    error = response_error(measured, simulated_response(clean, path, "local_rational", measured))
+    least = response_floor(noisier, path, "local_rational", measured)
+    assert least is not None
+    assert measured.variance is not None
+    assert error.magnitude == pytest.approx(least.magnitude, rel=0.3)
+    assert error.decibel == pytest.approx(least.decibel, rel=0.3)
+    # The variance of the estimate holds the distortion as well.
+    assert np.sqrt(np.mean(measured.variance) / 2.0) > 3.0 * error.magnitude
+
+
+def test_lines_beyond_the_sweep_are_not_compared_however_fast_the_record_was_sampled() -> None:
+    dt = 1e-3
+    t = dt * np.arange(5000)
+    bare = Record("sweep", dt, {"u": log_sweep(t, 3.0, 3.0, 90.0)}, {"u": "N", "x": "m"}, kind="sweep")
+    clean = simulate(compose(AXIS), LIGHT, bare)
+    noise = np.random.default_rng(1).normal(scale=0.01 * np.std(clean["x"]), size=t.size)
+    (path,) = signal_paths(AXIS)
+    found, problems = measured_responses(clean.with_signals(x=clean["x"] + noise), (path,), "local_rational")
+    assert not problems
+    assert found[path.name].omega[-1] < 150.0
+    found, (problem,) = measured_responses(clean.with_signals(x=noise), (path,), "local_rational")
+    assert not found
+    assert "too few for a comparison" in problem
 
 
 def test_the_paths_of_a_running_gear_are_cut_where_the_thesis_cuts_them() -> None:
@@ -97,11 +128,7 @@ def test_a_simulation_is_read_by_the_estimator_of_the_measurement_and_shows_the_
     own = simulated_response(clean, path, "local_rational", measured[path.name])
     truth = 1.0 / (LINEAR["k"] - LINEAR["m"] * own.omega**2 + 1j * LINEAR["d"] * own.omega)
     np.testing.assert_allclose(own.values, truth, rtol=2e-3)
-    error, floor = response_error(measured[path.name], own), response_floor(measured[path.name])
-    assert floor is not None
-    assert error.n_lines == measured[path.name].omega.size
-    assert error.magnitude == pytest.approx(floor.magnitude, rel=0.3)
-    assert error.decibel == pytest.approx(floor.decibel, rel=0.3)
+    assert response_error(measured[path.name], own).n_lines == measured[path.name].omega.size
 
 
 def test_a_step_has_no_frequency_response_and_says_nothing() -> None:

@@ -75,7 +75,9 @@ def test_the_command_writes_tables_a_page_and_figures(gear: Path, tmp_path: Path
     assert len(rows) == 3 * (2 * 3 + 2 + 4)
     assert {r["model"] for r in rows} == {"nominal", "iwan_tables", "mine"}
     truth = [r for r in rows if r["model"] == "iwan_tables" and r["signal"] in ("psi", "u -> psi")]
-    assert all(r["best"] == "yes" and float(r["value"]) < 1.5 * float(r["noise_floor"]) for r in truth)
+    assert all(r["best"] == "yes" for r in truth)
+    # The floor is of the rig at rest, where its resonance does not amplify the disturbance.
+    assert all(float(r["value"]) < 2.5 * float(r["noise_floor"]) for r in truth)
     content = json.loads((out / "comparison.json").read_text(encoding="utf-8"))
     assert (content["schema_version"], len(content["scores"]), content["failures"]) == (1, len(rows), [])
     assert [s["value"] for s in content["scores"]] == pytest.approx(
@@ -96,7 +98,9 @@ def test_the_method_of_the_thesis_is_an_option(gear: Path) -> None:
     comparison = run_compare(gear, ["identified", "nominal"], method="thesis", n_jobs=1)
     errors = {(s.model, s.column.signal, s.column.quantity): s for s in comparison.scores}
     yaw = errors["identified", "u -> psi", "magnitude_rmse"]
-    assert (yaw.column.unit, yaw.noise_floor) == ("rad/A", None)
+    assert yaw.column.unit == "rad/A"
+    assert yaw.noise_floor is not None
+    assert 0.0 < yaw.noise_floor < errors["nominal", "u -> psi", "magnitude_rmse"].value
     # Table 5.1 has the same order at 1 A.
     assert yaw.value < errors["nominal", "u -> psi", "magnitude_rmse"].value
 

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.compare.floor import Floor
 from rigsight.compare.free_run import free_run
 from rigsight.compare.response_error import (
+    ResponseError,
     SignalPath,
     measured_responses,
     response_error,
@@ -32,6 +34,10 @@ from rigsight.simulate.model import Model
 
 _EQUAL = 5e-4
 """Relative difference below which two errors are the same: they read alike in three digits."""
+_NOISE_SEED = 0
+"""Of the noise that shows what noise does to a frequency response: the same comparison gives the same floors."""
+_COPIES = 4
+"""Copies with other noise, over which the floor of a frequency response is averaged: one alone may be a fifth too low."""
 _FEWER = 0.95
 """Share of the measured lines below which a simulated response is said to have fewer."""
 
@@ -43,17 +49,6 @@ class Competitor:
     name: str
     model: Model
     source: str
-
-
-@dataclass(frozen=True)
-class Floor:
-    """Standard deviation of what no model can explain in an output, how it was found, and whether it is only a lower bound."""
-
-    output: str
-    unit: str
-    std: float
-    method: str
-    lower_bound: bool = False
 
 
 @dataclass(frozen=True)
@@ -264,6 +259,12 @@ def compare_on_record(
     """
     paths = signal_paths(yardstick.rig)
     measured, problems = measured_responses(record, paths, yardstick.method)
+    disturbed = _with_more_noise(record, yardstick)
+    least = {
+        path.name: response_floor(disturbed, path, yardstick.method, measured[path.name])
+        for path in paths
+        if path.name in measured
+    }
     notes = [f"No frequency response: {problem}" for problem in problems]
     step = None
     if record.kind == "step":
@@ -271,7 +272,7 @@ def compare_on_record(
             step = step_window(record, _stepping(record, yardstick.rig), yardstick.step_seconds)
         except InputError as error:
             notes.append(str(error))
-    trials = [_trial(c, record, windows, yardstick, paths, measured, step) for c in competitors]
+    trials = [_trial(c, record, windows, yardstick, paths, measured, least, step) for c in competitors]
     moved: dict[str, dict[str, NDArray[np.float64]]] = {}
     for trial in trials:
         for output, samples in trial.moved.items():
@@ -286,6 +287,18 @@ def compare_on_record(
         failures=tuple(failure for trial in trials for failure in trial.failures),
         notes=(*notes, *(note for trial in trials for note in trial.notes)),
     )
+
+
+def _with_more_noise(record: Record, yardstick: Yardstick) -> list[Record]:
+    """Return copies of a record whose outputs have as much noise again."""
+    rng = np.random.default_rng(_NOISE_SEED)
+    floors = [floor for floor in yardstick.floors if floor.output in record]
+    return [
+        record.with_signals(
+            **{f.output: record[f.output] + f.noise(record.n_samples, record.dt, rng) for f in floors}
+        )
+        for _ in range(_COPIES)
+    ]
 
 
 def _stepping(record: Record, rig: Rig) -> str:
@@ -328,6 +341,7 @@ def _trial(
     yardstick: Yardstick,
     paths: Iterable[SignalPath],
     measured: Mapping[str, FrequencyResponse],
+    least: Mapping[str, ResponseError | None],
     step: StepWindow | None,
 ) -> _Trial:
     trial = _Trial(competitor.name, record.name)
@@ -343,7 +357,9 @@ def _trial(
         )
     for path in paths:
         if path.name in measured:
-            _score_response(trial, run.simulated, path, measured[path.name], yardstick.method)
+            _score_response(
+                trial, run.simulated, path, measured[path.name], least[path.name], yardstick.method
+            )
     for floor in yardstick.floors:
         if floor.output not in record:
             continue
@@ -361,7 +377,12 @@ def _trial(
 
 
 def _score_response(
-    trial: _Trial, simulated: Record, path: SignalPath, measured: FrequencyResponse, method: Method
+    trial: _Trial,
+    simulated: Record,
+    path: SignalPath,
+    measured: FrequencyResponse,
+    floor: ResponseError | None,
+    method: Method,
 ) -> None:
     columns = (
         Column("magnitude_rmse", path.name, measured.unit),
@@ -375,7 +396,6 @@ def _score_response(
         trial.failures += [Failure(trial.model, trial.record, str(problem), column) for column in columns]
         return
     trial.responses[path.name] = without_shares(own)
-    floor = response_floor(measured)
     floors = (None, None, None) if floor is None else (floor.magnitude, floor.phase, floor.decibel)
     for column, value, least in zip(
         columns, (error.magnitude, error.phase, error.decibel), floors, strict=True

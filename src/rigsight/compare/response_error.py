@@ -144,7 +144,7 @@ def measured_responses(
         if first is not None:
             band = (band[0], min(band[1], float(first.omega[-1])))
         try:
-            found[path.name] = _response(record, path, method, _LEAST_CLEARNESS).band(*band)
+            found[path.name] = _measured(record, path, method).band(*band)
         except InputError as error:
             problems.append(f"{path.name}: {error}")
     return found, problems
@@ -161,10 +161,23 @@ def _of_inputs(
         problems.append("no input moves in this record; without excitation there is no frequency response.")
     for path in moving:
         try:
-            found[path.name] = _response(record, path, method, _LEAST_CLEARNESS)
+            found[path.name] = _measured(record, path, method)
         except InputError as error:
             problems.append(f"{path.name}: {error}")
     return found, problems
+
+
+def _measured(record: Record, path: SignalPath, method: Method) -> FrequencyResponse:
+    """Return the response at the lines that stand out of their noise."""
+    found = _response(record, path, method, _LEAST_CLEARNESS)
+    if found.variance is not None:
+        is_clear = found.magnitude**2 > _LEAST_CLEARNESS * found.variance
+        if np.mean(is_clear) < 0.5:
+            raise InputError(
+                f"{np.sum(is_clear)} of {is_clear.size} lines stand out of their noise by 10 dB, too few for a comparison. "
+                "Record for longer, or excite more."
+            )
+    return found
 
 
 def simulated_response(
@@ -244,18 +257,40 @@ def response_error(measured: FrequencyResponse, simulated: FrequencyResponse) ->
     return ResponseError(rms(one.magnitude - other.magnitude), rms(phase), rms(ratio), one.omega.size)
 
 
-def response_floor(measured: FrequencyResponse) -> ResponseError | None:
-    """Return what the uncertainty of the measured response alone makes of each error, None where it is not known.
+def response_floor(
+    disturbed: Sequence[Record], path: SignalPath, method: Method, measured: FrequencyResponse
+) -> ResponseError | None:
+    """Return what noise alone makes of each error, None where the estimator cannot read a disturbed record.
 
-    The variance of a line is what no smooth linear response explains: noise, and in a sweep of a nonlinear rig some of its
-    distortion, which a model that has the nonlinearity repeats. Such a model can come below this floor.
+    The response of the record with as much noise again is compared with the measured one. The variance that an estimator gives
+    would be too high for this: in a sweep of a nonlinear rig it holds the distortion, which a model with the nonlinearity
+    repeats.
+
+    Parameters
+    ----------
+    disturbed
+        Copies of the measured record, each with noise of the size and the spectrum of its noise floor added to the outputs.
+    path, method
+        Path and estimator of the measured response.
+    measured
+        The measured response.
+
+    Returns
+    -------
+    Root mean squares over the copies.
     """
-    if measured.variance is None:
+    try:
+        errors = [
+            response_error(measured, simulated_response(record, path, method, measured))
+            for record in disturbed
+        ]
+    except InputError:
         return None
-    # Half of the variance of a complex value lies along it, half across.
-    along = np.sqrt(0.5 * measured.variance)
-    relative = rms(along / measured.magnitude)
-    return ResponseError(rms(along), relative, _PER_NEPER * relative, measured.omega.size)
+    magnitude, phase, decibel = (
+        rms(np.array([getattr(error, name) for error in errors]))
+        for name in ("magnitude", "phase", "decibel")
+    )
+    return ResponseError(magnitude, phase, decibel, min(error.n_lines for error in errors))
 
 
 def without_shares(response: FrequencyResponse) -> FrequencyResponse:

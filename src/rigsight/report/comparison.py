@@ -228,8 +228,7 @@ def _sentences(comparison: Comparison) -> list[str]:
     ]
     return [
         f"All frequency responses, measured and simulated, are from one estimator: {comparison.method.replace('_', ' ')}.",
-        "The noise floor of a frequency response is what no smooth linear response explains. On a nonlinear rig that holds "
-        "distortion, which a model with the nonlinearity repeats: it can come far below.",
+        "The noise floor of a frequency response is what noise of the size and spectrum below would change in the measured one.",
         f"Steps are compared for {comparison.step_seconds:g} s, less the mean before them.",
         windows,
         *floors,

@@ -120,7 +120,7 @@ def compare_campaign(
     # One model without a spring, and all are run in windows: the same yardstick for everyone.
     drifts = any(can_drift(rig, c.model.values) for c in competitors)
     floors = tuple(
-        Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound)
+        Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound, floor.stretches)
         for floor in noise_floors(rig, campaign.records, drifts)
     )
     yardstick = Yardstick(rig, floors, chosen, step_seconds)

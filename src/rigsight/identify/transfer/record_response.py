@@ -37,7 +37,7 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 """Lines (or distances of averaged frequencies) that the half-power width of a peak must hold for a method to follow it."""
 _CLEAR = 100.0
 """Power over variance (20 dB) from which a local model of a noisy response can be trusted."""
-_MOSTLY, _LEAST_SHARE = 0.8, 0.05
+_MOSTLY = 0.8
 _THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
@@ -228,7 +228,7 @@ def _clear(found: FrequencyResponse, lines: int, least: float) -> FrequencyRespo
         np.pad(clear.astype(np.float64), lines // 2, mode="edge"), np.ones(lines) / lines, "valid"
     )
     inside = np.flatnonzero(clear & (share[: clear.size] >= _MOSTLY))
-    if inside.size < _LEAST_SHARE * clear.size:
+    if not inside.size:
         return found
     kept = np.zeros(clear.size, dtype=np.bool_)
     kept[inside[0] : inside[-1] + 1] = True
