@@ -237,6 +237,16 @@ def test_a_channel_at_fault_is_told_with_its_place(fault, kind, told):
         assert sensor_faults(AXIS, record) == []
 
 
+def test_the_force_of_an_element_that_is_moved_in_steps_is_not_coarse():
+    x = 1e-3 * np.repeat([0.0, 1.0, 3.0, 0.0], 500)
+    staircase = Record("steps", DT, {"x": x, "force": 1e4 * x}, {}, kind="step")
+    assert sensor_faults(ELEMENT, staircase) == []
+    (finding,) = sensor_faults(
+        ELEMENT, staircase.with_signals(force=coarse(1e4 * x + np.sin(np.arange(x.size))))
+    )
+    assert finding.kind == "quantization"
+
+
 def test_a_channel_at_fault_does_not_speak_of_amplitude():
     """Clipping makes the gain fall with amplitude as a nonlinear effect does."""
     records = sweeps()

@@ -165,8 +165,8 @@ def _extremes(records: Sequence[Record], source: str, alone: bool) -> tuple[Reco
 
 
 def _amplitude(record: Record, source: str, alone: bool) -> float:
-    """Return the amplitude as given for the only input, else that of a sine with the same RMS."""
-    return (alone and record.amplitude) or float(np.sqrt(2.0) * np.std(record[source]))
+    """Return the amplitude as given for the only input, else half the range, as everywhere."""
+    return (alone and record.amplitude) or 0.5 * float(np.ptp(record[source]))
 
 
 def _common(

@@ -21,11 +21,13 @@ def sensor_faults(rig: Rig, record: Record) -> list[Finding]:
     smooth = _of_displacement(rig) if rig.is_driven else frozenset()
     for name, unit in signals.items():
         found += _clipped(record, name, unit)
+    given = max((np.unique(record[s.name]).size for s in rig.inputs if s.name in record), default=0)
+    most_levels = given if given <= NOTES.fewest_levels else 0
     for name in outputs:
         samples = record[name]
         if np.ptp(samples) == 0.0:
             continue
-        coarse = _quantized(record, name, signals[name])
+        coarse = _quantized(record, name, signals[name], most_levels)
         found += coarse
         # A coarse channel stands still and jumps by itself; a force may do both, and a pressure or a speed when an input steps.
         if not coarse and name in smooth:
@@ -61,11 +63,14 @@ def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
     ]
 
 
-def _quantized(record: Record, name: str, unit: str) -> list[Finding]:
-    """Find a channel whose values lie on so few levels that rounding is a good part of its noise."""
+def _quantized(record: Record, name: str, unit: str, n_given: int) -> list[Finding]:
+    """Find a channel whose values lie on so few levels that rounding is a good part of its noise.
+
+    An output that has no more levels than the input, `n_given`, may follow a staircase without noise.
+    """
     levels = np.unique(record[name])
     span = float(levels[-1] - levels[0])
-    if levels.size > NOTES.fewest_levels:
+    if not n_given < levels.size <= NOTES.fewest_levels:
         return []
     gaps = np.diff(levels)
     step = float(np.min(gaps))
