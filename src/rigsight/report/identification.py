@@ -13,7 +13,7 @@ from rich.text import Text
 
 from rigsight.diagnose.result import Estimate
 from rigsight.identify.identification import Identification, RecordIdentification, RecordScore
-from rigsight.report.quantities import estimate_text, gap_percent, written
+from rigsight.report.quantities import ERRORS_HOLD, estimate_text, gap_percent, written
 from rigsight.report.terminal import plain_text
 
 _MOST_WARNINGS = 12
@@ -37,6 +37,7 @@ class IdentificationSummary:
         found = self.identification
         yield text(f"Identified: {found.title}", "bold green")
         yield from _amplitude_tables(found, text, options.max_width)
+        yield text(ERRORS_HOLD, "dim")
         yield text(found.amplitude_statement, "bold yellow" if found.changing else "")
         yield text("")
         yield text("One set for all estimation records", "bold")

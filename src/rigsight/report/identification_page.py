@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rigsight.identify.identification import Identification
 from rigsight.identify.linear_view import LinearView, Mode
 from rigsight.report.drawing.figures import PageFigure, page_figure
-from rigsight.report.quantities import UNDETERMINED, Written, gap_percent, written
+from rigsight.report.quantities import ERRORS_HOLD, UNDETERMINED, Written, gap_percent, written
 from rigsight.report.render import environment
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ def render_identification(
             combinations=[
                 _row(c.text, c.value, c.std, c.unit, f"of {', '.join(c.members)}") for c in told.combinations
             ],
+            errors_hold=ERRORS_HOLD,
             statements=told.statements,
             outputs=list(dict.fromkeys(name for s in identification.joint.scores for name in s.nrmse)),
             scores=[

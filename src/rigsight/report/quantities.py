@@ -10,6 +10,7 @@ from rigsight.compare.score import Quantity
 from rigsight.diagnose.result import Estimate
 
 UNDETERMINED = "not determined by these records"
+ERRORS_HOLD = "Standard errors are of the noise alone: they hold if the equations of the rig do."
 _QUANTITY_LABELS: dict[Quantity, str] = {
     "magnitude_rmse": "magnitude [{unit}]",
     "phase_rmse": "phase [{unit}]",
