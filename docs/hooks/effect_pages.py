@@ -40,8 +40,8 @@ def index_page() -> str:
         [
             "# The catalogue of effects",
             "",
-            f"A diagnosis can name these {len(CATALOGUE)} effects, and up to three of them at once. Each page is generated from the "
-            "file that declares the effect: the equation shown is the one that is simulated and fitted.",
+            f"A diagnosis can name these {len(CATALOGUE)} effects, and up to three of them at once. Each page is generated from "
+            "the file that declares the effect: the equation shown is the one that is simulated and fitted.",
             "",
             "| effect | where it acts | description |",
             "|---|---|---|",
