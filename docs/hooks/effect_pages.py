@@ -40,14 +40,14 @@ def index_page() -> str:
         [
             "# The catalogue of effects",
             "",
-            f"A diagnosis can name these {len(CATALOGUE)} effects, and pairs of them. Each page below is generated from the "
-            "file that declares the effect: the equation shown is the one that is simulated and fitted.",
+            f"A diagnosis can name these {len(CATALOGUE)} effects, and up to three of them at once. Each page is generated from "
+            "the file that declares the effect: the equation shown is the one that is simulated and fitted.",
             "",
-            "| effect | where it acts | in a sentence |",
+            "| effect | where it acts | description |",
             "|---|---|---|",
             *rows,
             "",
-            "An effect that is missing here can be added without touching the package: "
+            "An effect that is not in the catalogue can be added without changing the package: "
             "[effects of your own](../own_effects.md).",
             "",
         ]
@@ -63,7 +63,7 @@ def effect_page(effect: Effect) -> str:
         _facts(effect),
         "## Equation",
         _equations(effect),
-        "As the file of the effect has it:",
+        "As written in the file of the effect:",
         text.equation,
         "## Parameters",
         _parameters(effect),
@@ -73,7 +73,7 @@ def effect_page(effect: Effect) -> str:
         _caption(effect),
         "## When it applies",
         text.applies,
-        "## How it is told from its neighbors",
+        "## How to distinguish it from similar effects",
         _neighbors(effect),
         "## References",
         text.references,
@@ -131,8 +131,8 @@ def _parameters(effect: Effect) -> str:
         rows.append([f"`{p.name}`", p.description, *units, _bounds(p), null, _search(p)])
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
     return (
-        f"{table}\n\nBounds are in the rig's units. The search range is in characteristic units: 1 is the size that such a "
-        "number naturally has in the records."
+        f"{table}\n\nBounds are in the rig's units. The search range is in characteristic units: 1 is the typical size of "
+        "such a parameter for the records."
     )
 
 
@@ -179,9 +179,9 @@ def _caption(effect: Effect) -> str:
     else:
         how = "Axis with m = 1 kg, d = 2 N s/m, k = 100 N/m: it resonates at 10 rad/s."
     return (
-        f"*Simulated when this site was built, in steady state, each frequency alone. {how} Of the effect's start values those "
-        "are used that show most; where it changes with amplitude, amplitude 1 is the one that they are scaled for. A line "
-        "that breaks off is a rig that sticks, or one that leaves the range in which the equation holds.*"
+        f"*Simulated when this site was built, in steady state, one frequency at a time. {how} The start values of the effect "
+        "with the largest influence are used; if the response changes with amplitude, they are scaled for amplitude 1. A line "
+        "ends where the rig sticks or leaves the range in which the equation is valid.*"
     )
 
 
@@ -200,18 +200,18 @@ def _neighbors(effect: Effect) -> str:
     ]
     parts = []
     if rows:
-        table = ["| neighbor | how it is related | its own signature |", "|---|---|---|", *rows]
+        table = ["| similar effect | relation | its signature |", "|---|---|---|", *rows]
         parts.append("\n".join(table))
     if alike:
         parts.append(
             "At the same place, with the same trend of the gain and the same kind of harmonics: "
-            f"{listed(alike)}. What tells these apart is not the trend but its form: the fit to records of several amplitudes, "
-            "and the error on records that were not fitted."
+            f"{listed(alike)}. The trend does not distinguish these effects, but its form does: compare the fits to records of "
+            "several amplitudes, and the errors on records that were not fitted."
         )
     if not parts:
         parts.append("No other effect of the catalogue acts at this place with the same trend and harmonics.")
     parts.append(
-        "Where records do not tell two effects apart, the diagnosis names both (`ambiguous_with`): "
+        "If records do not distinguish two effects, the diagnosis names both (`ambiguous_with`): "
         "[how the verdict is reached](../verdict.md)."
     )
     return "\n\n".join(parts)

@@ -7,32 +7,32 @@ from rigsight.diagnose.policy.number import Stated, stated
 
 _SECTIONS = (
     ("What decides a verdict and its probability", POLICY.verdict),
-    ("What is told about records and numbers", POLICY.notes),
-    ("Over which stretch a model is compared", POLICY.horizon),
-    ("How far is searched", POLICY.search),
-    ("How finely the gap is mapped", POLICY.maps),
-    ("Can the numbers be trusted?", POLICY.trust),
-    ("How many draws a standard error rests on", POLICY.bootstrap),
+    ("Notes about records and parameters", POLICY.notes),
+    ("Length of the comparison", POLICY.horizon),
+    ("The extent of the search", POLICY.search),
+    ("The resolution of gap maps", POLICY.maps),
+    ("Can the parameters be trusted?", POLICY.trust),
+    ("Draws of the bootstrap", POLICY.bootstrap),
 )
 
 
 def policy_page() -> str:
     """Return the page that states every number of a diagnosis."""
     parts = [
-        "# The numbers of a diagnosis\n",
-        "Every number that decides, tells, searches or maps something, with its reason. All stand in one frozen object, "
-        "`rigsight.diagnose.policy.POLICY`, from which this page is made; what stands elsewhere in the code is numerical "
-        "tolerance. [How the verdict is reached](verdict.md) says where each is used.\n",
-        "A *convention* is a line that somebody has to draw. An **assumption** is what a few rigs suggested, and what yours may "
-        "break. *Measured* is what a study set. A *budget* bounds work: a right model may be lost by it, a wrong one does "
-        "not gain.\n",
+        "# The thresholds of a diagnosis\n",
+        "All thresholds of a diagnosis, each with its reason. They are fields of one frozen object, "
+        "`rigsight.diagnose.policy.POLICY`, from which this page is generated; other constants in the code are numerical "
+        "tolerances. [How the verdict is reached](verdict.md) says where each threshold is used.\n",
+        "A *convention* is a line that has to be drawn somewhere. An **assumption** was suggested by a few rigs and may not hold "
+        "for yours. *Measured* values were set by a study. A *budget* limits computation: it may lose a right model, but it "
+        "does not favor a wrong one.\n",
     ]
     for title, group in _SECTIONS:
         numbers = stated(group)
         parts += [
             f"## {title}\n",
-            f"{len(numbers)} numbers.\n",
-            "| number | value | kind | why |",
+            f"{len(numbers)} thresholds.\n",
+            "| threshold | value | kind | reason |",
             "|---|---|---|---|",
         ]
         parts += [_row(number) for number in numbers]

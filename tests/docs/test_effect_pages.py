@@ -19,7 +19,7 @@ HEADINGS = (
     "Parameters",
     "Signature",
     "When it applies",
-    "How it is told from its neighbors",
+    "How to distinguish it from similar effects",
     "References",
 )
 
