@@ -74,8 +74,9 @@ class PythonProgram:
 
     def _answer(self, q: Any, v: Any, f: Any, p: Any, a: Any) -> None:
         bodies = self._bodies
-        n, numbers = bodies.n, dict(zip(bodies.parameters, p[: len(bodies.parameters)], strict=True))
-        own = [np.ctypeslib.as_array(values, (n,)).copy() for values in (q, v, f)]
+        n = bodies.n
+        numbers = dict(zip(bodies.parameters, p[: len(bodies.parameters)], strict=True))
+        own = [np.frombuffer(ctypes.string_at(values, 8 * n)).copy() for values in (q, v, f)]
         try:
             found = np.asarray(_given[bodies.file](*own, numbers), dtype=np.float64)
             if found.shape != (n,):
@@ -84,8 +85,8 @@ class PythonProgram:
         except BaseException as error:
             self._error = error
             found = np.full(n, np.nan)
-        for i in range(n):
-            a[i] = found[i]
+        for i, acceleration in enumerate(found.tolist()):
+            a[i] = acceleration
 
     @property
     def c_text(self) -> str:
