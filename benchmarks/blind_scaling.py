@@ -35,11 +35,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigsight.blind import Outcome
-from rigsight.workflow.blind_bench.execution import finished
-from rigsight.workflow.blind_bench.files import BenchFolder, trial_name
-from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.store import TrialStore
-from rigsight.workflow.blind_bench.trial import diagnose_trial, make_trial
+from rigsight.workflow.bench.execution import finished
+from rigsight.workflow.bench.files import BenchFolder, trial_name
+from rigsight.workflow.bench.scoring import score_trial
+from rigsight.workflow.bench.store import TrialStore
+from rigsight.workflow.bench.trial import diagnose_trial, make_trial
 
 N_EMPTY = 2000
 N_ROWS = 200

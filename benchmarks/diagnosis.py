@@ -24,7 +24,7 @@ from rigsight.excitation import log_sweep, step
 from rigsight.records import Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.kernels import prepare_kernels, structures_to_try
+from rigsight.workflow.run.kernels import prepare_kernels, structures_to_try
 
 Floats = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ NAME_A_RIG = {
     "rigs/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "workflow/demo.py": "the demo is the running gear of the thesis",
     "workflow/own/effect_promises.py": "effects of one's own are tried on three built-in rigs",
-    "workflow/virtual_rig.py": "the demo is the running gear of the thesis",
+    "workflow/campaign/virtual_rig.py": "the demo is the running gear of the thesis",
 }
 NAMES_WITHOUT_A_QUESTION = {"utils", "util", "common", "core", "helpers", "misc"}
 
@@ -72,6 +72,12 @@ def test_every_language_is_printed_in_one_place() -> None:
         if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
     }
     assert {name for name in printers if not name.startswith("simulate/printing/")} == set()
+
+
+def test_beside_its_rooms_workflow_holds_commands_only() -> None:
+    source = ROOT / "src" / "rigsight"
+    commands = {module.stem for module in (source / "workflow").glob("*.py")} - {"__init__"}
+    assert commands <= {module.stem for module in (source / "cli").glob("*.py")}
 
 
 def test_no_other_module_knows_a_rig_by_name() -> None:

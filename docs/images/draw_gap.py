@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from rigsight.plot.drawing import GIVEN, MEASURED, WITH_EFFECT, style
 from rigsight.records import Record
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.diagnose import task_of
-from rigsight.workflow.files.model_file import read_model
 
 PANELS = {"sweep_0.75A": (19.0, 25.0), "step_0.60A": (9.5, 13.5)}
 TITLES = {"sweep_0.75A": "Sweep, 0.75 A (not fitted)", "step_0.60A": "Step, 0.6 A (not fitted)"}

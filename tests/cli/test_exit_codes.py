@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from rigsight.cli.exit_codes import told
-from rigsight.workflow.files.results import write_together
-from rigsight.workflow.progress import Stage
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress import Stage
+from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.results import write_together
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")
 Run = Callable[..., tuple[int, str, str]]

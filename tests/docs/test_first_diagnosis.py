@@ -6,7 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.campaign import read_campaign
 from rigsight.workflow.diagnose import task_of
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -15,7 +15,7 @@ from rigsight.identify.record_identification import Wishes
 from rigsight.identify.transfer.record_response import RecordResponse, record_response
 from rigsight.records import Record
 from rigsight.rigs import AXIS
-from rigsight.workflow.campaigns.in_memory import make_campaign
+from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.identify import identify_campaign
 
 M, D, K = 2.0, 5.0, 200.0

@@ -15,21 +15,21 @@ from hypothesis import strategies as st
 
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.workflow.blind_bench.external import KeyTable
-from rigsight.workflow.blind_bench.files import read_json
-from rigsight.workflow.campaigns.campaign import file_inside
-from rigsight.workflow.campaigns.campaign_file import (
+from rigsight.workflow.bench.external import KeyTable
+from rigsight.workflow.bench.files import read_json
+from rigsight.workflow.campaign.campaign import file_inside
+from rigsight.workflow.campaign.campaign_file import (
     CampaignTable,
     FileTable,
     RecordTable,
     checked_file,
     read_campaign_table,
 )
-from rigsight.workflow.campaigns.where import Where
-from rigsight.workflow.files.json_file import json_object
-from rigsight.workflow.files.model_file import model_of, named_model, read_model
+from rigsight.workflow.campaign.model_file import model_of, named_model, read_model
+from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.own_effects import own_effects
+from rigsight.workflow.run.json_file import json_object
 
 drawn = settings(
     derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40

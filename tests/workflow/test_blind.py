@@ -20,11 +20,11 @@ from rigsight.blind import Outcome, Trial, n_trials, subject_of
 from rigsight.errors import InputError, MachineError, RigsightError
 from rigsight.records import Record
 from rigsight.workflow import blind
+from rigsight.workflow.bench.files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
+from rigsight.workflow.bench.scoring import score_trial
+from rigsight.workflow.bench.trial import _environment, diagnose_trial
 from rigsight.workflow.blind import rescore, run_blind
-from rigsight.workflow.blind_bench.files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
-from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.trial import _environment, diagnose_trial
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.campaign import read_campaign
 
 SEED = 4711
 NAME = "617"
@@ -285,7 +285,7 @@ def test_a_disk_without_room_for_results_says_so(bench: BenchFolder, monkeypatch
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("rigsight.workflow.blind_bench.trial.shutil.copy", full)
+    monkeypatch.setattr("rigsight.workflow.bench.trial.shutil.copy", full)
     with pytest.raises(OSError, match="No space left") as raised:
         diagnose_trial(bench, NAME, start=("-c", ""))
     assert raised.value.errno == errno.ENOSPC

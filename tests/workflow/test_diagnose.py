@@ -13,10 +13,10 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.conicity import creep_factor
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.campaign import read_campaign
 from rigsight.workflow.diagnose import run_diagnose, task_of
-from rigsight.workflow.kernels import structures_to_try
-from rigsight.workflow.progress import Step
+from rigsight.workflow.run.kernels import structures_to_try
+from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
 FEW = tuple(effect_named(name) for name in ("cubic_stiffness", "quadratic_damping"))

@@ -20,12 +20,12 @@ from rigsight.identify.identification import Identification
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.campaigns.in_memory import make_campaign
+from rigsight.workflow.campaign.campaign import Campaign, read_campaign
+from rigsight.workflow.campaign.in_memory import make_campaign
+from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.compare import compare_campaign
 from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.discover import discover_campaign
-from rigsight.workflow.files.model_file import model_of
 from rigsight.workflow.identify import checked_wishes, identify_campaign
 
 DT, NOISE = 5e-3, 2e-5

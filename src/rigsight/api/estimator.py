@@ -13,8 +13,8 @@ from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.campaigns.in_memory import make_campaign, rig_of
+from rigsight.workflow.campaign.campaign import Campaign, read_campaign
+from rigsight.workflow.campaign.in_memory import make_campaign, rig_of
 from rigsight.workflow.simulate import simulate_model
 
 if TYPE_CHECKING:

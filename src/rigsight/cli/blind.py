@@ -12,7 +12,7 @@ from rigsight.cli.exit_codes import told
 from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.errors import InputError
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def blind(
@@ -88,9 +88,9 @@ def blind(
     """
     with told(debug, "the same command goes on from here"), listening(quiet) as listener:
         from rigsight.workflow import blind as bench
-        from rigsight.workflow.blind_bench.score_files import merge as merged
-        from rigsight.workflow.blind_bench.score_files import write_markdown
-        from rigsight.workflow.files.results import check_target
+        from rigsight.workflow.bench.score_files import merge as merged
+        from rigsight.workflow.bench.score_files import write_markdown
+        from rigsight.workflow.run.results import check_target
 
         _check_together(campaigns, keys, merge or [], rescore, trial or [])
         if markdown is not None:

@@ -10,7 +10,7 @@ import typer
 from rigsight.cli.exit_codes import told
 from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def discover(

@@ -19,7 +19,7 @@ import typer
 
 from rigsight.cli.signals import exit_code
 from rigsight.errors import MachineError, RigsightError
-from rigsight.workflow.files.results import forget_written, written
+from rigsight.workflow.run.results import forget_written, written
 
 DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)

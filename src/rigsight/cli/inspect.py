@@ -14,7 +14,7 @@ from rigsight.cli.terminal import show, show_as_json
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rigsight.workflow.campaigns.inspect import Inspection
+    from rigsight.workflow.inspect import Inspection
 
 
 def inspect(
@@ -31,7 +31,7 @@ def inspect(
 ) -> None:
     """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
     with told(debug):
-        from rigsight.workflow.campaigns.inspect import run_inspect
+        from rigsight.workflow.inspect import run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
 
         found = run_inspect(file, own_rigs(rigs or []).values())

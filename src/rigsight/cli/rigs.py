@@ -40,7 +40,7 @@ def list_rigs(
         files = own_rigs(rigs or [])
         known = known_rigs(files.values())
         if picture is not None:
-            from rigsight.workflow.files.rig_picture_file import write_rig_picture
+            from rigsight.workflow.rigs import write_rig_picture
 
             if name is None:
                 raise InputError("Which rig is to be drawn? Name it: rigsight rigs NAME --picture FILE.png.")

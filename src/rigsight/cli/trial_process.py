@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rigsight.cli.application import main as command_line
 from rigsight.cli.exit_codes import Left
-from rigsight.workflow.blind_bench.parent_watch import end_with_parent
-from rigsight.workflow.blind_bench.trial import MACHINE
+from rigsight.workflow.bench.parent_watch import end_with_parent
+from rigsight.workflow.bench.trial import MACHINE
 
 
 def main() -> None:

@@ -9,16 +9,16 @@ from typing import Any
 
 from rigsight.blind import Design, Outcome, n_trials
 from rigsight.errors import InputError, nearest
-from rigsight.workflow.blind_bench.execution import finished
-from rigsight.workflow.blind_bench.external import ExternalBench
-from rigsight.workflow.blind_bench.files import EXTERNAL, STORE_FILE, BenchFolder, read_json, trial_name
-from rigsight.workflow.blind_bench.score_files import score_bench
-from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.store import TrialStore
-from rigsight.workflow.blind_bench.trial import diagnose_trial, make_trial
-from rigsight.workflow.files.results import check_writable
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.bench.execution import finished
+from rigsight.workflow.bench.external import ExternalBench
+from rigsight.workflow.bench.files import EXTERNAL, STORE_FILE, BenchFolder, read_json, trial_name
+from rigsight.workflow.bench.score_files import score_bench
+from rigsight.workflow.bench.scoring import score_trial
+from rigsight.workflow.bench.store import TrialStore
+from rigsight.workflow.bench.trial import diagnose_trial, make_trial
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable
 
 RUNNING = "Blind trials"
 SCORING = "Scoring trials anew"

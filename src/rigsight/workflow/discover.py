@@ -14,17 +14,17 @@ from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, Task, discover
 from rigsight.discover.discovery import Method
-from rigsight.errors import RigsightError, check_option
+from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.files.model_file import MODEL_FILE
-from rigsight.workflow.files.results import check_writable, json_text, write_together
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.not_yet import check_takes
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.rigs import RIGS, is_built_in_motion
+from rigsight.workflow.campaign.campaign import Campaign, read_campaign
+from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
 FIGURE_FILE = "discovery.svg"
@@ -117,7 +117,6 @@ def discover_campaign(
         If the rig's own equations cannot be simulated near the records.
     """
     chosen = cast("Method", check_option("The method", method, METHODS))
-    check_takes("discover", campaign.rig, campaign.records)
     task = discovery_task(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.
@@ -141,7 +140,13 @@ def discovery_task(campaign: Campaign) -> Task:
     ----------
     campaign
         A campaign that was read.
+
+    Raises
+    ------
+    InputError
+        If its rig of one motion is told in other words than the built-in ones, or records have constants of their own.
     """
+    _check_can_be_discovered(campaign)
     no_spring = campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0
     length = window_length(campaign.rig, campaign.estimation) if no_spring else None
     floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
@@ -174,6 +179,24 @@ def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
             FIGURE_FILE: svg_text(discovery_figure(found), FIGURE_FILE),
         },
     )
+
+
+def _check_can_be_discovered(campaign: Campaign) -> None:
+    """Refuse what a discovery would ignore: other words for one motion than the built-in rigs', constants of single records."""
+    rig = campaign.rig
+    if rig.has_one_motion and not is_built_in_motion(rig):
+        listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
+        raise InputError(
+            f"'rigsight discover' cannot take the rig '{rig.name}' of your own yet: of rigs of one motion it takes {listed}. "
+            "If the equation is the same, write it in their words."
+        )
+    for record in campaign.records:
+        if record.constants:
+            listed = ", ".join(record.constants)
+            raise InputError(
+                "'rigsight discover' cannot take constants that differ from record to record yet, and record "
+                f"'{record.name}' gives {listed}. Give them under [rig.constants], or leave the record out."
+            )
 
 
 def _one_by_one(

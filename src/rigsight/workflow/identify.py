@@ -20,10 +20,8 @@ from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.diagnose import versions
-from rigsight.workflow.files.model_file import MODEL_FILE
-from rigsight.workflow.files.results import check_writable, json_text, write_together
+from rigsight.workflow.campaign.campaign import Campaign, read_campaign
+from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.identification.any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
 from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
 from rigsight.workflow.identification.joint import identify_jointly
@@ -34,8 +32,10 @@ from rigsight.workflow.identification.warnings import (
     offsets_of_records,
     out_of_band,
 )
-from rigsight.workflow.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.versions import versions
 
 IDENTIFICATION_FILE = "identification.json"
 PAGE_FILE = "identification.html"

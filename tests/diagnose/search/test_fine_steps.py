@@ -9,7 +9,7 @@ from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.identify import IdleThreads
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.campaign import read_campaign
 from rigsight.workflow.diagnose import task_of
 
 

@@ -39,15 +39,15 @@ from rigsight.rigs import Rig, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.campaign.campaign import Campaign
 from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,
     beyond_identified_amplitudes,
     offsets_of_records,
 )
-from rigsight.workflow.kernels import prepare_kernels
-from rigsight.workflow.progress import Listener, Stage
+from rigsight.workflow.run.kernels import prepare_kernels
+from rigsight.workflow.run.progress import Listener, Stage
 
 IDENTIFYING = "Identifying"
 METHODS = ("local_rational", "local_polynomial")

@@ -20,7 +20,7 @@ from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
 from rigsight.report.quantities import gap_percent
 from rigsight.simulate import Structure, compose
-from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.campaign.campaign import Campaign
 
 _DIFFERENT = 0.01
 """Probability of differences as large by chance below which records are said to need sets of their own."""

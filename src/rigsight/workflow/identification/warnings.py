@@ -17,7 +17,7 @@ from rigsight.identify.record_identification import MISFIT, measured_amplitude
 from rigsight.identify.transfer.record_response import driven_band
 from rigsight.records import Record
 from rigsight.rigs import evaluated
-from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.campaign.campaign import Campaign
 from rigsight.workflow.identification.joint import parent
 
 _TOLERANCE = 0.02

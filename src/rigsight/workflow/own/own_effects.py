@@ -19,7 +19,7 @@ from rigsight.simulate.printing.text import text
 from rigsight.workflow.own.effect_declaration import declaration_faults, equations
 from rigsight.workflow.own.effect_promises import broken_promises
 from rigsight.workflow.own.python_file import run_python_file
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.run.progress import Listener, Stage, silent
 
 ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
