@@ -31,7 +31,7 @@ NAME_A_RIG = {
     "rigs/built_in.py": "the built-in rigs",
     "rigs/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "workflow/demo.py": "the demo is the running gear of the thesis",
-    "workflow/own/effect_promises.py": "effects of one's own are tried on three built-in rigs",
+    "workflow/own/effect_checks.py": "effects of one's own are tried on three built-in rigs",
     "workflow/campaign/virtual_rig.py": "the demo is the running gear of the thesis",
 }
 NAMES_WITHOUT_A_QUESTION = {"utils", "util", "common", "core", "helpers", "misc"}

@@ -26,7 +26,7 @@ from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.compare import compare_campaign
 from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.discover import discover_campaign
-from rigsight.workflow.identify import checked_wishes, identify_campaign
+from rigsight.workflow.identify import checked_options, identify_campaign
 
 DT, NOISE = 5e-3, 2e-5
 AXIS_VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
@@ -75,7 +75,7 @@ def campaign(offsets: Any = "shared", **drawn: Any) -> Campaign:
 
 
 def identified(made: Campaign) -> Identification:
-    return identify_campaign(made, checked_wishes("local_rational", None))
+    return identify_campaign(made, checked_options("local_rational", None))
 
 
 def diagnosed(made: Campaign, names: Sequence[str] = RIVALS) -> Diagnosis:

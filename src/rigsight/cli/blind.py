@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.errors import InputError
@@ -86,7 +86,7 @@ def blind(
     Writes results and one row per trial into DIR as they are finished, and the score into DIR/blind.json and DIR/blind.html.
     Started again, it goes on where it was interrupted.
     """
-    with told(debug, "the same command goes on from here"), listening(quiet) as listener:
+    with report_errors(debug, "the same command goes on from here"), listening(quiet) as listener:
         from rigsight.workflow import blind as bench
         from rigsight.workflow.bench.score_files import merge as merged
         from rigsight.workflow.bench.score_files import write_markdown

@@ -32,7 +32,7 @@ GOES_ON = f"{_NOTHING}; the same command goes on from there"
 
 
 @contextlib.contextmanager
-def told(debug: bool, left: str = _NOTHING) -> Iterator[None]:
+def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code.
 
     Parameters
@@ -90,7 +90,7 @@ def told(debug: bool, left: str = _NOTHING) -> Iterator[None]:
         _leave_defect(error)
 
 
-class Left(SystemExit):
+class CommandExit(SystemExit):
     """The process ends, and has said why.
 
     Attributes
@@ -114,8 +114,8 @@ def _leave_defect(error: Exception) -> NoReturn:
 
 
 @contextlib.contextmanager
-def output_told() -> Iterator[None]:
-    """Map what happens outside `told`, while a finished command shows its results, to a message and an exit code.
+def report_output_errors() -> Iterator[None]:
+    """Map what happens outside `report_errors`, while a finished command shows its results, to a message and an exit code.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def output_told() -> Iterator[None]:
         yield
         if sys.stdout is not None:
             sys.stdout.flush()
-    except Left:
+    except CommandExit:
         raise
     except SystemExit as leaving:
         # The parser says 130 for everything that reads as Ctrl-C, and 1 where nobody reads; the signal stands behind it.
@@ -161,7 +161,7 @@ def _named(folders: Iterable[Path]) -> str:
 
 def _leave_unread() -> NoReturn:
     _forget_output()
-    raise Left(UNREAD)
+    raise CommandExit(UNREAD)
 
 
 def _forget_output() -> None:
@@ -180,4 +180,4 @@ def leave(message: str, code: int, is_of_the_machine: bool = False) -> NoReturn:
     """
     with contextlib.suppress(OSError):
         typer.echo(f"rigsight: {message}", err=True)
-    raise Left(code, is_of_the_machine)
+    raise CommandExit(code, is_of_the_machine)

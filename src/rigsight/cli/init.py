@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.workflow.run.progress_display import listening
@@ -72,7 +72,7 @@ def init(
             folder or Path(), mjcf, gear, model, rigs, as_it_is=as_it_is, json=json, quiet=quiet, debug=debug
         )
         return
-    with told(debug):
+    with report_errors(debug):
         from rigsight.errors import InputError
 
         if gear or as_it_is:
@@ -125,7 +125,7 @@ def _init_from_mjcf(
     quiet: bool,
     debug: bool,
 ) -> None:
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.errors import InputError
         from rigsight.workflow.init import run_init_from_mjcf
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show, show_as_json
 
@@ -30,7 +30,7 @@ def inspect(
     debug: Debug = False,
 ) -> None:
     """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
-    with told(debug):
+    with report_errors(debug):
         from rigsight.workflow.inspect import run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
 

@@ -18,7 +18,7 @@ from rigsight.workflow.run.results import (
     json_text,
     write_together,
 )
-from rigsight.workflow.run.unfinished_files import hidden, write_locked
+from rigsight.workflow.run.unfinished_files import temporary_path, write_locked
 
 CONTENTS = {"a.json": "{}\n", "b.html": "<p>ä</p>\n"}
 
@@ -201,12 +201,14 @@ def test_a_signal_while_files_get_their_names_waits_and_leaves_the_old_ones(
 
 def test_what_a_killed_run_left_is_removed_but_no_file_of_a_run_at_work(tmp_path: Path) -> None:
     pytest.importorskip("fcntl", reason="nothing tells there whether a writer lives")
-    left = [hidden(tmp_path / name, "0a1b2c3d", ending) for name in CONTENTS for ending in ("part", "old")]
+    left = [
+        temporary_path(tmp_path / name, "0a1b2c3d", ending) for name in CONTENTS for ending in ("part", "old")
+    ]
     for path in left:
         path.write_text("left")
     mine = tmp_path / ".a.json.draft.part"
     mine.write_text("mine")
-    with write_locked(hidden(tmp_path / "a.json", "ffffffff", "part"), b"at work") as at_work:
+    with write_locked(temporary_path(tmp_path / "a.json", "ffffffff", "part"), b"at work") as at_work:
         write_together(tmp_path, CONTENTS)
         names = sorted(path.name for path in tmp_path.iterdir())
         assert names == sorted([mine.name, Path(at_work.name).name, *CONTENTS])

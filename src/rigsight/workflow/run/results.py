@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rigsight.errors import InputError, MachineError
-from rigsight.workflow.run.unfinished_files import hidden, keep_locked, remove_left, write_locked
+from rigsight.workflow.run.unfinished_files import keep_locked, remove_left, temporary_path, write_locked
 
 _REASONS = {
     errno.EACCES: "writing is not allowed there",
@@ -128,7 +128,7 @@ def write_together(
                 _check_replaceable(folder / name)
                 target = (folder / name).resolve()
                 remove_left(target)
-                part = parts[target] = hidden(target, token, "part")
+                part = parts[target] = temporary_path(target, token, "part")
                 file = write_locked(part, content.encode("utf-8") if isinstance(content, str) else content)
                 locks.callback(file.close)
                 os.fsync(file.fileno())
@@ -164,7 +164,7 @@ def _put_in_place(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -
         try:
             for target in parts:
                 if target.exists():
-                    old = hidden(target, token, "old")
+                    old = temporary_path(target, token, "old")
                     locks.callback(keep_locked(target, old).close)
                     kept[target] = old
                 else:

@@ -1,4 +1,4 @@
-"""Which hidden files hold results on their way to the disk, and which of them did a killed run leave?
+"""Which temporary files hold results on their way to the disk, and which of them did a killed run leave?
 
 A file on its way to ``NAME`` is ``.NAME.TOKEN.part``, what it replaces waits as ``.NAME.TOKEN.old`` until all are in place. Both
 are locked as long as their writer lives, so that a later run removes what a killed one left, and nothing else.
@@ -20,10 +20,10 @@ except ImportError:
     # Windows: nothing can be told about a writer there, so nothing is removed.
     fcntl = None
 
-_HIDDEN = re.compile(r"\.[0-9a-f]{8}\.(part|old)")
+_TEMPORARY = re.compile(r"\.[0-9a-f]{8}\.(part|old)")
 
 
-def hidden(target: Path, token: str, ending: str) -> Path:
+def temporary_path(target: Path, token: str, ending: str) -> Path:
     """Return where content on its way to a file, or the file's old content, waits; `ending` is ``part`` or ``old``."""
     return target.with_name(f".{target.name}.{token}.{ending}")
 
@@ -79,7 +79,7 @@ def remove_left(target: Path) -> None:
     with contextlib.suppress(OSError):
         for path in target.parent.iterdir():
             name = path.name
-            if name.startswith(f".{target.name}.") and _HIDDEN.fullmatch(name[len(target.name) + 1 :]):
+            if name.startswith(f".{target.name}.") and _TEMPORARY.fullmatch(name[len(target.name) + 1 :]):
                 _remove_if_left(path)
 
 

@@ -1,4 +1,4 @@
-"""Does a simulated effect do what every effect promises: vanish at null, stay finite, give no energy, be found again?
+"""Which checks must a simulated effect pass: does it vanish at null, stay finite, give no energy, and is it found again?
 
 Measured on one mass with a spring, lateral effects on the running gear, those of a prescribed motion on an element. Each function
 returns a sentence that says what is broken, or None.
@@ -240,12 +240,12 @@ def finite_where_searched(effect: Effect) -> str | None:
 def is_found_again(effect: Effect) -> str | None:
     """Check that a fit to its own noisy simulation returns its parameters."""
     bench = bench_of(effect)
-    told = None
+    failed = None
     for amplitude in _LEVELS:
-        told = _recovered(effect, bench, amplitude)
-        if told is None:
+        failed = _recovered(effect, bench, amplitude)
+        if failed is None:
             return None
-    return told
+    return failed
 
 
 def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
@@ -315,7 +315,7 @@ def _bases(rig: Rig) -> list[tuple[Signal, str]]:
     return list(zip(rig.outputs, ("x", "length") if rig.is_driven else ("force",), strict=False))
 
 
-PROMISES: tuple[Callable[[Effect], str | None], ...] = (
+CHECKS: tuple[Callable[[Effect], str | None], ...] = (
     null_gives_the_rig,
     vanishes_continuously,
     gives_no_energy,
@@ -325,16 +325,16 @@ PROMISES: tuple[Callable[[Effect], str | None], ...] = (
 """In the order in which they are worth reading."""
 
 
-def broken_promises(effect: Effect) -> tuple[str, ...]:
-    """Return what an effect with a sound declaration does not keep, one sentence each."""
+def failed_checks(effect: Effect) -> tuple[str, ...]:
+    """Return what an effect with a sound declaration does not pass, one sentence each."""
     found: list[str] = []
-    for promise in PROMISES:
+    for check in CHECKS:
         try:
-            told = promise(effect)
+            failed = check(effect)
         except (ArithmeticError, np.linalg.LinAlgError) as error:
-            told = f"it cannot be simulated or fitted at its start values: {error}"
-        if told is not None:
-            found.append(told)
+            failed = f"it cannot be simulated or fitted at its start values: {error}"
+        if failed is not None:
+            found.append(failed)
     return tuple(found)
 
 
