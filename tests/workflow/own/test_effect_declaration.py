@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 
 from rigsight.discover import MONOMIALS
-from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, State
+from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, Start, State, SumAndDifference
 from rigsight.effects.symbols import u, v, x
 from rigsight.parameters import Parameter
 from rigsight.workflow.own.effect_declaration import declaration_faults
@@ -26,6 +27,9 @@ SOUND = Effect(
     signature=Signature(GainTrend.STEADY),
     torque=c * x,
 )
+STATE = State(z, -z, "x")
+START = Start({"c": c})
+PAIR = SumAndDifference("c", "d", (0.0, 1.0), (0.0, 1.0))
 
 
 def changed_parameter(**changes: Any) -> dict[str, Any]:
@@ -37,6 +41,36 @@ def test_sound_declarations_have_no_fault():
         assert declaration_faults(effect) == ()
 
 
+@pytest.mark.parametrize("number", [0, np.int64(0), np.float32(0.0), np.float64(0.0)], ids=type)
+def test_numbers_of_python_and_numpy_are_numbers(number):
+    assert declaration_faults(replace(SOUND, **changed_parameter(null=number))) == ()
+
+
+@pytest.mark.parametrize("value", [False, np.False_, 10**400, np.zeros(1), sp.Float(0), "0"], ids=type)
+def test_what_only_turns_into_a_number_is_none(value):
+    (fault,) = declaration_faults(replace(SOUND, **changed_parameter(null=value)))
+    assert fault.startswith("parameters: null is ")
+    assert fault.endswith("; give a number, or None.")
+
+
+@pytest.mark.parametrize(
+    "declared", [SOUND, PARAMETER, Signature(GainTrend.FALLS), STATE, START, PAIR], ids=type
+)
+def test_every_field_is_checked(declared):
+    holders = {Parameter: "parameters", State: "states", Start: "starts", SumAndDifference: "searched_as"}
+    for field in fields(declared):
+        changed = replace(declared, **{field.name: object()})
+        if isinstance(changed, Effect):
+            effect, where = changed, ""
+        elif isinstance(changed, Signature):
+            effect, where = replace(SOUND, signature=changed), "signature: "
+        else:
+            holder = holders[type(changed)]
+            effect, where = replace(SOUND, **{holder: (changed,)}), f"{holder}: "
+        (fault,) = declaration_faults(effect)
+        assert fault.startswith(f"{where}{field.name} is <object object")
+
+
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
@@ -45,7 +79,26 @@ def test_sound_declarations_have_no_fault():
         ({"place": "dynamics"}, "Place.DYNAMICS"),
         ({"torque": "c*x"}, "give an expression of sympy symbols"),
         ({"parameters": PARAMETER}, "give a tuple"),
-        ({"parameters": ("c",)}, "parameters holds 'c'; give a Parameter"),
+        (
+            {"parameters": ("c",)},
+            "parameters holds 'c'; give a tuple of Parameter objects (with a comma behind",
+        ),
+        ({"energy": "active"}, "energy is 'active'; give one of Energy.CONSERVATIVE"),
+        ({"signature": Signature("falls")}, "signature: gain_trend is 'falls'; give one of GainTrend.RISES"),
+        ({"at": 1}, "at is 1; give a text, or None"),
+        ({"needs_inertia": 1}, "needs_inertia is 1; give True or False"),
+        ({"ordered": (("c",),)}, "ordered holds ('c',); give a tuple of pairs of parameter names"),
+        (
+            {"special_cases": {"c": "one"}},
+            "special_cases holds 'one'; give a dictionary of parameter names and",
+        ),
+        ({"states": (State("z", -z, "x"),)}, "states: symbol is 'z'; give a sympy symbol"),
+        (changed_parameter(null="0"), "parameters: null is '0'; give a number, or None"),
+        (
+            changed_parameter(search=(0.0, "ten")),
+            "parameters: search holds 'ten'; give two numbers in a tuple",
+        ),
+        (changed_parameter(starts=0.3), "parameters: starts is 0.3; give numbers in a tuple (with a comma"),
         ({"torque": None}, "there is none; at dynamics that is torque or spring or deflection"),
         ({"spring": c * x}, "there are torque, spring"),
         ({"place": Place.SENSOR}, "torque does not belong to the place sensor"),
