@@ -21,6 +21,7 @@ PACKAGES = (
     "simulators",
     "libraries",
     "identify",
+    "campaign",
     "discover",
     "compare",
     "diagnose",
@@ -33,7 +34,7 @@ PACKAGES = (
 )
 """From what is measured to what is shown, as the rooms of the house lie above each other."""
 COMMANDS = (
-    "campaign.campaign",
+    "campaign.read_campaign",
     "diagnose",
     "identify",
     "discover",

@@ -27,8 +27,8 @@ from rigsight.records.formats import channel_file
 from rigsight.records.formats.channel import ChannelFile
 from rigsight.rigs import RIGS
 from rigsight.workflow.bench.external import ExternalBench
-from rigsight.workflow.campaign.campaign import read_campaign
 from rigsight.workflow.campaign.model_file import read_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.inspect import run_inspect
 from rigsight.workflow.own import own_effects
 from rigsight.workflow.run.results import json_text

@@ -19,7 +19,7 @@ from rigsight.rigs import RIGS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.linearization import linearize
 from rigsight.workflow.bench.files import BenchFolder
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 SEED = 7
 

@@ -17,7 +17,6 @@ from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.workflow.bench.external import KeyTable
 from rigsight.workflow.bench.files import read_json
-from rigsight.workflow.campaign.campaign import file_inside
 from rigsight.workflow.campaign.campaign_file import (
     CampaignTable,
     FileTable,
@@ -26,6 +25,7 @@ from rigsight.workflow.campaign.campaign_file import (
     read_campaign_table,
 )
 from rigsight.workflow.campaign.model_file import model_of, named_model, read_model
+from rigsight.workflow.campaign.read_campaign import file_inside
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.own_effects import own_effects

@@ -24,7 +24,7 @@ from rigsight.workflow.bench.files import RUN_FILE, STORE_FILE, BenchFolder, rea
 from rigsight.workflow.bench.scoring import score_trial
 from rigsight.workflow.bench.trial import _environment, diagnose_trial
 from rigsight.workflow.blind import rescore, run_blind
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 SEED = 4711
 NAME = "617"

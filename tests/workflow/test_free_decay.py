@@ -13,7 +13,7 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import read_record
 from rigsight.rigs import ELEMENT
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import run_compare
 from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.discover import run_discover

@@ -22,7 +22,7 @@ from rigsight.rigs import RIGS, Rig, read_rig_file, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
 from rigsight.workflow.campaign.in_memory import make_campaign
-from rigsight.workflow.discover import discovery_task
+from rigsight.workflow.discover import regression_data
 from rigsight.workflow.identification import any_rig
 from rigsight.workflow.identification.json import identification_json
 from rigsight.workflow.identify import checked_options, identify_campaign, run_identify, write_identification
@@ -396,7 +396,7 @@ def test_the_name_of_a_rig_changes_nothing() -> None:
     found = {}
     for rig in (axis, stage):
         campaign = make_campaign(rig, [record], title="same")
-        discovery_task(campaign)
+        regression_data(campaign)
         found[rig.name] = identify_campaign(campaign, checked_options("local_rational", None))
     own = {name: identification_json(one, {}) for name, one in found.items()}
     assert own["axis"]["records"][0]["paths"][0]["fit"] is not None
@@ -415,4 +415,4 @@ def test_a_rig_of_one_motion_in_other_words_is_refused_where_words_count() -> No
     t = np.linspace(0.0, 1.0, 50)
     record = Record("one", 0.02, {"u": np.sin(t), "x": np.cos(t)}, {"u": "N", "x": "m"})
     with pytest.raises(InputError, match="'stage' of your own yet: of rigs of one motion it takes axis"):
-        discovery_task(make_campaign(stage, [record]))
+        regression_data(make_campaign(stage, [record]))

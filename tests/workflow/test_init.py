@@ -11,7 +11,7 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.rigs import rig_file_text
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.init import run_init
 
 from ..records.formats import write_mdf, write_parquet, write_text

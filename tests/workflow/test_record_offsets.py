@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.campaign import Campaign
 from rigsight.compare.comparison import Competitor
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.noise.detection import noise_floors
@@ -20,9 +21,9 @@ from rigsight.identify.identification import Identification
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaign.campaign import Campaign, read_campaign
 from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.campaign.model_file import model_of
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import compare_campaign
 from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.discover import discover_campaign

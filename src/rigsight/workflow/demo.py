@@ -18,7 +18,7 @@ from rigsight.records import Hold, Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.campaign.virtual_rig import VirtualRig
 from rigsight.workflow.diagnose import diagnose_campaign, result_files
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose, structures_to_fit
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, candidates_on, diagnose, structures_to_fit
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
-from rigsight.workflow.campaign.campaign import Campaign, read_campaign
 from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.run.fit_journal import FitJournal
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
@@ -125,8 +126,7 @@ def diagnose_campaign(
     ]
     candidates = candidates_on(campaign.rig, named, campaign.modelled)
     tried = structures_to_try(campaign.rig, candidates, campaign.modelled)
-    task = task_of(campaign)
-    prepare_kernels(structures_to_fit(task, tried), n_jobs, listener)
+    prepare_kernels(structures_to_fit(campaign, tried), n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     journal = (
         contextlib.nullcontext()
@@ -136,7 +136,7 @@ def diagnose_campaign(
     # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
         diagnosis = diagnose(
-            task,
+            campaign,
             candidates,
             seed=seed,
             n_jobs=n_jobs,
@@ -154,12 +154,6 @@ def _tell_going_on(count: int, listener: Listener) -> None:
     stage = f"Going on: {count} fit{'' if count == 1 else 's'} done before the interruption"
     listener(Step(stage, "", 0, count))
     listener(Step(stage, "", count, count))
-
-
-def task_of(campaign: Campaign) -> Task:
-    """Return what a campaign asks to be diagnosed, with alternative parameters turned into the rig's own."""
-    given = campaign.rig.in_own_parameters(campaign.parameters, campaign.constants)
-    return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records, campaign.modelled)
 
 
 def write_diagnosis(

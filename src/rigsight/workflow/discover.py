@@ -10,18 +10,20 @@ from typing import cast
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.discover import METHODS, Discovery, Task, discover
+from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
+from rigsight.discover.regression_data import has_no_spring
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
 from rigsight.rigs import RIGS, is_built_in_motion
-from rigsight.workflow.campaign.campaign import Campaign, read_campaign
 from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs
 from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.results import check_writable, json_text, write_together
@@ -117,11 +119,11 @@ def discover_campaign(
         If the rig's own equations cannot be simulated near the records.
     """
     chosen = cast("Method", check_option("The method", method, METHODS))
-    task = discovery_task(campaign)
+    data = regression_data(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
+        found = discover(data, chosen, pointwise, seed, stage.finished, n_jobs)
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
         notes += tuple(closed_loop_notes(campaign.records, campaign.rig, "It is not used in a discovery."))
         factor = campaign.open_factor
@@ -129,12 +131,12 @@ def discover_campaign(
         found = replace(found, warnings=(*found.warnings, *notes))
         if not one_by_one:
             return found
-        alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
+        alone = _one_by_one(campaign, data, chosen, pointwise, seed, n_jobs, stage.finished)
         return replace(found, by_record=alone)
 
 
-def discovery_task(campaign: Campaign) -> Task:
-    """Return what is to be discovered in a campaign; records of a rig that drifts are cut into windows.
+def regression_data(campaign: Campaign) -> RegressionData:
+    """Return what of a campaign is regressed; records of a rig that drifts are cut into windows.
 
     Parameters
     ----------
@@ -147,19 +149,11 @@ def discovery_task(campaign: Campaign) -> Task:
         If its rig of one motion is told in other words than the built-in ones, or records have constants of their own.
     """
     _check_can_be_discovered(campaign)
-    no_spring = campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0
-    length = window_length(campaign.rig, campaign.estimation) if no_spring else None
+    no_spring = has_no_spring(campaign)
     floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
-    noise = {floor.output: floor.std for floor in floors}
-    factor = campaign.open_factor
-    return Task(
-        title=campaign.title,
-        rig=campaign.rig,
-        constants=campaign.constants,
-        records=cut(campaign.records, length),
-        noise=noise,
-        no_spring=no_spring,
-        held={} if factor is None else {factor.held: factor.value},
+    length = window_length(campaign.rig, campaign.estimation) if no_spring else None
+    return RegressionData(
+        campaign, {floor.output: floor.std for floor in floors}, cut(campaign.records, length)
     )
 
 
@@ -201,7 +195,7 @@ def _check_can_be_discovered(campaign: Campaign) -> None:
 
 def _one_by_one(
     campaign: Campaign,
-    task: Task,
+    data: RegressionData,
     method: Method,
     pointwise: bool,
     seed: int,
@@ -211,9 +205,9 @@ def _one_by_one(
     """Discover on each estimation record alone; where that fails, the reason stands in its place."""
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
-        own = [r for r in task.records if r.role == "validation" or r.name.startswith(record.name)]
+        own = [r for r in data.records if r.role == "validation" or r.name.startswith(record.name)]
         try:
-            return record.name, discover(replace(task, records=tuple(own)), method, pointwise, seed)
+            return record.name, discover(replace(data, windows=tuple(own)), method, pointwise, seed)
         except RigsightError as error:
             return record.name, str(error)
 

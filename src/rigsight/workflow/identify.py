@@ -11,6 +11,7 @@ from typing import cast
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from rigsight.campaign import Campaign
 from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
@@ -20,8 +21,8 @@ from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign import Campaign, read_campaign
 from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identification.any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
 from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
 from rigsight.workflow.identification.joint import identify_jointly

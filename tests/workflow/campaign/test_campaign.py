@@ -11,7 +11,7 @@ from rigsight.errors import InputError
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.records.reference import instrument_of
 from rigsight.rigs import rig_file_text
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 HEAD = """
 title = "rear axle"

@@ -19,7 +19,7 @@ from rigsight.excitation import linear_sweep
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaign.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.own.own_effects import equation_text, named, own_effects
 from rigsight.workflow.simulate import run_simulate

@@ -35,7 +35,6 @@ from rigsight.workflow.bench.files import (
     described,
     read_json,
 )
-from rigsight.workflow.campaign.campaign import listed_rig
 from rigsight.workflow.campaign.campaign_file import (
     MOST_RECORDS,
     FileTable,
@@ -45,6 +44,7 @@ from rigsight.workflow.campaign.campaign_file import (
     read_campaign_table,
 )
 from rigsight.workflow.campaign.listed_records import file_inside
+from rigsight.workflow.campaign.read_campaign import listed_rig
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.run.json_file import json_object
 from rigsight.workflow.run.results import json_text, write_together

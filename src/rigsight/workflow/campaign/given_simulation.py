@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from rigsight.effects import Effect
 from rigsight.errors import InputError, nearest
@@ -11,16 +10,6 @@ from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.workflow.campaign.where import Location, Where
-
-
-@dataclass(frozen=True)
-class GivenSimulation:
-    """The rig, and what is known of the simulation in question; see `Campaign`."""
-
-    rig: Rig
-    modelled: tuple[Effect, ...]
-    constants: dict[str, float]
-    parameters: dict[str, float]
 
 
 def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:
@@ -55,8 +44,8 @@ def checked_simulation(
     constants: Mapping[str, float],
     parameters: Mapping[str, float],
     of_records: Collection[str] = (),
-) -> GivenSimulation:
-    """Return a rig and the simulation in question with all defaults filled in.
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return constants and parameters of the simulation in question, all defaults filled in.
 
     Parameters
     ----------
@@ -81,7 +70,7 @@ def checked_simulation(
         structure = compose(rig, modelled)
     except InputError as error:
         raise InputError(f"{where.at('rig', 'effects')}: {error}") from None
-    return GivenSimulation(rig, tuple(modelled), known, _parameters(where, structure, parameters))
+    return known, _parameters(where, structure, parameters)
 
 
 def checked_numbers(

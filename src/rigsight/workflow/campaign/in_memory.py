@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import get_args
 
+from rigsight.campaign import Campaign
 from rigsight.effects import Effect, effect_named
 from rigsight.errors import InputError, check_option
 from rigsight.parameters import ParameterSet
@@ -14,9 +15,9 @@ from rigsight.records.plausibility import is_constant
 from rigsight.rigs import RIGS, Rig, rig_of_tables
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign import NO_VALIDATION, Campaign, of_first_record
 from rigsight.workflow.campaign.campaign_file import Offsets
 from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
+from rigsight.workflow.campaign.read_campaign import NO_VALIDATION, of_first_record
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effects_on
 
@@ -69,13 +70,9 @@ def make_campaign(
     found = rig_of(rig)
     called = title or found.name
     by_record = set.intersection(*(set(record.constants) for record in records)) if records else set()
-    given = checked_simulation(
-        Where(called),
-        found,
-        effects_on(found, effects_of(effects), called),
-        constants or {},
-        parameters or {},
-        by_record,
+    modelled = effects_on(found, effects_of(effects), called)
+    known, given = checked_simulation(
+        Where(called), found, modelled, constants or {}, parameters or {}, by_record
     )
     if all(record.role != "estimation" for record in records):
         raise InputError(
@@ -94,15 +91,14 @@ def make_campaign(
         checked = tuple(
             record.with_free_offsets(signal.name for signal in found.outputs) for record in checked
         )
-    constants, differing = of_first_record(given, checked)
+    constants, differing = of_first_record(found, known, checked)
     return Campaign(
         title=called,
-        path=None,
-        rig=given.rig,
-        modelled=given.modelled,
+        rig=found,
         constants=constants,
-        parameters=given.parameters,
+        parameters=given,
         records=checked,
+        modelled=tuple(modelled),
         notes=tuple(
             note for note in (differing, "" if judged else NO_VALIDATION.format(file=called)) if note
         ),

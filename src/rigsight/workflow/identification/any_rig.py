@@ -9,6 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.errors import SimulationError, check_option
 from rigsight.identify import (
@@ -39,7 +40,6 @@ from rigsight.rigs import Rig, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaign.campaign import Campaign
 from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,

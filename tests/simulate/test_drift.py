@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.diagnose.fitting.drift import can_drift
-from rigsight.diagnose.fitting.task import Task
-from rigsight.rigs import AXIS, RIGS
+from rigsight.rigs import RIGS
+from rigsight.simulate.drift import can_drift
 
 
 @pytest.mark.parametrize("name", ["drive_train", "servo", "two_link_arm", "quarter_car"])
@@ -21,12 +20,3 @@ def test_a_cart_rolls_away() -> None:
 def test_a_spring_that_is_given_as_zero_is_none() -> None:
     assert can_drift(RIGS["drive_train"], {"k_l": 0.0})
     assert not can_drift(RIGS["drive_train"], {"k_s": 0.3, "k_l": 0.1})
-
-
-@pytest.mark.parametrize(("k", "absent"), [(0.0, "k"), (2.0, None), (None, None)])
-def test_one_mass_is_without_a_spring_where_its_stiffness_is_given_as_zero(
-    k: float | None, absent: str | None
-) -> None:
-    task = Task("", AXIS, {"gain": 1.0}, {} if k is None else {"k": k}, ())
-    assert task.absent_spring == absent
-    assert task.drifts == (absent is not None)

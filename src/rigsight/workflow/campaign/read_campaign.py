@@ -1,17 +1,16 @@
-"""What is a campaign: one rig, its known numbers, the simulation in question, and the records about it."""
+"""How is a `campaign.toml` read, with its rig and all its records, and what of it is worth a note?"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.identify import OpenFactor, open_factor
 from rigsight.records import Record
 from rigsight.rigs import Rig, read_rig_file
 from rigsight.workflow.campaign.campaign_file import (
@@ -21,7 +20,7 @@ from rigsight.workflow.campaign.campaign_file import (
     locate,
     read_campaign_table,
 )
-from rigsight.workflow.campaign.given_simulation import GivenSimulation, checked_simulation, rig_named
+from rigsight.workflow.campaign.given_simulation import checked_simulation, rig_named
 from rigsight.workflow.campaign.listed_records import file_inside, inside, read_listed_record
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effect_on
@@ -32,71 +31,6 @@ _SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
 _RATES_APART = 100.0
 """Ratio of sample times from which they are asked about."""
 NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
-
-
-@dataclass(frozen=True, eq=False)
-class Campaign:
-    """A campaign, read or made of records, and checked.
-
-    Attributes
-    ----------
-    title
-        What a report calls it.
-    path
-        The toml file; None for a campaign that was made of records in memory.
-    rig
-        The declared rig.
-    constants
-        All constants of the rig, defaults filled in [SI].
-    modelled
-        Effects that the simulation in question has already.
-    parameters
-        The parameters that were given, as they were given [SI]; what is missing of the rig's is to be identified.
-    records
-        In the order of the file, with distinct names.
-    notes
-        What was noticed about the campaign as a whole.
-    """
-
-    title: str
-    path: Path | None
-    rig: Rig
-    modelled: tuple[Effect, ...]
-    constants: dict[str, float]
-    parameters: dict[str, float]
-    records: tuple[Record, ...]
-    notes: tuple[str, ...] = ()
-
-    # That of the dataclass would hold every sample.
-    def __repr__(self) -> str:
-        names = [record.name for record in self.records]
-        return f"Campaign({self.title!r}, rig={self.rig.name!r}, records={names!r})"
-
-    @property
-    def called(self) -> str:
-        """How messages call it: by its file, or by its title."""
-        return self.title if self.path is None else self.path.name
-
-    @property
-    def folder(self) -> Path | None:
-        """The folder that holds its file."""
-        return None if self.path is None else self.path.parent
-
-    @property
-    def estimation(self) -> tuple[Record, ...]:
-        """Records that may be fitted."""
-        return tuple(record for record in self.records if record.role == "estimation")
-
-    @cached_property
-    def open_factor(self) -> OpenFactor | None:
-        """What the records that may be fitted tell up to a common factor only: those of a free motion."""
-        given = self.rig.in_own_parameters(self.parameters, self.constants)
-        return open_factor(self.rig, self.estimation, self.constants, given)
-
-    @property
-    def validation(self) -> tuple[Record, ...]:
-        """Records that are only ever scored."""
-        return tuple(record for record in self.records if record.role == "validation")
 
 
 def read_campaign(
@@ -130,13 +64,9 @@ def read_campaign(
     rig = listed_rig(path, table.rig, where, own_rigs)
     known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
     by_record = set.intersection(*(set(record.constants) for record in table.records))
-    given = checked_simulation(
-        where,
-        rig,
-        [effect_on(rig, name, known, where.at("rig", "effects")) for name in table.rig.effects],
-        table.rig.constants,
-        table.rig.parameters,
-        by_record,
+    modelled = [effect_on(rig, name, known, where.at("rig", "effects")) for name in table.rig.effects]
+    known_constants, parameters = checked_simulation(
+        where, rig, modelled, table.rig.constants, table.rig.parameters, by_record
     )
     if all(record.role != "estimation" for record in table.records):
         raise InputError(
@@ -152,7 +82,7 @@ def read_campaign(
         outputs = [signal.name for signal in rig.outputs]
         read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
     records = tuple(record for _, record in read)
-    constants, differing = of_first_record(given, records)
+    constants, differing = of_first_record(rig, known_constants, records)
     notes = [
         note
         for note in (
@@ -167,12 +97,12 @@ def read_campaign(
         notes.append(NO_VALIDATION.format(file=path.name))
     return Campaign(
         title=table.title or path.parent.resolve().name,
-        path=path,
         rig=rig,
-        modelled=given.modelled,
         constants=constants,
-        parameters=given.parameters,
+        parameters=parameters,
         records=_with_distinct_names(read),
+        modelled=tuple(modelled),
+        path=path,
         notes=tuple(notes),
     )
 
@@ -242,19 +172,23 @@ def _check_simulator(rig: Rig, table: RigTable, where: Where) -> None:
     )
 
 
-def of_first_record(given: GivenSimulation, records: Sequence[Record]) -> tuple[dict[str, float], str]:
+def of_first_record(
+    rig: Rig, known: Mapping[str, float], records: Sequence[Record]
+) -> tuple[dict[str, float], str]:
     """Return all constants, those that only records give with the value of the first, and a note on these.
 
     Parameters
     ----------
-    given
-        The simulation in question.
+    rig
+        The rig.
+    known
+        Its constants that hold for all records [SI].
     records
         All records of the campaign.
     """
-    first = {name: value for name, value in records[0].constants.items() if name not in given.constants}
-    values = {**given.constants, **first}
-    constants = {constant.name: values[constant.name] for constant in given.rig.constants}
+    first = {name: value for name, value in records[0].constants.items() if name not in known}
+    values = {**known, **first}
+    constants = {constant.name: values[constant.name] for constant in rig.constants}
     if not first:
         return constants, ""
     listed = ", ".join(f"{name} = {value:g}" for name, value in first.items())
