@@ -35,7 +35,7 @@ def no_dask() -> bool:
 
 
 on_a_cluster = pytest.mark.skipif(
-    no_dask(), reason="distributed is not installed: pip install 'rigsight[cluster]'"
+    no_dask(), reason="distributed is not installed: pip install 'rigsight[bench]'"
 )
 
 

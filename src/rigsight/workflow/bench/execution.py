@@ -135,7 +135,7 @@ def _check_installed() -> None:
         import distributed  # noqa: F401
     except ImportError:
         raise InputError(
-            "A bench on a cluster needs Dask, which is not installed: pip install 'rigsight[cluster]'"
+            "A bench on a cluster needs Dask, which is not installed: pip install 'rigsight[bench]'"
         ) from None
 
 
