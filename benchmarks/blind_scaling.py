@@ -35,6 +35,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigsight.blind import Outcome
+from rigsight.cli import trial_process
 from rigsight.workflow.bench.execution import finished
 from rigsight.workflow.bench.files import BenchFolder, trial_name
 from rigsight.workflow.bench.scoring import score_trial
@@ -64,7 +65,7 @@ class Ran:
 def run_trial(folder: BenchFolder, seed: int, number: int) -> Ran:
     begin = time.time()
     make_trial(folder, "small", seed, number)
-    diagnose_trial(folder, trial_name(number))
+    diagnose_trial(folder, trial_name(number), trial_process.START)
     outcome = score_trial(folder, trial_name(number))
     memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / (
         1e6 if sys.platform == "darwin" else 1e3

@@ -87,6 +87,7 @@ def blind(
     Started again, it goes on where it was interrupted.
     """
     with report_errors(debug, "the same command goes on from here"), listening(quiet) as listener:
+        from rigsight.cli.trial_process import START
         from rigsight.workflow import blind as bench
         from rigsight.workflow.bench.score_files import merge as merged
         from rigsight.workflow.bench.score_files import write_markdown
@@ -106,10 +107,16 @@ def blind(
         elif rescore:
             content = bench.rescore(out, **running)
         elif campaigns is not None and keys is not None:
-            content = bench.run_external(campaigns, keys, out, only=trial or (), **running)
+            content = bench.run_external(campaigns, keys, out, start=START, only=trial or (), **running)
         else:
             content = bench.run_blind(
-                out, design=design, trials=trials, seed=seed, only=_numbers(trial or []), **running
+                out,
+                start=START,
+                design=design,
+                trials=trials,
+                seed=seed,
+                only=_numbers(trial or []),
+                **running,
             )
         if markdown is not None:
             write_markdown(markdown, content)

@@ -9,6 +9,9 @@ from rigsight.cli.exit_codes import CommandExit
 from rigsight.workflow.bench.parent_watch import end_with_parent
 from rigsight.workflow.bench.trial import MACHINE
 
+START = ("-c", f"from {__name__} import main; main()")
+"""Arguments with which Python starts the process; it is named here, so that nothing below names the command line."""
+
 
 def main() -> None:
     """Run the command line as a child that ends, and clears its folder, with the process that started it."""

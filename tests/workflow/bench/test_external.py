@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rigsight.cli.trial_process import START
 from rigsight.errors import InputError
 from rigsight.workflow import blind
 from rigsight.workflow.bench.external import ExternalBench
@@ -134,7 +135,7 @@ def test_what_has_changed_is_another_trial(diagnosed: ExternalBench, change: str
 
 
 def run(bench: ExternalBench, **more: Any) -> dict[str, Any]:
-    return run_external(bench.campaigns, bench.sealed, bench.path, n_jobs=1, **more)
+    return run_external(bench.campaigns, bench.sealed, bench.path, start=START, n_jobs=1, **more)
 
 
 def test_a_campaign_is_done_once_and_again_when_it_has_changed(
@@ -142,7 +143,7 @@ def test_a_campaign_is_done_once_and_again_when_it_has_changed(
 ) -> None:
     done: list[str] = []
 
-    def diagnose(folder: ExternalBench, name: str) -> None:
+    def diagnose(folder: ExternalBench, name: str, start: Sequence[str]) -> None:
         done.append(name)
         file = folder.result(name) / RUN_FILE
         file.write_text(json.dumps({**read_json(file), "fingerprint": folder.fingerprint(name)}))
@@ -278,7 +279,7 @@ def test_a_drawn_bench_and_one_of_a_lab_do_not_share_a_folder(lab: ExternalBench
     lab.settle_here()
     lab.settle_here()
     with pytest.raises(InputError, match="campaigns of somebody else"):
-        run_blind(lab.path, design="small", trials=1)
+        run_blind(lab.path, start=START, design="small", trials=1)
     other = replace(lab, path=lab.path.parent / "drawn")
     (other.path / "keys").mkdir(parents=True)
     other.settings.write_text(json.dumps({"design": "small", "seed": 3}))

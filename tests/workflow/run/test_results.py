@@ -90,11 +90,12 @@ def test_a_signal_that_comes_when_all_is_in_place_leaves_the_new_ones(
         signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(results, "_put_in_place", interrupted)
-    results.forget_written()
-    with pytest.raises(KeyboardInterrupt):
+    with results.noting_folders() as written, pytest.raises(KeyboardInterrupt):
         write_together(tmp_path / "out", CONTENTS)
     assert {path.name: path.read_text("utf-8") for path in (tmp_path / "out").iterdir()} == CONTENTS
-    assert results.written() == (tmp_path / "out",)
+    assert written == [tmp_path / "out"]
+    with results.noting_folders() as others:
+        assert others == []
 
 
 def test_a_failure_keeps_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,6 @@ _KEPT_VARIABLES = (
     "RIGSIGHT_CACHE_DIR",
 )
 """What a diagnosing process needs of its surroundings; nothing else of them reaches it."""
-_START = "from rigsight.cli.trial_process import main; main()"
 _FAILURES = (1, 2)
 """Exit codes of a diagnosis that ended by itself; any other end says nothing about the trial."""
 MACHINE = 75
@@ -50,7 +50,7 @@ def make_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> N
         folder.write_trial(name, draw_trial(design, seed, number))
 
 
-def diagnose_trial(folder: BenchFolder, name: str, start: tuple[str, ...] = ("-c", _START)) -> None:
+def diagnose_trial(folder: BenchFolder, name: str, start: Sequence[str]) -> None:
     """Diagnose a trial in a process of its own, unless that has been done.
 
     The process works on a copy in a temporary folder, so that not even a path tells which trial it is or where keys are.
@@ -62,7 +62,7 @@ def diagnose_trial(folder: BenchFolder, name: str, start: tuple[str, ...] = ("-c
     name
         Which trial.
     start
-        How Python starts the command line.
+        Arguments with which Python starts the command line.
 
     Raises
     ------

@@ -11,6 +11,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -34,17 +35,18 @@ DIAGNOSIS_FILE, REPORT_FILE = "diagnosis.json", "report.html"
 """Results of a diagnosis; the bench reads one and links the other."""
 ELSEWHERE = "Name another place with --out."
 
-_written: list[Path] = []
+_noted: ContextVar[list[Path] | None] = ContextVar("folders with results", default=None)
 
 
-def written() -> Sequence[Path]:
-    """Return the folders into which this process has written results since `forget_written`, for who says what is there."""
-    return tuple(_written)
-
-
-def forget_written() -> None:
-    """Count from here on."""
-    _written.clear()
+@contextlib.contextmanager
+def noting_folders() -> Iterator[Sequence[Path]]:
+    """Give the folders into which results are written inside this block, for who says what is there when it is interrupted."""
+    folders: list[Path] = []
+    before = _noted.set(folders)
+    try:
+        yield folders
+    finally:
+        _noted.reset(before)
 
 
 def json_text(content: Mapping[str, Any]) -> str:
@@ -138,7 +140,8 @@ def write_together(
             with signals_held() as held:
                 _put_in_place(parts, token, held)
                 is_in_place = True
-                _written.append(folder)
+                if (folders := _noted.get()) is not None:
+                    folders.append(folder)
     except BaseException as error:
         if is_in_place:
             # A signal that waited; it came when all was done.
