@@ -35,11 +35,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigsight.blind import Outcome
-from rigsight.workflow.blind_bench.execution import finished
-from rigsight.workflow.blind_bench.files import BenchFolder, trial_name
-from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.store import TrialStore
-from rigsight.workflow.blind_bench.trial import diagnose_trial, make_trial
+from rigsight.cli import trial_process
+from rigsight.workflow.bench.execution import finished
+from rigsight.workflow.bench.files import BenchFolder, trial_name
+from rigsight.workflow.bench.scoring import score_trial
+from rigsight.workflow.bench.store import TrialStore
+from rigsight.workflow.bench.trial import diagnose_trial, make_trial
 
 N_EMPTY = 2000
 N_ROWS = 200
@@ -64,7 +65,7 @@ class Ran:
 def run_trial(folder: BenchFolder, seed: int, number: int) -> Ran:
     begin = time.time()
     make_trial(folder, "small", seed, number)
-    diagnose_trial(folder, trial_name(number))
+    diagnose_trial(folder, trial_name(number), trial_process.START)
     outcome = score_trial(folder, trial_name(number))
     memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / (
         1e6 if sys.platform == "darwin" else 1e3

@@ -16,9 +16,9 @@ import numpy as np
 
 from rigsight.blind import Outcome, ParameterError, WithheldError
 from rigsight.effects import CATALOGUE
-from rigsight.workflow.blind_bench.files import STORE_FILE
-from rigsight.workflow.blind_bench.score_files import BLIND_FILE, PAGE_FILE, merge
-from rigsight.workflow.blind_bench.store import TrialStore
+from rigsight.workflow.bench.files import STORE_FILE
+from rigsight.workflow.bench.score_files import BLIND_FILE, PAGE_FILE, merge
+from rigsight.workflow.bench.store import TrialStore
 
 PARTS = 4
 """Benches that the rows come from, as if they had run on so many clusters."""

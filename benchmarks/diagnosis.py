@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose import Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import diagnose
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.excitation import log_sweep, step
 from rigsight.records import Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.kernels import prepare_kernels, structures_to_try
+from rigsight.workflow.run.kernels import prepare_kernels, structures_to_try
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ SIMULATIONS_PER_FIT = 80
 """Of each record: ten steps of least squares with forward differences for eight parameters."""
 
 
-def campaign(effect: str, length: float) -> Task:
+def campaign(effect: str, length: float) -> Campaign:
     rng = np.random.default_rng(0)
     structure = compose(RUNNING_GEAR, [effect_named(effect)])
     values = {**LINEAR, **EFFECTS[effect]}
@@ -66,13 +67,13 @@ def campaign(effect: str, length: float) -> Task:
         records.append(clean.with_signals(**noisy))
     constants = {p.name: LINEAR[p.name] for p in RUNNING_GEAR.constants}
     given = {**{p.name: LINEAR[p.name] for p in RUNNING_GEAR.parameters if p.name in LINEAR}, "k_c": 90.0}
-    return Task(effect, RUNNING_GEAR, constants, given, tuple(records))
+    return Campaign(effect, RUNNING_GEAR, constants, given, tuple(records))
 
 
-def diagnosed(task: Task, n_jobs: int) -> tuple[float, tuple[str, ...]]:
+def diagnosed(measured: Campaign, n_jobs: int) -> tuple[float, tuple[str, ...]]:
     start = time.perf_counter()
     with threadpool_limits(limits=1, user_api="blas"):
-        found = diagnose(task, n_jobs=n_jobs, prepare=lambda s: prepare_kernels(s, n_jobs, lambda _: None))
+        found = diagnose(measured, n_jobs=n_jobs, prepare=lambda s: prepare_kernels(s, n_jobs, lambda _: None))
     return time.perf_counter() - start, found.effects
 
 
@@ -117,8 +118,8 @@ def main() -> None:
             f"  records of {length * SWEEP:4.0f} s {seconds:8.1f} s   {seconds / first:5.2f} times the first",
             flush=True,
         )
-    task = campaign("cubic_stiffness", SWEEP)
-    one = sum(scipy_simulation(record) for record in task.records if record.role == "estimation")
+    measured = campaign("cubic_stiffness", SWEEP)
+    one = sum(scipy_simulation(record) for record in measured.records if record.role == "estimation")
     alone = SIMULATIONS_PER_FIT * one
     print(
         f"scipy (solve_ivp LSODA rtol 1e-6) simulates the four records once in {one:.1f} s: least_squares with finite "

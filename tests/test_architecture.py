@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -31,8 +33,8 @@ NAME_A_RIG = {
     "rigs/built_in.py": "the built-in rigs",
     "rigs/conicity.py": "API: equation (2.12) of the thesis, of the running gear",
     "workflow/demo.py": "the demo is the running gear of the thesis",
-    "workflow/own/effect_promises.py": "effects of one's own are tried on three built-in rigs",
-    "workflow/virtual_rig.py": "the demo is the running gear of the thesis",
+    "workflow/own/effect_checks.py": "effects of one's own are tried on three built-in rigs",
+    "workflow/campaign/virtual_rig.py": "the demo is the running gear of the thesis",
 }
 NAMES_WITHOUT_A_QUESTION = {"utils", "util", "common", "core", "helpers", "misc"}
 
@@ -72,6 +74,33 @@ def test_every_language_is_printed_in_one_place() -> None:
         if any(word in module.read_text(encoding="utf-8") for word in ("sympy.printing", "sp.latex("))
     }
     assert {name for name in printers if not name.startswith("simulate/printing/")} == set()
+
+
+def test_no_text_names_a_module_of_a_room_above() -> None:
+    """The linter does not see an import that stands in a text: code for another process, a name for importlib."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    layers = next(c["layers"] for c in contracts if c.get("containers") == ["rigsight"])
+    height = {room: -i for i, layer in enumerate(layers) for room in layer.split(" | ")}
+    found = []
+    for module in MODULES:
+        own = module.relative_to(ROOT / "src" / "rigsight").with_suffix("").parts[0]
+        tree = ast.parse(module.read_text(encoding="utf-8"))
+        told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told:
+                named = re.findall(r"(?:^|import |from )rigsight\.([a-z_]+)", node.value)
+                found += [
+                    f"{module}: {node.value}" for room in named if height.get(room, -99) > height.get(own, 0)
+                ]
+    assert found == []
+
+
+def test_beside_its_rooms_workflow_holds_commands_only() -> None:
+    source = ROOT / "src" / "rigsight"
+    commands = {module.stem for module in (source / "workflow").glob("*.py")} - {"__init__"}
+    assert commands <= {module.stem for module in (source / "cli").glob("*.py")}
 
 
 def test_no_other_module_knows_a_rig_by_name() -> None:

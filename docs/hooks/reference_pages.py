@@ -21,6 +21,7 @@ PACKAGES = (
     "simulators",
     "libraries",
     "identify",
+    "campaign",
     "discover",
     "compare",
     "diagnose",
@@ -33,7 +34,7 @@ PACKAGES = (
 )
 """From what is measured to what is shown, as the rooms of the house lie above each other."""
 COMMANDS = (
-    "campaigns.campaign",
+    "campaign.read_campaign",
     "diagnose",
     "identify",
     "discover",
@@ -41,7 +42,7 @@ COMMANDS = (
     "simulate",
     "vary",
     "blind",
-    "files.model_file",
+    "campaign.model_file",
 )
 """Modules of `rigsight.workflow` that are public one by one: each command is a function of its own module."""
 

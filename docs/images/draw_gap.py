@@ -16,9 +16,8 @@ from matplotlib.figure import Figure
 from rigsight.plot.drawing import GIVEN, MEASURED, WITH_EFFECT, style
 from rigsight.records import Record
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.diagnose import task_of
-from rigsight.workflow.files.model_file import read_model
+from rigsight.workflow.campaign.model_file import read_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 PANELS = {"sweep_0.75A": (19.0, 25.0), "step_0.60A": (9.5, 13.5)}
 TITLES = {"sweep_0.75A": "Sweep, 0.75 A (not fitted)", "step_0.60A": "Step, 0.6 A (not fitted)"}
@@ -26,16 +25,16 @@ PICTURE = Path(__file__).with_name("gap.svg")
 
 
 def draw(demo: Path) -> None:
-    task = task_of(read_campaign(demo / "campaign"))
-    defaults = {p.name: p.default for p in task.rig.parameters if p.default is not None}
-    given = {**defaults, **task.constants, **task.given}
+    campaign = read_campaign(demo / "campaign")
+    defaults = {p.name: p.default for p in campaign.rig.parameters if p.default is not None}
+    given = {**defaults, **campaign.constants, **campaign.given}
     model = read_model(demo)
     with style():
         figure = Figure(figsize=(7.6, 2.7), layout="constrained")
         axes = figure.subplots(1, 2)
         for ax, (name, window) in zip(axes, PANELS.items(), strict=True):
-            (record,) = [record for record in task.records if record.name == name]
-            before = simulate(compose(task.rig, task.modelled), given, record)
+            (record,) = [record for record in campaign.records if record.name == name]
+            before = simulate(compose(campaign.rig, campaign.modelled), given, record)
             after = simulate(model.structure, model.values, record)
             panel(ax, record, before, after, window)
             ax.set_title(TITLES[name])

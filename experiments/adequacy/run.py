@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from rigsight.blind import draw_trial
-from rigsight.diagnose import Task
+from rigsight.campaign import Campaign
 from rigsight.diagnose.examination import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.adequacy import Adequacy, adequacy
@@ -57,9 +57,9 @@ def row(seed: int, trial: int) -> Row | None:
         return None
     rig, records = drawn.linear.rig, drawn.records
     constants = {p.name: drawn.linear.values[p.name] for p in rig.constants}
-    task = Task(str(trial), rig, constants, {}, tuple(records))
+    campaign = Campaign(str(trial), rig, constants, {}, tuple(records))
     noise = {floor.output: floor.std for floor in noise_floors(rig, records)}
-    bench = fit_context_of(task, noise, Windowing(), None, IdleThreads(1))
+    bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))
     rng = np.random.default_rng(trial)
     linear = reidentify(bench, bench.start)
     effects = tuple(effect_named(name) for name in drawn.key["effects"])

@@ -25,12 +25,12 @@ from rigsight.records import Record
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.model_file import MODEL_FILE, read_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.campaign.virtual_rig import VirtualRig
 from rigsight.workflow.compare import run_compare
-from rigsight.workflow.files.model_file import MODEL_FILE, read_model
-from rigsight.workflow.files.results import json_text
 from rigsight.workflow.identify import run_identify
-from rigsight.workflow.virtual_rig import VirtualRig
+from rigsight.workflow.run.results import json_text
 
 EVALUATION = "evaluation"
 FITTED = ("identify", "calibrate", "discover")

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.blind import n_trials, subject_of
-from rigsight.workflow.blind_bench.files import BenchFolder, trial_name
-from rigsight.workflow.blind_bench.trial import make_trial
+from rigsight.workflow.bench.files import BenchFolder, trial_name
+from rigsight.workflow.bench.trial import make_trial
 
 SEED = 6
 FIRST = 100

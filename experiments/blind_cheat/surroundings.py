@@ -12,8 +12,8 @@ from pathlib import Path
 
 from campaigns import Campaign
 
-from rigsight.workflow.blind_bench.files import BenchFolder, trial_name
-from rigsight.workflow.blind_bench.trial import diagnose_trial
+from rigsight.workflow.bench.files import BenchFolder, trial_name
+from rigsight.workflow.bench.trial import diagnose_trial
 
 SPY = """
 import json, os, sys

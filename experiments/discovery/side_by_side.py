@@ -26,7 +26,7 @@ with warnings.catch_warnings():
 
 from rigsight.metrics import nrmse
 from rigsight.records import Record
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.discover import run_discover
 
 warnings.filterwarnings("ignore", module="pysindy")

@@ -18,7 +18,7 @@ from rigsight.excitation import Multisine, multisine, multisine_lines
 from rigsight.metrics import rms
 from rigsight.records import Record
 from rigsight.simulate import simulate
-from rigsight.workflow.files.model_file import read_model
+from rigsight.workflow.campaign.model_file import read_model
 
 M, C, K, ALPHA, BETA, GAMMA, DELTA = 2.0, 10.0, 5e4, 5e4, 1e3, 0.8, -1.1
 DT = 1.0 / 750.0

@@ -13,7 +13,7 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose
 from rigsight.units import characteristic_value
-from rigsight.workflow.own.effect_promises import bench_of, sizes
+from rigsight.workflow.own.effect_checks import bench_of, sizes
 
 DT = 5e-3
 N_SAMPLES = 200

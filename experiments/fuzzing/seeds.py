@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 
 from rigsight.rigs.published import published_sets
-from rigsight.workflow.files.model_file import named_model
+from rigsight.workflow.campaign.model_file import named_model
 
 N_SAMPLES = 60
 UNITS = {"u": "A", "psi": "rad", "y": "m"}

@@ -26,12 +26,12 @@ from rigsight.records import read_record
 from rigsight.records.formats import channel_file
 from rigsight.records.formats.channel import ChannelFile
 from rigsight.rigs import RIGS
-from rigsight.workflow.blind_bench.external import ExternalBench
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.campaigns.inspect import run_inspect
-from rigsight.workflow.files.model_file import read_model
-from rigsight.workflow.files.results import json_text
+from rigsight.workflow.bench.external import ExternalBench
+from rigsight.workflow.campaign.model_file import read_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.inspect import run_inspect
 from rigsight.workflow.own import own_effects
+from rigsight.workflow.run.results import json_text
 
 Plain = Callable[[bytes, int], bytes]
 """libFuzzer's own mutation of bytes up to a size."""

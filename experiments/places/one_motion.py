@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rigsight.blind import draw_trial
 from rigsight.blind.subjects import subject_of
-from rigsight.diagnose import Task
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.detection import noise_floors
@@ -38,9 +38,9 @@ def row(seed: int, number: int) -> tuple[int, int, bool, str]:
     trial = draw_trial(DESIGN, seed, number)
     rig = trial.linear.rig
     constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
-    task = Task(str(number), rig, constants, trial.given, trial.records)
-    noise = {floor.output: floor.std for floor in noise_floors(rig, task.records, task.drifts, True)}
-    bench = fit_context_of(task, noise, Windowing(), None, IdleThreads(1))
+    campaign = Campaign(str(number), rig, constants, trial.given, trial.records)
+    noise = {floor.output: floor.std for floor in noise_floors(rig, campaign.records, campaign.drifts, True)}
+    bench = fit_context_of(campaign, noise, Windowing(), None, IdleThreads(1))
     linear = reidentify(bench, bench.start)
     offered = bench.offered(CATALOGUE)
     begun = time.process_time()

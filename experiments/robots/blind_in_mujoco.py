@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigsight.robots import sensor_readings
-from rigsight.workflow.campaigns.from_mjcf import run_init_from_mjcf
 from rigsight.workflow.diagnose import run_diagnose
+from rigsight.workflow.init import run_init_from_mjcf
 
 DT, STEP, SECONDS, NOISE = 0.004, 0.0005, 8.0, 2e-4
 """Sample time and MuJoCo's step [s], length of a record [s], noise of an encoder [rad]."""

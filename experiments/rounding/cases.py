@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigsight.blind import draw_trial
-from rigsight.diagnose import Task
+from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect, effect_named
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record
@@ -35,21 +35,21 @@ class Case:
     """Records, what may be missing, and the noise in them."""
 
     name: str
-    task: Task
+    campaign: Campaign
     effects: tuple[Effect, ...]
     noise: float
 
-    def disturbed(self, share: float, seed: int) -> Task:
-        """Return the task with that share of the noise added to what was measured; seed 0 adds nothing."""
+    def disturbed(self, share: float, seed: int) -> Campaign:
+        """Return the campaign with that share of the noise added to what was measured; seed 0 adds nothing."""
         if seed == 0:
-            return self.task
+            return self.campaign
         rng = np.random.default_rng(seed)
         records = []
-        for record in self.task.records:
-            own = [signal.name for signal in self.task.rig.outputs if signal.name in record]
+        for record in self.campaign.records:
+            own = [signal.name for signal in self.campaign.rig.outputs if signal.name in record]
             moved = {n: record[n] + rng.normal(scale=share * self.noise, size=record.n_samples) for n in own}
             records.append(record.with_signals(**moved))
-        return replace(self.task, records=tuple(records))
+        return replace(self.campaign, records=tuple(records))
 
 
 def cases(draws: int, trials: tuple[int, ...]) -> list[Case]:
@@ -64,9 +64,9 @@ def cases(draws: int, trials: tuple[int, ...]) -> list[Case]:
         trial = draw_trial("small", 9, number)
         rig = trial.linear.rig
         constants = {p.name: trial.linear.values[p.name] for p in rig.constants}
-        task = Task(f"trial {number}", rig, constants, trial.given, trial.records)
+        campaign = Campaign(f"trial {number}", rig, constants, trial.given, trial.records)
         noise = min(float(value) for value in trial.key["noise_floor"].values())
-        found.append(Case(f"small 9, trial {number}", task, CATALOGUE, noise))
+        found.append(Case(f"small 9, trial {number}", campaign, CATALOGUE, noise))
     return found
 
 
@@ -78,5 +78,5 @@ def _axis(name: str, effect: str, own: Mapping[str, float], draw: int, tried: tu
         asked = Record(run, DT, {"u": linear_sweep(t, size, 1.0, 30.0)}, {}, role=role, hold="zoh")
         clean = simulate(structure, {**RIG, **own}, asked)
         records.append(clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size)))
-    task = Task(name, AXIS, {"gain": 1.0}, {}, tuple(records))
-    return Case(name, task, tuple(effect_named(n) for n in tried), NOISE)
+    campaign = Campaign(name, AXIS, {"gain": 1.0}, {}, tuple(records))
+    return Case(name, campaign, tuple(effect_named(n) for n in tried), NOISE)

@@ -37,7 +37,7 @@ from rigsight.simulate.compiled import kernel_cache
 from rigsight.simulate.compiled.kernel import Kernel
 from rigsight.simulate.compiled.kernel_source import KernelEquations, kernel_source
 from rigsight.units import characteristic_value
-from rigsight.workflow.own import effect_promises
+from rigsight.workflow.own import effect_checks
 
 N_SAMPLES, DT = 1500, 5e-3
 CENTRAL = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
@@ -225,7 +225,7 @@ def kernel_line(name: str, repeats: int) -> str:
 
 
 def fits(effect: Any) -> tuple[GreyBoxFit, dict[str, float], tuple[str, ...]]:
-    """Return the last fit that the promise of an effect makes, with its start."""
+    """Return the last fit that the check of an effect makes, with its start."""
     made: list[Any] = []
     plain = GreyBoxFit.fit
 
@@ -235,7 +235,7 @@ def fits(effect: Any) -> tuple[GreyBoxFit, dict[str, float], tuple[str, ...]]:
 
     GreyBoxFit.fit = kept  # type: ignore[method-assign, assignment]
     try:
-        effect_promises.is_found_again(effect)
+        effect_checks.is_found_again(effect)
     finally:
         GreyBoxFit.fit = plain  # type: ignore[method-assign]
     return made[-1]

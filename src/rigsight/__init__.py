@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rigsight.api.linear_identifier import LinearIdentifier as LinearIdentifier
     from rigsight.api.reading import read_record as read_record
     from rigsight.api.rig import Rig as Rig
+    from rigsight.campaign import Campaign as Campaign
     from rigsight.effects import CATALOGUE as CATALOGUE
     from rigsight.effects import Effect as Effect
     from rigsight.errors import InputError as InputError
@@ -27,17 +28,16 @@ if TYPE_CHECKING:
     from rigsight.records import ColumnMapping as ColumnMapping
     from rigsight.records import Record as Record
     from rigsight.simulate.model import Model as Model
-    from rigsight.workflow.campaigns.campaign import Campaign as Campaign
-    from rigsight.workflow.campaigns.campaign import read_campaign as read_campaign
-    from rigsight.workflow.campaigns.in_memory import make_campaign as make_campaign
-    from rigsight.workflow.campaigns.in_memory import make_model as make_model
-    from rigsight.workflow.files.model_file import read_model as read_model
+    from rigsight.workflow.campaign.in_memory import make_campaign as make_campaign
+    from rigsight.workflow.campaign.in_memory import make_model as make_model
+    from rigsight.workflow.campaign.model_file import read_model as read_model
+    from rigsight.workflow.campaign.read_campaign import read_campaign as read_campaign
     from rigsight.workflow.own.own_effects import own_effects as own_effects
     from rigsight.workflow.simulate import simulate_model as simulate_model
 
 _HOMES = {
     "CATALOGUE": "rigsight.effects",
-    "Campaign": "rigsight.workflow.campaigns.campaign",
+    "Campaign": "rigsight.campaign",
     "ColumnMapping": "rigsight.records",
     "ComparisonResult": "rigsight.api.comparison_result",
     "Diagnoser": "rigsight.api.diagnoser",
@@ -55,11 +55,11 @@ _HOMES = {
     "SimulationError": "rigsight.errors",
     "compare_models": "rigsight.api.comparing",
     "example_campaign": "rigsight.api.example",
-    "make_campaign": "rigsight.workflow.campaigns.in_memory",
-    "make_model": "rigsight.workflow.campaigns.in_memory",
+    "make_campaign": "rigsight.workflow.campaign.in_memory",
+    "make_model": "rigsight.workflow.campaign.in_memory",
     "own_effects": "rigsight.workflow.own.own_effects",
-    "read_campaign": "rigsight.workflow.campaigns.campaign",
-    "read_model": "rigsight.workflow.files.model_file",
+    "read_campaign": "rigsight.workflow.campaign.read_campaign",
+    "read_model": "rigsight.workflow.campaign.model_file",
     "read_record": "rigsight.api.reading",
     "simulate_model": "rigsight.workflow.simulate",
 }

@@ -18,8 +18,8 @@ from rigsight.effects import CATALOGUE
 from rigsight.rigs import RIGS
 from rigsight.simulate import compose, simulate
 from rigsight.simulate.linearization import linearize
-from rigsight.workflow.blind_bench.files import BenchFolder
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.bench.files import BenchFolder
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 SEED = 7
 

@@ -38,8 +38,29 @@ def test_help_lists_the_commands() -> None:
 
 
 def test_help_imports_nothing_heavy() -> None:
-    code = "import sys, rigsight.cli; sys.exit(bool({'numpy', 'sympy', 'pydantic'} & sys.modules.keys()))"
+    code = "import sys, rigsight.cli; sys.exit(bool({'numpy', 'sympy', 'pydantic', 'sqlite3'} & sys.modules.keys()))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_nothing_but_the_bench_needs_dask_and_sqlite() -> None:
+    """Help, every public name and every other command come without them."""
+    code = """
+import contextlib, importlib, pkgutil, sys
+import rigsight, rigsight.cli, rigsight.workflow
+sys.argv = ["rigsight", "--help"]
+with contextlib.suppress(SystemExit):
+    rigsight.cli.main()
+for name in rigsight.__all__:
+    getattr(rigsight, name)
+for package in (rigsight.cli, rigsight.workflow):
+    for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        if module.name not in ("rigsight.cli.trial_process", "rigsight.workflow.blind", "rigsight.workflow.bench"):
+            importlib.import_module(module.name)
+found = [name for name in sys.modules if name.startswith(("sqlite3", "distributed", "dask", "rigsight.workflow.bench"))]
+sys.exit(", ".join(found) or 0)
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
 
 
 def test_version(run: Run) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rigsight.blind import Outcome
-from rigsight.workflow.blind_bench.files import STORE_FILE
-from rigsight.workflow.blind_bench.store import TrialStore
+from rigsight.workflow.bench.files import STORE_FILE
+from rigsight.workflow.bench.store import TrialStore
 
 Run = Callable[..., tuple[int, str, str]]
 

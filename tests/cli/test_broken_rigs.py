@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigsight.rigs import rig_file_text
-from rigsight.workflow.campaigns.in_memory import make_model
-from rigsight.workflow.files.results import json_text
+from rigsight.workflow.campaign.in_memory import make_model
+from rigsight.workflow.run.results import json_text
 
 from ..workflow.any_rig import CURRENT, TRAIN, simulated, write_record, write_train_campaign
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from rigsight.cli.exit_codes import told
-from rigsight.workflow.files.results import write_together
-from rigsight.workflow.progress import Stage
-from rigsight.workflow.progress_display import listening
+from rigsight.cli.exit_codes import report_errors
+from rigsight.workflow.run.progress import Stage
+from rigsight.workflow.run.progress_display import listening
+from rigsight.workflow.run.results import write_together
 
 RIGSIGHT = Path(sys.executable).with_name("rigsight")
 Run = Callable[..., tuple[int, str, str]]
@@ -250,7 +250,7 @@ def test_a_bench_that_is_interrupted_goes_on_and_its_settings_are_no_results(
         write_together(tmp_path / "bench" / "keys", {"settings.json": "{}"})
         raise KeyboardInterrupt
 
-    with pytest.raises(SystemExit), told(debug=False, left="the same command goes on from here"):
+    with pytest.raises(SystemExit), report_errors(debug=False, left="the same command goes on from here"):
         interrupted()
     assert capsys.readouterr().err == "rigsight: interrupted; the same command goes on from here.\n"
 

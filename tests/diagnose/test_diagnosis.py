@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, diagnose
 from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.excitation import linear_sweep
@@ -66,8 +67,8 @@ def diagnosed(
     given: Mapping[str, float] = GIVEN,
     seed: int = 0,
 ) -> Diagnosis:
-    task = Task("stage", AXIS, {"gain": 1.0}, given, tuple(records))
-    return diagnose(task, [effect_named(name) for name in candidates], seed)
+    campaign = Campaign("stage", AXIS, {"gain": 1.0}, given, tuple(records))
+    return diagnose(campaign, [effect_named(name) for name in candidates], seed)
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +173,7 @@ def context(effect: str, own: Mapping[str, float]) -> Diagnosis:
     inputs = [0.005 * amplitude * np.sin(3.0 * t + 2.0 * t**2) for amplitude, _ in RUNS]
     records = measured(ELEMENT, [effect], values, inputs, noise=0.05)
     candidates = [effect_named(name) for name in ("coulomb_friction", "bouc_wen_hysteresis")]
-    return diagnose(Task("damper", ELEMENT, {}, {"k": 4e3, "d": 120.0}, records), candidates)
+    return diagnose(Campaign("damper", ELEMENT, {}, {"k": 4e3, "d": 120.0}, records), candidates)
 
 
 @pytest.mark.parametrize(
@@ -201,7 +202,7 @@ def test_a_running_gear_whose_records_lack_the_lateral_displacement() -> None:
     constants = {name: GEAR[name] for name in ("v", "r_0", "b", "k_tau")}
     given = {name: GEAR[name] for name in ("J_z", "k_c", "k_d")}
     candidates = [effect_named(name) for name in CANDIDATES]
-    diagnosis = diagnose(Task("gear", RUNNING_GEAR, constants, given, records), candidates)
+    diagnosis = diagnose(Campaign("gear", RUNNING_GEAR, constants, given, records), candidates)
     assert (diagnosis.effects, diagnosis.where) == (("cubic_stiffness",), ("yaw_dynamics",))
     assert set(diagnosis.gap) == {"psi"}
     assert diagnosis.gap["psi"].closed == pytest.approx(1.0, abs=0.01)
@@ -240,8 +241,8 @@ def test_the_same_seed_gives_identical_results(cubic: Diagnosis, cubic_records: 
 
 
 def test_the_number_of_jobs_does_not_change_the_result(cubic: Diagnosis, cubic_records) -> None:
-    task = Task("stage", AXIS, {"gain": 1.0}, GIVEN, cubic_records)
-    parallel = diagnose(task, [effect_named(name) for name in CANDIDATES], n_jobs=2)
+    campaign = Campaign("stage", AXIS, {"gain": 1.0}, GIVEN, cubic_records)
+    parallel = diagnose(campaign, [effect_named(name) for name in CANDIDATES], n_jobs=2)
     assert json.dumps(parallel.to_json()) == json.dumps(cubic.to_json())
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rigsight.discover import Task, known_terms
+from rigsight.campaign import Campaign
+from rigsight.discover import RegressionData, known_terms
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
@@ -58,8 +59,8 @@ def _multisine(amplitude: float, seconds: float, rng: np.random.Generator) -> np
 
 
 @pytest.fixture(scope="session")
-def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
-    """Return the true values and the task of an axis: sweeps of several amplitudes, and a multisine that is held out."""
+def make_data() -> Callable[..., tuple[dict[str, float], RegressionData]]:
+    """Return the true values and the data of an axis: sweeps of several amplitudes, and a multisine that is held out."""
 
     def make(
         truth: str,
@@ -68,7 +69,7 @@ def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
         seconds: float = 10.0,
         seed: int = 0,
         validation: bool = True,
-    ) -> tuple[dict[str, float], Task]:
+    ) -> tuple[dict[str, float], RegressionData]:
         rng = np.random.default_rng(seed)
         known = known_terms()
         structure = compose(AXIS, [known[name] for name in TRUTHS[truth].effects])
@@ -82,7 +83,7 @@ def make_task() -> Callable[..., tuple[dict[str, float], Task]]:
                 structure, values, Record(name=name, dt=DT, signals={"u": u}, units={}, role=role)
             )
             records.append(record.with_signals(x=record["x"] + rng.normal(scale=noise, size=u.size)))
-        return values, Task("axis", AXIS, {"gain": 0.8}, tuple(records), {"x": noise})
+        return values, RegressionData(Campaign("axis", AXIS, {"gain": 0.8}, {}, tuple(records)), {"x": noise})
 
     return make
 

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from rigsight.discover import Discovery, Task, discover
+from rigsight.campaign import Campaign
+from rigsight.discover import Discovery, RegressionData, discover
 from rigsight.effects import effect_named, placed
 from rigsight.errors import InputError
 from rigsight.plot import svg_text
@@ -26,7 +27,7 @@ Z_MAX = 4.5
 """Standard errors by which an estimate may be off: one in 10^5 by chance."""
 
 
-def campaign(rig: Rig, values: Mapping[str, float]) -> Task:
+def campaign(rig: Rig, values: Mapping[str, float]) -> RegressionData:
     structure = compose(rig, [placed(effect_named("quadratic_damping"), "motor_bearing")])
     rng = np.random.default_rng(0)
     runs = []
@@ -42,7 +43,7 @@ def campaign(rig: Rig, values: Mapping[str, float]) -> Task:
         r.with_signals(**{n: r[n] + rng.normal(scale=std, size=r.n_samples) for n, std in noise.items()})
         for r in runs
     )
-    return Task("train", rig, {"k_t": 0.05}, noisy, noise)
+    return RegressionData(Campaign("train", rig, {"k_t": 0.05}, {}, noisy), noise)
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +82,6 @@ def test_results_say_where(found: Discovery) -> None:
 
 @pytest.mark.parametrize(("method", "pointwise"), [("full", False), ("discrepancy", True)])
 def test_a_form_that_it_does_not_have_is_refused(drive_train: Rig, method: str, pointwise: bool) -> None:
-    task = Task("train", drive_train, {"k_t": 0.05}, (), {})
+    data = RegressionData(Campaign("train", drive_train, {"k_t": 0.05}, {}, ()), {})
     with pytest.raises(InputError, match="has several joints"):
-        discover(task, method, pointwise)  # type: ignore[arg-type]
+        discover(data, method, pointwise)  # type: ignore[arg-type]

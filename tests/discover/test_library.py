@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rigsight.discover import Task
+from rigsight.discover import RegressionData
 from rigsight.discover.motion import motion_of
 from rigsight.discover.own_regression import own_regression, rows_of
 from rigsight.discover.terms.library import candidates
@@ -26,13 +26,13 @@ from rigsight.identify import characteristic_scales
 def test_a_column_is_the_term_along_the_motion(
     name: str,
     term: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    make_task: Callable[..., tuple[dict[str, float], Task]],
+    make_data: Callable[..., tuple[dict[str, float], RegressionData]],
 ) -> None:
-    values, task = make_task("cubic", 2e-5, amplitudes=(0.6,), validation=False)
-    motion = motion_of(task.rig, task.records[0], values, 2e-5)
-    scales = characteristic_scales(task.rig, task.records, values)
+    values, data = make_data("cubic", 2e-5, amplitudes=(0.6,), validation=False)
+    motion = motion_of(data.rig, data.records[0], values, 2e-5)
+    scales = characteristic_scales(data.rig, data.records, values)
     rows = rows_of([motion], scales["time"])
-    projected = own_regression(task.rig, False, [motion], rows)
+    projected = own_regression(data.rig, False, [motion], rows)
     (found,) = candidates([effect_named(name)], [motion], rows, projected, scales, True)
     # A force that resists: it takes acceleration away.
     np.testing.assert_allclose(found.column, -rows.of(term(motion.x, motion.v)), rtol=1e-6, atol=1e-15)

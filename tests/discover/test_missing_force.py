@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigsight.discover import Task, missing_force
+from rigsight.discover import RegressionData, missing_force
 from rigsight.discover.missing_force import MissingForce
 from rigsight.identify import characteristic_scales, linear_start
 
 
-def shape_of(task: Task) -> MissingForce:
-    estimation = [record for record in task.records if record.role == "estimation"]
-    values = {**task.constants, **linear_start(task.rig, estimation, task.constants, {})}
-    scales = characteristic_scales(task.rig, estimation, values)
-    return missing_force(task.rig, estimation, values, scales, task.noise["x"], np.random.default_rng(0))
+def shape_of(data: RegressionData) -> MissingForce:
+    estimation = [record for record in data.records if record.role == "estimation"]
+    values = {**data.campaign.constants, **linear_start(data.rig, estimation, data.campaign.constants, {})}
+    scales = characteristic_scales(data.rig, estimation, values)
+    return missing_force(data.rig, estimation, values, scales, data.noise["x"], np.random.default_rng(0))
 
 
-def test_a_cube_is_seen_as_a_cube(make_task) -> None:
-    values, task = make_task("cubic", 2e-5)
-    found = shape_of(task)
+def test_a_cube_is_seen_as_a_cube(make_data) -> None:
+    values, data = make_data("cubic", 2e-5)
+    found = shape_of(data)
     (term,) = found.terms
     assert term.term == "x^3"
     assert term.coefficient == pytest.approx(values["k_3"], rel=0.05)
@@ -28,15 +28,15 @@ def test_a_cube_is_seen_as_a_cube(make_task) -> None:
     assert "x^3" in found.sentence
 
 
-def test_a_product_that_no_effect_has_is_seen(make_task) -> None:
-    values, task = make_task("monomial", 2e-5)
-    (term,) = shape_of(task).terms
+def test_a_product_that_no_effect_has_is_seen(make_data) -> None:
+    values, data = make_data("monomial", 2e-5)
+    (term,) = shape_of(data).terms
     assert set(term.term.split()) == {"x", "v"}
     assert term.coefficient == pytest.approx(values["c_11"], rel=0.05)
 
 
-def test_nothing_is_seen_where_nothing_is_lacking(make_task) -> None:
-    found = shape_of(make_task("linear", 2e-5)[1])
+def test_nothing_is_seen_where_nothing_is_lacking(make_data) -> None:
+    found = shape_of(make_data("linear", 2e-5)[1])
     assert found.terms == ()
     assert found.to_json()["terms"] == []
     assert found.sentence.startswith("No product")

@@ -7,20 +7,20 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rigsight.discover import Task
+from rigsight.discover import RegressionData
 from rigsight.discover.motion import motion_of
 from rigsight.discover.weak_form import Rows
 
-Make = Callable[..., tuple[dict[str, float], Task]]
+Make = Callable[..., tuple[dict[str, float], RegressionData]]
 
 
 @pytest.mark.parametrize("noise", [2e-6, 2e-5, 2e-4])
-def test_the_missing_force_is_seen_through_the_noise(noise: float, make_task: Make) -> None:
-    values, task = make_task("cubic", noise, amplitudes=(1.0,), validation=False)
-    (record,) = task.records
-    _, clean = make_task("cubic", 1e-12, amplitudes=(1.0,), validation=False)
+def test_the_missing_force_is_seen_through_the_noise(noise: float, make_data: Make) -> None:
+    values, data = make_data("cubic", noise, amplitudes=(1.0,), validation=False)
+    (record,) = data.records
+    _, clean = make_data("cubic", 1e-12, amplitudes=(1.0,), validation=False)
     x = clean.records[0]["x"]
-    motion = motion_of(task.rig, record, values, noise)
+    motion = motion_of(data.rig, record, values, noise)
     assert np.std(motion.x - x) < 0.6 * noise
     force = (
         values["m"] * motion.acceleration + values["d"] * motion.v + values["k"] * motion.x - 0.8 * motion.u

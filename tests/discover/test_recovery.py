@@ -9,14 +9,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rigsight.discover import Discovery, Task, discover
+from rigsight.campaign import Campaign
+from rigsight.discover import Discovery, RegressionData, discover
 from rigsight.effects import effect_named
 from rigsight.records import Record
 from rigsight.rigs import ELEMENT, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
 
-Make = Callable[..., tuple[dict[str, float], Task]]
-Discovered = Callable[[str, float], tuple[dict[str, float], Task, Discovery]]
+Make = Callable[..., tuple[dict[str, float], RegressionData]]
+Discovered = Callable[[str, float], tuple[dict[str, float], RegressionData, Discovery]]
 Z_MAX = 4.5
 """Standard errors by which an estimate may be off: one in 10^5 by chance."""
 
@@ -34,13 +35,13 @@ CASES = {
 
 
 @pytest.fixture(scope="module")
-def discovered(make_task: Make) -> Discovered:
-    """Return true values, task and discovery of an axis, discovered once for all tests of this file that look at it."""
+def discovered(make_data: Make) -> Discovered:
+    """Return true values, data and discovery of an axis, discovered once for all tests of this file that look at it."""
 
     @cache
-    def found(truth: str, noise: float) -> tuple[dict[str, float], Task, Discovery]:
-        values, task = make_task(truth, noise)
-        return values, task, discover(task)
+    def found(truth: str, noise: float) -> tuple[dict[str, float], RegressionData, Discovery]:
+        values, data = make_data(truth, noise)
+        return values, data, discover(data)
 
     return found
 
@@ -88,55 +89,55 @@ def test_one_hysteresis_is_not_taken_for_the_other(
     assert {term.name: term.inclusion for term in found.terms}.get(rival, 0.0) < 0.5
 
 
-def test_too_much_noise_to_decide_is_said(make_task: Make) -> None:
+def test_too_much_noise_to_decide_is_said(make_data: Make) -> None:
     # Noise as large as the motion at the middle amplitude hides the friction.
-    _, task = make_task("Coulomb", 5e-3, seconds=5.0)
-    found = discover(task)
+    _, data = make_data("Coulomb", 5e-3, seconds=5.0)
+    found = discover(data)
     assert found.kept == ()
     assert any(
         "too high to decide" in warning and "every term left out is in doubt" in warning
         for warning in found.warnings
     )
     # Less of it shows the friction, and that its size is vague.
-    _, task = make_task("Coulomb", 2e-3, seconds=5.0)
-    (friction,) = discover(task).kept
+    _, data = make_data("Coulomb", 2e-3, seconds=5.0)
+    (friction,) = discover(data).kept
     assert friction.name == "coulomb_friction"
     assert "T_c is known to" in friction.doubt
 
 
-def test_one_amplitude_is_warned_of(make_task: Make) -> None:
-    _, task = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.6,))
-    assert any("one amplitude" in warning for warning in discover(task).warnings)
+def test_one_amplitude_is_warned_of(make_data: Make) -> None:
+    _, data = make_data("linear", 2e-5, seconds=5.0, amplitudes=(0.6,))
+    assert any("one amplitude" in warning for warning in discover(data).warnings)
     # What can be told apart there, and what cannot, is said with it.
-    _, task = make_task("cubic", 2e-5, seconds=5.0, amplitudes=(0.6,))
-    assert any("told apart" in w and "elsewhere they are untested" in w for w in discover(task).warnings)
-    _, task = make_task("Coulomb", 1e-3, amplitudes=(0.6,), seconds=5.0)
-    assert any("Nearly as good there is" in warning for warning in discover(task).warnings)
+    _, data = make_data("cubic", 2e-5, seconds=5.0, amplitudes=(0.6,))
+    assert any("told apart" in w and "elsewhere they are untested" in w for w in discover(data).warnings)
+    _, data = make_data("Coulomb", 1e-3, amplitudes=(0.6,), seconds=5.0)
+    assert any("Nearly as good there is" in warning for warning in discover(data).warnings)
 
 
-def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_task: Make) -> None:
-    _, task = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.3, 0.6))
-    assert not any("input of fitted ones" in warning for warning in discover(task).warnings)
+def test_a_held_out_record_with_the_input_of_a_fitted_one_is_warned_of(make_data: Make) -> None:
+    _, data = make_data("linear", 2e-5, seconds=5.0, amplitudes=(0.3, 0.6))
+    assert not any("input of fitted ones" in warning for warning in discover(data).warnings)
     # Another measurement of the same sweep: other noise, and it starts a second later.
-    _, again = make_task("linear", 2e-5, seconds=5.0, amplitudes=(0.6,), seed=1, validation=False)
+    _, again = make_data("linear", 2e-5, seconds=5.0, amplitudes=(0.6,), seed=1, validation=False)
     twin = replace(again.records[0].slice(200, None), name="again", role="validation")
-    estimation = tuple(record for record in task.records if record.role == "estimation")
-    found = discover(replace(task, records=(*estimation, twin)))
+    estimation = tuple(record for record in data.records if record.role == "estimation")
+    found = discover(replace(data, windows=(*estimation, twin)))
     assert any("'again' as 'sweep_0.6'" in warning for warning in found.warnings)
 
 
-def test_the_full_form_finds_the_damper_among_the_terms(make_task: Make) -> None:
-    values, task = make_task("linear", 2e-5, seconds=5.0)
-    found = discover(task, "full")
+def test_the_full_form_finds_the_damper_among_the_terms(make_data: Make) -> None:
+    values, data = make_data("linear", 2e-5, seconds=5.0)
+    found = discover(data, "full")
     inclusion = {term.name: term.inclusion for term in found.terms}
     assert inclusion["d"] > 0.9
     assert inclusion["k"] > 0.9
     assert found.rig_parameters["d"].value == pytest.approx(values["d"], rel=1e-3)
 
 
-def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_task: Make) -> None:
-    values, task = make_task("cubic", 2e-6, seconds=5.0)
-    found = discover(task, pointwise=True)
+def test_points_give_the_same_equation_as_windows_where_noise_is_low(make_data: Make) -> None:
+    values, data = make_data("cubic", 2e-6, seconds=5.0)
+    found = discover(data, pointwise=True)
     assert [term.name for term in found.kept] == ["cubic_stiffness"]
     assert found.kept[0].coefficients["k_3"].value == pytest.approx(values["k_3"], rel=1e-3)
 
@@ -147,31 +148,31 @@ def test_terms_that_the_records_cannot_tell_apart_are_named(discovered: Discover
 
 
 def test_the_held_out_error_is_that_of_the_polished_equation(
-    make_task: Make, monkeypatch: pytest.MonkeyPatch
+    make_data: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The fits that choose the terms stop short here.
     monkeypatch.setattr("rigsight.discover.bench._FIRST_EVALUATIONS", 1)
     monkeypatch.setattr("rigsight.discover.bench._EVALUATIONS", 2)
-    _, task = make_task("cubic", 2e-5)
-    found = discover(task)
+    _, data = make_data("cubic", 2e-5)
+    found = discover(data)
     before = next(a for a in found.alternatives if set(a.terms) == {term.name for term in found.kept})
     assert found.held_out_error < 1.1 < before.held_out
     (run,) = found.runs
-    left = np.sqrt(np.mean((run.measured - run.simulated) ** 2)) / task.noise["x"]
+    left = np.sqrt(np.mean((run.measured - run.simulated) ** 2)) / data.noise["x"]
     assert left == pytest.approx(found.held_out_error)
 
 
-def test_without_validation_a_record_is_set_aside_and_this_is_said(make_task: Make) -> None:
-    _, task = make_task("cubic", 2e-5, seconds=5.0, validation=False)
-    found = discover(task)
+def test_without_validation_a_record_is_set_aside_and_this_is_said(make_data: Make) -> None:
+    _, data = make_data("cubic", 2e-5, seconds=5.0, validation=False)
+    found = discover(data)
     assert found.held_out == ("sweep_0.6",)
     assert any("set aside" in warning for warning in found.warnings)
     assert [term.name for term in found.kept] == ["cubic_stiffness"]
 
 
-def test_the_same_seed_gives_the_same_discovery_with_any_number_of_jobs(make_task: Make) -> None:
-    _, task = make_task("Coulomb", 2e-5, amplitudes=(0.3, 0.8), seconds=5.0)
-    first, second = discover(task, seed=3), discover(task, seed=3, n_jobs=2)
+def test_the_same_seed_gives_the_same_discovery_with_any_number_of_jobs(make_data: Make) -> None:
+    _, data = make_data("Coulomb", 2e-5, amplitudes=(0.3, 0.8), seconds=5.0)
+    first, second = discover(data, seed=3), discover(data, seed=3, n_jobs=2)
     assert first.to_json() == second.to_json()
     assert np.isfinite(first.held_out_error)
 
@@ -214,7 +215,7 @@ def test_the_other_rigs_are_discovered_too(case: str, sweep: Callable[[float, fl
         record = simulate(structure, {**constants, **values}, driven)
         seen = {name: record[name] + rng.normal(scale=std, size=u.size) for name, std in noise.items()}
         records.append(record.with_signals(**seen))
-    found = discover(Task(case, rig, constants, tuple(records), noise))
+    found = discover(RegressionData(Campaign(case, rig, constants, {}, tuple(records)), noise))
     assert [term.name for term in found.kept] == [effect]
     coefficients = {**found.rig_parameters, **found.kept[0].coefficients}
     assert set(coefficients) == set(values) - {"A", "n"}

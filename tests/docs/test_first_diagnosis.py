@@ -6,8 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.diagnose import task_of
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -20,10 +19,10 @@ def test_the_campaign_of_the_page_is_read_with_the_records_of_its_script(tmp_pat
     page = (DOCS / "first_diagnosis.md").read_text(encoding="utf-8")
     (campaign,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     (tmp_path / "campaign.toml").write_text(campaign, encoding="utf-8")
-    task = task_of(read_campaign(tmp_path))
-    assert [record.name for record in task.estimation] == ["sweep_5N", "sweep_20N"]
-    assert [record.name for record in task.validation] == ["sweep_10N", "multisine_7N"]
-    for record in task.records:
+    campaign = read_campaign(tmp_path)
+    assert [record.name for record in campaign.estimation] == ["sweep_5N", "sweep_20N"]
+    assert [record.name for record in campaign.validation] == ["sweep_10N", "multisine_7N"]
+    for record in campaign.records:
         first = (tmp_path / f"{record.name}.csv").read_text(encoding="utf-8").splitlines()[:2]
         assert first[0] in page
         assert record.hold == "zoh"

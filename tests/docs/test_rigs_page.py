@@ -13,7 +13,7 @@ from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.rigs.reading.rig_tables import RigTable
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.simulate import simulate_model
 
 PAGE = (Path(__file__).parents[2] / "docs/rigs.md").read_text(encoding="utf-8")

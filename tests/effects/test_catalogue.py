@@ -1,4 +1,4 @@
-"""What every effect of the catalogue promises, measured on one mass with a spring."""
+"""The checks that every effect of the catalogue passes, measured on one mass with a spring."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from rigsight.errors import InputError
 from rigsight.rigs import AXIS, RIGS
 from rigsight.simulate import compose, simulate
 from rigsight.units import parse_dimension
-from rigsight.workflow.own.effect_declaration import declaration_faults
-from rigsight.workflow.own.effect_promises import (
+from rigsight.workflow.own.effect_checks import (
+    CHECKS,
     FULL,
     PER_PERIOD,
-    PROMISES,
     SMALL,
     bench_of,
     is_found_again,
@@ -27,6 +26,7 @@ from rigsight.workflow.own.effect_promises import (
     sine_record,
     start_values,
 )
+from rigsight.workflow.own.effect_declaration import declaration_faults
 
 each_effect = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 each_effect_of_one_motion = pytest.mark.parametrize(
@@ -37,11 +37,11 @@ each_effect_of_one_motion = pytest.mark.parametrize(
 
 @each_effect_of_one_motion
 @pytest.mark.parametrize(
-    "promise", [p for p in PROMISES if p is not is_found_again], ids=lambda promise: promise.__name__
+    "check", [p for p in CHECKS if p is not is_found_again], ids=lambda check: check.__name__
 )
-def test_promise_is_kept(effect, promise):
-    """The promises that a user's own effect has to keep too; tests/identify/test_recovery.py holds the last."""
-    assert promise(effect) is None
+def test_a_check_is_passed(effect, check):
+    """The checks that a user's own effect has to pass too; tests/identify/test_recovery.py holds the last."""
+    assert check(effect) is None
 
 
 @each_effect_of_one_motion

@@ -11,11 +11,11 @@ import scipy.linalg
 from rigsight.errors import InputError
 from rigsight.frequency import local_polynomial_response, local_rational_response
 from rigsight.identify.closed_loop import closed_loop_notes
-from rigsight.identify.record_identification import Wishes
+from rigsight.identify.record_identification import EstimationOptions
 from rigsight.identify.transfer.record_response import RecordResponse, record_response
 from rigsight.records import Record
 from rigsight.rigs import AXIS
-from rigsight.workflow.campaigns.in_memory import make_campaign
+from rigsight.workflow.campaign.in_memory import make_campaign
 from rigsight.workflow.identify import identify_campaign
 
 M, D, K = 2.0, 5.0, 200.0
@@ -93,7 +93,7 @@ def test_a_method_without_use_for_an_instrument_says_so() -> None:
 
 def test_identify_tells_what_the_reference_was_used_for() -> None:
     campaign = make_campaign("axis", [loop(0.02), loop(0.02, 0.01)], constants={"gain": 1.0})
-    found = identify_campaign(campaign, Wishes())
+    found = identify_campaign(campaign, EstimationOptions())
     (told,) = [text for text in found.warnings if "closed loop" in text]
     assert "'loop_0.02', 'loop_0.01'" in told
     assert "instrument" in told

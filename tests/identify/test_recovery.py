@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigsight.effects import CATALOGUE, Effect
-from rigsight.workflow.own.effect_promises import is_found_again
+from rigsight.workflow.own.effect_checks import is_found_again
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)

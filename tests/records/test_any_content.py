@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from rigsight.errors import InputError
 from rigsight.records.formats.channel_file import SUFFIXES
-from rigsight.workflow.campaigns.inspect import run_inspect
+from rigsight.workflow.inspect import run_inspect
 
 from .formats import FORMATS
 from .test_damaged_formats import SIGNALS, read

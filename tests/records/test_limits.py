@@ -16,7 +16,7 @@ from rigsight.errors import InputError
 from rigsight.records import read_record
 from rigsight.records.formats.channel import MOST_IN_TABLE, Refused, check_total, columns_of, kept_last
 from rigsight.records.formats.csv_channels import open_measurement
-from rigsight.workflow.campaigns.inspect import run_inspect
+from rigsight.workflow.inspect import run_inspect
 
 from .formats import write_matlab_packed, write_parquet
 from .test_damaged_formats import HEADER, Named, element, matrix

@@ -11,7 +11,7 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.records import read_record
 from rigsight.records.read_record import read_stretches
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 from .test_read_record import INPUTS, OUTPUTS
 

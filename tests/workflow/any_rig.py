@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigsight.records import Record
 from rigsight.rigs import Rig, rig_file_text
-from rigsight.workflow.campaigns.in_memory import make_model
+from rigsight.workflow.campaign.in_memory import make_model
 from rigsight.workflow.simulate import simulate_model
 
 Floats = NDArray[np.float64]

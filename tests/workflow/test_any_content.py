@@ -15,21 +15,21 @@ from hypothesis import strategies as st
 
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
-from rigsight.workflow.blind_bench.external import KeyTable
-from rigsight.workflow.blind_bench.files import read_json
-from rigsight.workflow.campaigns.campaign import file_inside
-from rigsight.workflow.campaigns.campaign_file import (
+from rigsight.workflow.bench.external import KeyTable
+from rigsight.workflow.bench.files import read_json
+from rigsight.workflow.campaign.campaign_file import (
     CampaignTable,
     FileTable,
     RecordTable,
     checked_file,
     read_campaign_table,
 )
-from rigsight.workflow.campaigns.where import Where
-from rigsight.workflow.files.json_file import json_object
-from rigsight.workflow.files.model_file import model_of, named_model, read_model
+from rigsight.workflow.campaign.model_file import model_of, named_model, read_model
+from rigsight.workflow.campaign.read_campaign import file_inside
+from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_declaration import declaration_faults
 from rigsight.workflow.own.own_effects import own_effects
+from rigsight.workflow.run.json_file import json_object
 
 drawn = settings(
     derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40
@@ -198,7 +198,9 @@ def test_any_value_in_a_member_of_an_effect(data: st.DataObject, value: Any) -> 
 
 def test_a_member_that_is_none_and_a_symbol_that_is_no_word_are_told() -> None:
     effect = CATALOGUE[0]
-    assert "give a Start" in " ".join(is_told(replace(effect, starts=({"k": 1},))))
+    assert "starts holds {'k': 1}; give a tuple of Start objects" in " ".join(
+        is_told(replace(effect, starts=({"k": 1},)))
+    )
     odd = tuple(replace(p, name=f"{p.name}; import os") for p in effect.parameters)
     assert "must consist of letters" in " ".join(is_told(replace(effect, parameters=odd)))
 

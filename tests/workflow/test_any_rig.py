@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigsight.campaign import Campaign
 from rigsight.errors import InputError
 from rigsight.rigs import RIGS, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate.composition import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.campaigns.in_memory import make_campaign, make_model
-from rigsight.workflow.files.model_file import model_of, read_model
-from rigsight.workflow.files.results import json_text
+from rigsight.workflow.campaign.in_memory import make_campaign, make_model
+from rigsight.workflow.campaign.model_file import model_of, read_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.run.results import json_text
 from rigsight.workflow.simulate import run_simulate
 
 from .any_rig import (

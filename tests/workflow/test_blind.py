@@ -8,7 +8,7 @@ import os
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,15 @@ import numpy as np
 import pytest
 
 from rigsight.blind import Outcome, Trial, n_trials, subject_of
+from rigsight.cli.trial_process import START
 from rigsight.errors import InputError, MachineError, RigsightError
 from rigsight.records import Record
 from rigsight.workflow import blind
+from rigsight.workflow.bench.files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
+from rigsight.workflow.bench.scoring import score_trial
+from rigsight.workflow.bench.trial import _environment, diagnose_trial
 from rigsight.workflow.blind import rescore, run_blind
-from rigsight.workflow.blind_bench.files import RUN_FILE, STORE_FILE, BenchFolder, read_json, trial_name
-from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.trial import _environment, diagnose_trial
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 SEED = 4711
 NAME = "617"
@@ -192,7 +193,7 @@ class Steps:
             self._count("make", name)
             folder.key(name).write_text(json.dumps(KEY))
 
-    def diagnose(self, folder: BenchFolder, name: str) -> None:
+    def diagnose(self, folder: BenchFolder, name: str, start: Sequence[str]) -> None:
         if not folder.diagnosed(name):
             self._count("diagnose", name)
             target = folder.result(name)
@@ -213,8 +214,8 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> Steps:
 def test_a_bench_goes_on_where_it_was_stopped(tmp_path: Path, steps: Steps, step: str) -> None:
     steps.dies.add((step, "002"))
     with pytest.raises(RigsightError, match="killed"):
-        run_blind(tmp_path, design="small", trials=4, seed=1, n_jobs=1)
-    content = run_blind(tmp_path, design="small", trials=4, seed=1, n_jobs=1)
+        run_blind(tmp_path, start=START, design="small", trials=4, seed=1, n_jobs=1)
+    content = run_blind(tmp_path, start=START, design="small", trials=4, seed=1, n_jobs=1)
     names = ["000", "001", "002", "003"]
     assert [t["trial"] for t in content["trials"]] == names
     assert steps.done == {(step, name): 1 for step in ("make", "diagnose", "score") for name in names}
@@ -223,13 +224,19 @@ def test_a_bench_goes_on_where_it_was_stopped(tmp_path: Path, steps: Steps, step
 
 
 def test_a_trial_with_a_row_is_left_alone(tmp_path: Path, steps: Steps) -> None:
-    run_blind(tmp_path, design="small", trials=2, seed=1, n_jobs=1)
+    run_blind(tmp_path, start=START, design="small", trials=2, seed=1, n_jobs=1)
     before = steps.done.copy()
     # Neither key nor results are needed any more.
     shutil.rmtree(tmp_path / "results")
     told: list[str] = []
     content = run_blind(
-        tmp_path, design="small", trials=3, seed=1, n_jobs=1, listener=lambda step: told.append(step.detail)
+        tmp_path,
+        start=START,
+        design="small",
+        trials=3,
+        seed=1,
+        n_jobs=1,
+        listener=lambda step: told.append(step.detail),
     )
     assert content["n_trials"] == 3
     assert steps.done - before == {("make", "002"): 1, ("diagnose", "002"): 1, ("score", "002"): 1}
@@ -237,15 +244,15 @@ def test_a_trial_with_a_row_is_left_alone(tmp_path: Path, steps: Steps) -> None:
 
 
 def test_one_trial_alone_is_added_to_the_score(tmp_path: Path, steps: Steps) -> None:
-    run_blind(tmp_path, design="small", seed=1, only=[7], n_jobs=1)
-    content = run_blind(tmp_path, design="small", seed=1, only=[5], n_jobs=1)
+    run_blind(tmp_path, start=START, design="small", seed=1, only=[7], n_jobs=1)
+    content = run_blind(tmp_path, start=START, design="small", seed=1, only=[5], n_jobs=1)
     assert [t["trial"] for t in content["trials"]] == ["005", "007"]
     assert content["wrong"][1]["again"] == "rigsight blind --design small --seed 1 --trial 7 --out DIR"
     assert steps.done["diagnose", "007"] == 1
 
 
 def test_rescoring_scores_what_is_diagnosed_and_runs_nothing(tmp_path: Path, steps: Steps) -> None:
-    run_blind(tmp_path, design="small", trials=2, seed=1, n_jobs=1)
+    run_blind(tmp_path, start=START, design="small", trials=2, seed=1, n_jobs=1)
     (tmp_path / "keys" / "001.json").write_text(json.dumps({**KEY, "noise": "high"}))
     (tmp_path / STORE_FILE).unlink()
     content = rescore(tmp_path, n_jobs=1)
@@ -259,9 +266,9 @@ def test_rescoring_scores_what_is_diagnosed_and_runs_nothing(tmp_path: Path, ste
 def test_a_folder_of_another_bench_and_a_number_out_of_range_are_told(tmp_path: Path) -> None:
     BenchFolder(tmp_path).settle("small", 1)
     with pytest.raises(InputError, match="seed 1"):
-        run_blind(tmp_path, design="small", seed=2)
+        run_blind(tmp_path, start=START, design="small", seed=2)
     with pytest.raises(InputError, match="numbered"):
-        run_blind(tmp_path / "other", design="small", trials=3, only=[3])
+        run_blind(tmp_path / "other", start=START, design="small", trials=3, only=[3])
 
 
 def test_a_failed_diagnosis_is_kept_with_its_reason(bench: BenchFolder) -> None:
@@ -277,7 +284,7 @@ def test_a_machine_that_lets_no_diagnosis_work_is_no_result_of_a_trial(
     in_the_way.write_text("no folder", "utf-8")
     monkeypatch.setenv("RIGSIGHT_CACHE_DIR", str(in_the_way / "kernels"))
     with pytest.raises(MachineError, match="on this machine: rigsight: Cannot keep compiled kernels"):
-        diagnose_trial(bench, NAME)
+        diagnose_trial(bench, NAME, START)
     assert not bench.diagnosed(NAME)
 
 
@@ -285,7 +292,7 @@ def test_a_disk_without_room_for_results_says_so(bench: BenchFolder, monkeypatch
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("rigsight.workflow.blind_bench.trial.shutil.copy", full)
+    monkeypatch.setattr("rigsight.workflow.bench.trial.shutil.copy", full)
     with pytest.raises(OSError, match="No space left") as raised:
         diagnose_trial(bench, NAME, start=("-c", ""))
     assert raised.value.errno == errno.ENOSPC

@@ -9,7 +9,7 @@ import pytest
 from rigsight.effects import CATALOGUE, effect_named
 from rigsight.rigs.published import published_sets
 from rigsight.workflow import demo
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 # What comes nearest to the hidden effect, of all that the demo tries: the others leave as much as the given simulation.
 RIVALS = (

@@ -13,10 +13,10 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.conicity import creep_factor
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.diagnose import run_diagnose, task_of
-from rigsight.workflow.kernels import structures_to_try
-from rigsight.workflow.progress import Step
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.diagnose import run_diagnose
+from rigsight.workflow.run.kernels import structures_to_try
+from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
 FEW = tuple(effect_named(name) for name in ("cubic_stiffness", "quadratic_damping"))
@@ -92,8 +92,8 @@ def test_conicity_becomes_the_creep_factor(tmp_path: Path, write_csv: Callable[.
         '[rig]\nmodel = "running_gear"\n[rig.constants]\nv = 1.0\nr_0 = 0.1\nb = 0.3\nk_tau = 0.27\n'
         '[rig.parameters]\ndelta_0 = 0.024\n[[records]]\nfile = "sweep.csv"\n'
     )
-    task = task_of(read_campaign(tmp_path))
-    assert task.given == {"c_y": pytest.approx(creep_factor(0.024, 0.1, 0.3))}
+    campaign = read_campaign(tmp_path)
+    assert campaign.given == {"c_y": pytest.approx(creep_factor(0.024, 0.1, 0.3))}
 
 
 def test_every_effect_that_the_rig_offers_is_compiled_by_itself_beforehand() -> None:

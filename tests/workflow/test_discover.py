@@ -15,10 +15,10 @@ from rigsight.discover import MONOMIALS
 from rigsight.errors import InputError
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.model_file import read_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.discover import run_discover
-from rigsight.workflow.files.model_file import read_model
-from rigsight.workflow.progress import Step
+from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
 

@@ -13,13 +13,13 @@ from rigsight.effects import effect_named
 from rigsight.errors import InputError
 from rigsight.records import read_record
 from rigsight.rigs import ELEMENT
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.campaigns.init import run_init
-from rigsight.workflow.campaigns.inspect import run_inspect
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import run_compare
 from rigsight.workflow.diagnose import run_diagnose
 from rigsight.workflow.discover import run_discover
 from rigsight.workflow.identify import run_identify
+from rigsight.workflow.init import run_init
+from rigsight.workflow.inspect import run_inspect
 from rigsight.workflow.simulate import run_simulate
 
 Force = Callable[[float, float], float]

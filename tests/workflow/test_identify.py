@@ -12,7 +12,7 @@ import pytest
 from rigsight.errors import InputError
 from rigsight.identify.identification import Identification
 from rigsight.workflow.identify import run_identify
-from rigsight.workflow.progress import Step
+from rigsight.workflow.run.progress import Step
 from rigsight.workflow.simulate import run_simulate
 
 from .virtual_campaign import CONSTANTS, NOISE, TRUTH, jump, sweep, write_campaign
@@ -187,7 +187,7 @@ def test_nothing_half_written_is_left(
     def broken(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("rigsight.workflow.files.results.os.fsync", broken)
+    monkeypatch.setattr("rigsight.workflow.run.results.os.fsync", broken)
     with pytest.raises(InputError, match="disk is full"):
         run_identify(linear_folder, tmp_path / "new" / "out")
     assert not (tmp_path / "new").exists()

@@ -21,11 +21,11 @@ from rigsight.report.identification import identification_summary
 from rigsight.rigs import RIGS, Rig, read_rig_file, rig_file_text
 from rigsight.rigs.reading.rig_file import rig_of_text
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaigns.in_memory import make_campaign
+from rigsight.workflow.campaign.in_memory import make_campaign
+from rigsight.workflow.discover import regression_data
 from rigsight.workflow.identification import any_rig
 from rigsight.workflow.identification.json import identification_json
-from rigsight.workflow.identify import checked_wishes, identify_campaign, run_identify, write_identification
-from rigsight.workflow.not_yet import check_takes
+from rigsight.workflow.identify import checked_options, identify_campaign, run_identify, write_identification
 
 Floats = NDArray[np.float64]
 DT, N = 0.01, 2000
@@ -78,7 +78,7 @@ def identified(
     start = {p.name: 1.2 * truth[p.name] for p in rig.parameters}
     monkeypatch.setattr(any_rig, "linear_start", lambda *_: start)
     campaign = make_campaign(rig, records, constants=constants)
-    return identify_campaign(campaign, checked_wishes("local_rational", None))
+    return identify_campaign(campaign, checked_options("local_rational", None))
 
 
 @pytest.fixture(scope="module")
@@ -330,7 +330,7 @@ def test_a_method_for_one_input_is_refused() -> None:
     rng, rig = np.random.default_rng(7), RIGS["drive_train"]
     campaign = make_campaign(rig, [recorded("one", rig, TRAIN, {"u": multisine(rng, 0.3, 200.0)}, rng)])
     with pytest.raises(InputError, match="Allowed: 'local_polynomial', 'local_rational'"):
-        identify_campaign(campaign, checked_wishes("h1", None))
+        identify_campaign(campaign, checked_options("h1", None))
 
 
 def test_poles_are_those_of_the_place_that_the_records_show(
@@ -375,7 +375,7 @@ def test_a_servo_is_identified_without_any_start_values() -> None:
     records = [
         recorded(str(size), rig, SERVO, {"goal": multisine(rng, size, 40.0)}, rng) for size in (0.05, 0.1)
     ]
-    found = identify_campaign(make_campaign(rig, records), checked_wishes("local_rational", None))
+    found = identify_campaign(make_campaign(rig, records), checked_options("local_rational", None))
     fit = found.joint.fit.fit
     for parameter in rig.parameters:
         error = fit.standard_errors[parameter.name]
@@ -396,8 +396,8 @@ def test_the_name_of_a_rig_changes_nothing() -> None:
     found = {}
     for rig in (axis, stage):
         campaign = make_campaign(rig, [record], title="same")
-        check_takes("discover", campaign.rig, campaign.records)
-        found[rig.name] = identify_campaign(campaign, checked_wishes("local_rational", None))
+        regression_data(campaign)
+        found[rig.name] = identify_campaign(campaign, checked_options("local_rational", None))
     own = {name: identification_json(one, {}) for name, one in found.items()}
     assert own["axis"]["records"][0]["paths"][0]["fit"] is not None
     for content in own.values():
@@ -412,5 +412,7 @@ def test_a_rig_of_one_motion_in_other_words_is_refused_where_words_count() -> No
         .replace("[parameters.d]", "[parameters.damper]")
     )
     stage = rig_of_text(words.replace('damping = "d"', 'damping = "damper"'))
+    t = np.linspace(0.0, 1.0, 50)
+    record = Record("one", 0.02, {"u": np.sin(t), "x": np.cos(t)}, {"u": "N", "x": "m"})
     with pytest.raises(InputError, match="'stage' of your own yet: of rigs of one motion it takes axis"):
-        check_takes("discover", stage)
+        regression_data(make_campaign(stage, [record]))

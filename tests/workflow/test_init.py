@@ -11,8 +11,8 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.rigs import rig_file_text
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.campaigns.init import run_init
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.init import run_init
 
 from ..records.formats import write_mdf, write_parquet, write_text
 

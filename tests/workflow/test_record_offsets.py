@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rigsight.campaign import Campaign
 from rigsight.compare.comparison import Competitor
 from rigsight.diagnose import Diagnosis
 from rigsight.diagnose.noise.detection import noise_floors
@@ -20,13 +21,13 @@ from rigsight.identify.identification import Identification
 from rigsight.records import Record
 from rigsight.rigs import AXIS, RIGS, Rig
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.campaigns.in_memory import make_campaign
+from rigsight.workflow.campaign.in_memory import make_campaign
+from rigsight.workflow.campaign.model_file import model_of
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.compare import compare_campaign
 from rigsight.workflow.diagnose import diagnose_campaign
 from rigsight.workflow.discover import discover_campaign
-from rigsight.workflow.files.model_file import model_of
-from rigsight.workflow.identify import checked_wishes, identify_campaign
+from rigsight.workflow.identify import checked_options, identify_campaign
 
 DT, NOISE = 5e-3, 2e-5
 AXIS_VALUES = {"gain": 1.0, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}
@@ -75,7 +76,7 @@ def campaign(offsets: Any = "shared", **drawn: Any) -> Campaign:
 
 
 def identified(made: Campaign) -> Identification:
-    return identify_campaign(made, checked_wishes("local_rational", None))
+    return identify_campaign(made, checked_options("local_rational", None))
 
 
 def diagnosed(made: Campaign, names: Sequence[str] = RIVALS) -> Diagnosis:

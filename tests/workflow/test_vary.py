@@ -17,7 +17,7 @@ from rigsight.errors import InputError
 from rigsight.rigs import RIGS
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.progress import Step
+from rigsight.workflow.run.progress import Step
 from rigsight.workflow.vary import run_vary, table_text
 
 

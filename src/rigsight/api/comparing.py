@@ -7,12 +7,12 @@ from pathlib import Path
 
 from rigsight.api.comparison_result import ComparisonResult
 from rigsight.api.estimator import campaign_of
+from rigsight.campaign import Campaign
 from rigsight.compare import Competitor
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign
 from rigsight.workflow.compare import compare_campaign, named_competitors, of_this_rig
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress_display import listening
 
 
 def compare_models(

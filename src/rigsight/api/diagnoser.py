@@ -8,15 +8,15 @@ from typing import Self
 
 from rigsight.api.diagnosis_result import DiagnosisResult
 from rigsight.api.estimator import CampaignEstimator, campaign_of
+from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.workflow.campaigns.campaign import Campaign
-from rigsight.workflow.campaigns.in_memory import effects_of
+from rigsight.workflow.campaign.in_memory import effects_of
+from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.diagnose import diagnose_campaign
-from rigsight.workflow.files.model_file import model_of
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress_display import listening
 
 
 class Diagnoser(CampaignEstimator):

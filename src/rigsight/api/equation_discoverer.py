@@ -8,13 +8,13 @@ from typing import Self
 
 from rigsight.api.discovery_result import DiscoveryResult
 from rigsight.api.estimator import CampaignEstimator, campaign_of
+from rigsight.campaign import Campaign
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.workflow.campaigns.campaign import Campaign
+from rigsight.workflow.campaign.model_file import model_of
 from rigsight.workflow.discover import discover_campaign
-from rigsight.workflow.files.model_file import model_of
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress_display import listening
 
 
 class EquationDiscoverer(CampaignEstimator):

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from sklearn.utils.validation import check_is_fitted
 
+from rigsight.campaign import Campaign
 from rigsight.effects import Effect
 from rigsight.errors import InputError
 from rigsight.records import Record
 from rigsight.rigs import RIGS, Rig
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.campaigns.in_memory import make_campaign, rig_of
+from rigsight.workflow.campaign.in_memory import make_campaign, rig_of
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.simulate import simulate_model
 
 if TYPE_CHECKING:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.excitation import linear_sweep
 from rigsight.records import Record, Role
 from rigsight.simulate import simulate
-from rigsight.workflow.campaigns.campaign import Campaign
-from rigsight.workflow.campaigns.in_memory import make_campaign, make_model
+from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 
 _GIVEN = {"m": 2.0, "d": 5.0, "k": 800.0}
 _K_3 = 5e6

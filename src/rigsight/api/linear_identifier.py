@@ -8,13 +8,13 @@ from typing import Self
 
 from rigsight.api.estimator import CampaignEstimator, campaign_of
 from rigsight.api.identification_result import IdentificationResult
+from rigsight.campaign import Campaign
 from rigsight.records import Record
 from rigsight.rigs import Rig
-from rigsight.workflow.campaigns.campaign import Campaign
-from rigsight.workflow.files.model_file import model_of
-from rigsight.workflow.identify import checked_wishes, identify_campaign
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.campaign.model_file import model_of
+from rigsight.workflow.identify import checked_options, identify_campaign
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress_display import listening
 
 
 class LinearIdentifier(CampaignEstimator):
@@ -28,7 +28,7 @@ class LinearIdentifier(CampaignEstimator):
     method
         Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     resolution
-        Width in frequency wished for [rad/s]; None takes what each record gives.
+        Width in frequency asked for [rad/s]; None takes what each record gives.
     n_jobs
         Records identified at the same time; None for one per processor.
     verbose
@@ -87,14 +87,14 @@ class LinearIdentifier(CampaignEstimator):
         Raises
         ------
         InputError
-            If the campaign cannot be used, the method is unknown, a record is too short for the resolution wished for, or no
+            If the campaign cannot be used, the method is unknown, a record is too short for the resolution asked for, or no
             record shows the motion.
         """
-        wishes = checked_wishes(self.method, self.resolution)
+        options = checked_options(self.method, self.resolution)
         jobs = checked_jobs(self.n_jobs)
         read = campaign_of(campaign, rig=self.rig)
         with listening(quiet=not self.verbose) as listener:
-            found = identify_campaign(read, wishes, jobs, listener)
+            found = identify_campaign(read, options, jobs, listener)
         self.identification_ = IdentificationResult.of(found)
         self.model_ = model_of(found.model)
         return self

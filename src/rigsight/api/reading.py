@@ -9,9 +9,9 @@ from rigsight.records import ColumnMapping, Hold, Kind, Record, Role
 from rigsight.records import read_record as read_file
 from rigsight.records.reference import signals_beside
 from rigsight.rigs import Rig
-from rigsight.workflow.campaigns.given_simulation import checked_numbers
-from rigsight.workflow.campaigns.in_memory import rig_of
-from rigsight.workflow.campaigns.where import Where
+from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.in_memory import rig_of
+from rigsight.workflow.campaign.where import Where
 
 
 def read_record(

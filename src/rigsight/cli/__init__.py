@@ -33,7 +33,7 @@ def main() -> None:
 
 def _end_at_once(code: int) -> NoReturn:
     """End without taking the interpreter apart: what an interrupted compilation leaves of LLVM crashes there."""
-    from rigsight.workflow.files.results import ENDING_SIGNALS
+    from rigsight.workflow.run.results import ENDING_SIGNALS
 
     for number in ENDING_SIGNALS:
         # One is enough: another would only complain.

@@ -14,7 +14,7 @@ from rigsight.cli.demo import demo
 from rigsight.cli.diagnose import diagnose
 from rigsight.cli.discover import discover
 from rigsight.cli.effects import list_effects
-from rigsight.cli.exit_codes import output_told
+from rigsight.cli.exit_codes import report_output_errors
 from rigsight.cli.export import export
 from rigsight.cli.identify import identify
 from rigsight.cli.init import init
@@ -56,7 +56,7 @@ def main() -> None:
     """Run the command line."""
     # Candidates are fitted side by side; matrix products that spread over the same processors only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with output_told(), ended_by_signals():
+    with report_output_errors(), ended_by_signals():
         app()
 
 

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
 from rigsight.errors import InputError
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def blind(
@@ -86,11 +86,12 @@ def blind(
     Writes results and one row per trial into DIR as they are finished, and the score into DIR/blind.json and DIR/blind.html.
     Started again, it goes on where it was interrupted.
     """
-    with told(debug, "the same command goes on from here"), listening(quiet) as listener:
+    with report_errors(debug, "the same command goes on from here"), listening(quiet) as listener:
+        from rigsight.cli.trial_process import START
         from rigsight.workflow import blind as bench
-        from rigsight.workflow.blind_bench.score_files import merge as merged
-        from rigsight.workflow.blind_bench.score_files import write_markdown
-        from rigsight.workflow.files.results import check_target
+        from rigsight.workflow.bench.score_files import merge as merged
+        from rigsight.workflow.bench.score_files import write_markdown
+        from rigsight.workflow.run.results import check_target
 
         _check_together(campaigns, keys, merge or [], rescore, trial or [])
         if markdown is not None:
@@ -106,10 +107,16 @@ def blind(
         elif rescore:
             content = bench.rescore(out, **running)
         elif campaigns is not None and keys is not None:
-            content = bench.run_external(campaigns, keys, out, only=trial or (), **running)
+            content = bench.run_external(campaigns, keys, out, start=START, only=trial or (), **running)
         else:
             content = bench.run_blind(
-                out, design=design, trials=trials, seed=seed, only=_numbers(trial or []), **running
+                out,
+                start=START,
+                design=design,
+                trials=trials,
+                seed=seed,
+                only=_numbers(trial or []),
+                **running,
             )
         if markdown is not None:
             write_markdown(markdown, content)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import command_line, show, show_files, show_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def compare(
@@ -44,7 +44,7 @@ def compare(
 
     Writes comparison.json, comparison.csv, comparison.html and figures into DIR, all or none.
     """
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.compare import run_compare
         from rigsight.workflow.own.own_simulators import own_simulators
 

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import GOES_ON, told
+from rigsight.cli.exit_codes import GOES_ON, report_errors
 from rigsight.cli.options import Debug, Jobs, Json, Quiet, Seed
 from rigsight.cli.terminal import command_line, show, show_files, show_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def demo(
@@ -28,7 +28,7 @@ def demo(
 
     Writes DIR/campaign (records and campaign.toml, as a measurement would leave them), diagnosis.json, model.json, report.html.
     """
-    with told(debug, GOES_ON), listening(quiet) as listener:
+    with report_errors(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.demo import HIDDEN_EFFECT, run_demo
 
         diagnosis = run_demo(out, seed=seed, n_jobs=jobs, listener=listener, command=command_line())

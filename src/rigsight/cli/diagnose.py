@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import GOES_ON, told
+from rigsight.cli.exit_codes import GOES_ON, report_errors
 from rigsight.cli.options import (
     Campaign,
     Debug,
@@ -22,7 +22,7 @@ from rigsight.cli.options import (
     effect_names,
 )
 from rigsight.cli.terminal import command_line, show, show_files, show_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def diagnose(
@@ -50,7 +50,7 @@ def diagnose(
 
     Writes diagnosis.json, model.json and report.html into DIR, all or none.
     """
-    with told(debug, GOES_ON), listening(quiet) as listener:
+    with report_errors(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose
         from rigsight.workflow.own.own_effects import named, own_effects
         from rigsight.workflow.own.own_rigs import own_rigs

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Seed, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def discover(
@@ -41,7 +41,7 @@ def discover(
 
     Writes discovery.json, model.json and discovery.svg into DIR, all or none.
     """
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover
         from rigsight.workflow.own.own_simulators import own_simulators
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnEffects, Quiet
 from rigsight.cli.terminal import show_as_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 if TYPE_CHECKING:
     from rigsight.effects import Effect
@@ -24,9 +24,9 @@ def list_effects(
 ) -> None:
     """List the effects that a diagnosis tries, and check effects of your own before they compete.
 
-    A file's effects are simulated and fitted: exit code 2 and the reason if one does not keep what an effect promises.
+    A file's effects are simulated and fitted: exit code 2 and the reason if one fails a check.
     """
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.effects import CATALOGUE
         from rigsight.workflow.own.own_effects import equation_text, own_effects
 

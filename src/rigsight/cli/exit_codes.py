@@ -19,7 +19,7 @@ import typer
 
 from rigsight.cli.signals import exit_code
 from rigsight.errors import MachineError, RigsightError
-from rigsight.workflow.files.results import forget_written, written
+from rigsight.workflow.run.results import noting_folders
 
 DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
@@ -32,7 +32,7 @@ GOES_ON = f"{_NOTHING}; the same command goes on from there"
 
 
 @contextlib.contextmanager
-def told(debug: bool, left: str = _NOTHING) -> Iterator[None]:
+def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
     """Map errors of a command to one message on stderr and an exit code.
 
     Parameters
@@ -50,47 +50,49 @@ def told(debug: bool, left: str = _NOTHING) -> Iterator[None]:
     if debug:
         yield
         return
-    forget_written()
-    try:
-        with warnings.catch_warnings():
-            # Trial parameters far off the mark overflow; fits expect that and go elsewhere.
-            warnings.simplefilter("ignore")
-            yield
-    except RigsightError as error:
-        leave(str(error), BAD_INPUT, isinstance(error, MachineError))
-    except KeyboardInterrupt as error:
-        if written() and left.startswith(_NOTHING):
-            left = f"the results in {_named(written())} are complete"
-        leave(f"interrupted; {left}.", exit_code(error))
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        if error.errno in _OF_THE_SESSION:
+    with noting_folders() as written:
+        try:
+            with warnings.catch_warnings():
+                # Trial parameters far off the mark overflow; fits expect that and go elsewhere.
+                warnings.simplefilter("ignore")
+                yield
+        except RigsightError as error:
+            leave(str(error), BAD_INPUT, isinstance(error, MachineError))
+        except KeyboardInterrupt as error:
+            if written and left.startswith(_NOTHING):
+                left = f"the results in {_named(written)} are complete"
+            leave(f"interrupted; {left}.", exit_code(error))
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            if error.errno in _OF_THE_SESSION:
+                leave(
+                    f"a limit of this session stands in the way: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
+                    BAD_INPUT,
+                    is_of_the_machine=True,
+                )
+            if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
+                _leave_defect(error)
+            # Results have messages of their own; what is left is what is read, and what lies between.
+            if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
+                leave(
+                    f"{error.filename} may not be read or written. Change its permissions; {left}.", BAD_INPUT
+                )
+            place = f" ({error.filename})" if error.filename else ""
             leave(
-                f"a limit of this session stands in the way: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
+                f"a temporary file or the output cannot be written{place}: {error.strerror}. Make room there, or set TMPDIR to a "
+                f"folder that can be written; {left}.",
                 BAD_INPUT,
                 is_of_the_machine=True,
             )
-        if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
+        except MemoryError:
+            message = "this needs more memory than there is. Shorten the records, or lower --jobs."
+            leave(message, BAD_INPUT, is_of_the_machine=True)
+        except Exception as error:
             _leave_defect(error)
-        # Results have messages of their own; what is left is what is read, and what lies between.
-        if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
-            leave(f"{error.filename} may not be read or written. Change its permissions; {left}.", BAD_INPUT)
-        place = f" ({error.filename})" if error.filename else ""
-        leave(
-            f"a temporary file or the output cannot be written{place}: {error.strerror}. Make room there, or set TMPDIR to a "
-            f"folder that can be written; {left}.",
-            BAD_INPUT,
-            is_of_the_machine=True,
-        )
-    except MemoryError:
-        message = "this needs more memory than there is. Shorten the records, or lower --jobs."
-        leave(message, BAD_INPUT, is_of_the_machine=True)
-    except Exception as error:
-        _leave_defect(error)
 
 
-class Left(SystemExit):
+class CommandExit(SystemExit):
     """The process ends, and has said why.
 
     Attributes
@@ -114,8 +116,8 @@ def _leave_defect(error: Exception) -> NoReturn:
 
 
 @contextlib.contextmanager
-def output_told() -> Iterator[None]:
-    """Map what happens outside `told`, while a finished command shows its results, to a message and an exit code.
+def report_output_errors() -> Iterator[None]:
+    """Map what happens outside `report_errors`, while a finished command shows its results, to a message and an exit code.
 
     Raises
     ------
@@ -126,7 +128,7 @@ def output_told() -> Iterator[None]:
         yield
         if sys.stdout is not None:
             sys.stdout.flush()
-    except Left:
+    except CommandExit:
         raise
     except SystemExit as leaving:
         # The parser says 130 for everything that reads as Ctrl-C, and 1 where nobody reads; the signal stands behind it.
@@ -161,7 +163,7 @@ def _named(folders: Iterable[Path]) -> str:
 
 def _leave_unread() -> NoReturn:
     _forget_output()
-    raise Left(UNREAD)
+    raise CommandExit(UNREAD)
 
 
 def _forget_output() -> None:
@@ -180,4 +182,4 @@ def leave(message: str, code: int, is_of_the_machine: bool = False) -> NoReturn:
     """
     with contextlib.suppress(OSError):
         typer.echo(f"rigsight: {message}", err=True)
-    raise Left(code, is_of_the_machine)
+    raise CommandExit(code, is_of_the_machine)

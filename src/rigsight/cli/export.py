@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet
 from rigsight.cli.terminal import show_as_json
 
@@ -78,7 +78,7 @@ def export(
     One file, with the equations, the numbers and their units, and nothing of rigsight needed to run it. mjcf and isaac write the
     numbers and effects into the fields that MuJoCo and Isaac Lab have for them, and say what they have no field for.
     """
-    with told(debug):
+    with report_errors(debug):
         from rigsight.workflow.export import run_export
         from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs

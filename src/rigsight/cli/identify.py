@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Campaign, Debug, Jobs, Json, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show, show_files, show_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def identify(
@@ -44,7 +44,7 @@ def identify(
     Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR, all or none; of a rig of any
     shape identification.html with the responses of every sensor to every input, poles, and what the records determine.
     """
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify
         from rigsight.workflow.own.own_simulators import own_simulators
 

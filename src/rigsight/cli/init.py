@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def init(
@@ -72,7 +72,7 @@ def init(
             folder or Path(), mjcf, gear, model, rigs, as_it_is=as_it_is, json=json, quiet=quiet, debug=debug
         )
         return
-    with told(debug):
+    with report_errors(debug):
         from rigsight.errors import InputError
 
         if gear or as_it_is:
@@ -80,7 +80,7 @@ def init(
             raise InputError(f"{option} of a robot's model; name the model with --mjcf.")
         if folder is None:
             raise InputError("Name the FOLDER that holds the measured files, or a model with --mjcf.")
-        from rigsight.workflow.campaigns.init import run_init
+        from rigsight.workflow.init import run_init
         from rigsight.workflow.own.own_simulators import own_simulators
 
         own_simulators(simulator or [])
@@ -125,9 +125,9 @@ def _init_from_mjcf(
     quiet: bool,
     debug: bool,
 ) -> None:
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.errors import InputError
-        from rigsight.workflow.campaigns.from_mjcf import run_init_from_mjcf
+        from rigsight.workflow.init import run_init_from_mjcf
 
         if model is not None or rigs:
             raise InputError("--mjcf gives the rig; leave out --model and --rigs.")

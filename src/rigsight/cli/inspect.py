@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Quiet
 from rigsight.cli.terminal import show, show_as_json
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rigsight.workflow.campaigns.inspect import Inspection
+    from rigsight.workflow.inspect import Inspection
 
 
 def inspect(
@@ -30,8 +30,8 @@ def inspect(
     debug: Debug = False,
 ) -> None:
     """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
-    with told(debug):
-        from rigsight.workflow.campaigns.inspect import run_inspect
+    with report_errors(debug):
+        from rigsight.workflow.inspect import run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
 
         found = run_inspect(file, own_rigs(rigs or []).values())

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnRigs, Simulators
 from rigsight.cli.terminal import show_as_json
 
@@ -30,7 +30,7 @@ def list_rigs(
 
     Exit code 2 and the place in the file if one of --rigs cannot be used.
     """
-    with told(debug):
+    with report_errors(debug):
         from rigsight.errors import InputError, check_option
         from rigsight.rigs import rig_file_text
         from rigsight.workflow.own.own_rigs import known_rigs, own_rigs
@@ -40,7 +40,7 @@ def list_rigs(
         files = own_rigs(rigs or [])
         known = known_rigs(files.values())
         if picture is not None:
-            from rigsight.workflow.files.rig_picture_file import write_rig_picture
+            from rigsight.workflow.rigs import write_rig_picture
 
             if name is None:
                 raise InputError("Which rig is to be drawn? Name it: rigsight rigs NAME --picture FILE.png.")

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from types import FrameType
 
-from rigsight.workflow.files.results import ENDING_SIGNALS
+from rigsight.workflow.run.results import ENDING_SIGNALS
 
 _AGAIN_AFTER = 0.05
 """Seconds after which a request is repeated that came where an exception would be dropped."""

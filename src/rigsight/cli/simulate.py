@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, OwnEffects, OwnRigs, Quiet, Simulators
 from rigsight.cli.terminal import show_as_json
 from rigsight.errors import InputError
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 if TYPE_CHECKING:
     from rigsight.records import ColumnMapping
@@ -84,7 +84,7 @@ def simulate(
     Writes a CSV with time, inputs and simulated sensors in SI units (running_gear: t,u,psi,y; axis: t,u,x; element: t,x,force).
     """
     file = out or Path(f"{record.stem}_simulated.csv")
-    with told(debug), listening(quiet):
+    with report_errors(debug), listening(quiet):
         from rigsight.workflow.own.own_effects import own_effects
         from rigsight.workflow.own.own_rigs import own_rigs
         from rigsight.workflow.own.own_simulators import own_simulators

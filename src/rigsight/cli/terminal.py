@@ -33,7 +33,7 @@ def show_json(file: Path) -> None:
 
 def show_as_json(content: Mapping[str, Any]) -> None:
     """Show content as JSON on stdout; `schema_version` comes first."""
-    from rigsight.workflow.files.results import json_text
+    from rigsight.workflow.run.results import json_text
 
     typer.echo(json_text({"schema_version": 1, **content}), nl=False)
 

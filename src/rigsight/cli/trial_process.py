@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from rigsight.cli.application import main as command_line
-from rigsight.cli.exit_codes import Left
-from rigsight.workflow.blind_bench.parent_watch import end_with_parent
-from rigsight.workflow.blind_bench.trial import MACHINE
+from rigsight.cli.exit_codes import CommandExit
+from rigsight.workflow.bench.parent_watch import end_with_parent
+from rigsight.workflow.bench.trial import MACHINE
+
+START = ("-c", f"from {__name__} import main; main()")
+"""Arguments with which Python starts the process; it is named here, so that nothing below names the command line."""
 
 
 def main() -> None:
@@ -15,5 +18,5 @@ def main() -> None:
     end_with_parent(str(Path.cwd()))
     try:
         command_line()
-    except Left as end:
+    except CommandExit as end:
         raise SystemExit(MACHINE if end.is_of_the_machine else end.code) from None

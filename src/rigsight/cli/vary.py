@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from rigsight.cli.exit_codes import told
+from rigsight.cli.exit_codes import report_errors
 from rigsight.cli.options import Debug, Json, Quiet, ResultsFolder, Simulators
 from rigsight.cli.terminal import show_json
 from rigsight.errors import InputError
-from rigsight.workflow.progress_display import listening
+from rigsight.workflow.run.progress_display import listening
 
 
 def vary(
@@ -64,7 +64,7 @@ def vary(
 
     Writes vary.svg, vary.png (vary_NAME.svg, ... where several parameters are named) and vary.json into DIR, all or none.
     """
-    with told(debug), listening(quiet) as listener:
+    with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.own.own_simulators import own_simulators
         from rigsight.workflow.vary import run_vary, table_text
 

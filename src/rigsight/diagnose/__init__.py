@@ -3,7 +3,6 @@
 from rigsight.diagnose.diagnosis import diagnose as diagnose
 from rigsight.diagnose.fitting.observer import structures_to_fit as structures_to_fit
 from rigsight.diagnose.fitting.placed_effects import candidates_on as candidates_on
-from rigsight.diagnose.fitting.task import Task as Task
 from rigsight.diagnose.result import Candidate as Candidate
 from rigsight.diagnose.result import Diagnosis as Diagnosis
 from rigsight.diagnose.result import LikelyCauses as LikelyCauses
@@ -18,7 +17,6 @@ __all__ = [
     "Diagnosis",
     "LikelyCauses",
     "Situation",
-    "Task",
     "Verdict",
     "candidates_on",
     "diagnose",

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.advise import advise
 from rigsight.diagnose.examination import Examination, examine
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.placed_effects import candidates_on
 from rigsight.diagnose.fitting.preparation import Prepare
-from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import readings
 from rigsight.diagnose.location.localize import localize
 from rigsight.diagnose.location.quantify import budget_intervals, effect_shares
@@ -47,7 +47,7 @@ _REFERENCE_USED = (
 
 
 def diagnose(
-    task: Task,
+    campaign: Campaign,
     effects: Sequence[Effect] = CATALOGUE,
     seed: int = 0,
     n_jobs: int = 1,
@@ -59,7 +59,7 @@ def diagnose(
 
     Parameters
     ----------
-    task
+    campaign
         Records and the given simulation.
     effects
         Candidates.
@@ -82,26 +82,26 @@ def diagnose(
         If the rig's own equations cannot be simulated near the records.
     """
     say = progress or (lambda _: None)
-    if not task.estimation:
+    if not campaign.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
-    effects = candidates_on(task.rig, effects, task.modelled)
-    notes = [note for record in task.records for note in record.notes]
-    notes += closed_loop_notes(task.records, task.rig, _REFERENCE_USED)
-    scored_on = "validation" if task.validation else "estimation"
-    if not task.validation:
+    effects = candidates_on(campaign.rig, effects, campaign.modelled)
+    notes = [note for record in campaign.records for note in record.notes]
+    notes += closed_loop_notes(campaign.records, campaign.rig, _REFERENCE_USED)
+    scored_on = "validation" if campaign.validation else "estimation"
+    if not campaign.validation:
         notes.append(
             "There is no validation record: errors are those of the records that were fitted, and too good."
         )
-    if task.open_factor is not None:
-        notes.append(task.open_factor.sentence)
+    if campaign.open_factor is not None:
+        notes.append(campaign.open_factor.sentence)
     rng = np.random.default_rng(seed)
-    found = examine(task, effects, rng, n_jobs, say, prepare, memory)
+    found = examine(campaign, effects, rng, n_jobs, say, prepare, memory)
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         notes.append(
             f"A model's error is {_least_left(found):.2g} of what the sensors show while the input rests. The rig moved there, "
             "in its play or driven by a disturbance, and the noise floor is taken from the top of the spectrum instead."
         )
-        found = examine(task, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
+        found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
     if found.windowing.bandwidth is not None:
         notes.append(
             "Nothing brings the rig back, so that every model drifts in free run. Models are compared as observers: each follows "
@@ -127,7 +127,7 @@ def diagnose(
             f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act "
             "as one law, and other laws of its kind fit equally well: they are not named."
         )
-    diagnosis = _assembled(task, found, notes, scored_on, rng)
+    diagnosis = _assembled(campaign, found, notes, scored_on, rng)
     diagnosis = replace(diagnosis, data_quality=found.quality)
     named = found.judgement.model if diagnosis.effects else found.reidentified
     if found.judgement.verdict != "unknown":
@@ -135,7 +135,9 @@ def diagnose(
         say("standard errors")
     own = next(candidate for candidate in diagnosis.candidates if candidate.effects == named.names)
     std = {name: estimate.std for name, estimate in own.parameters.items()}
-    diagnosis = replace(diagnosis, trust=trust(found.context, named, task.records, task.constants, std))
+    diagnosis = replace(
+        diagnosis, trust=trust(found.context, named, campaign.records, campaign.constants, std)
+    )
     say("trust in the numbers")
     if found.judgement.verdict != "unknown":
         return diagnosis
@@ -146,9 +148,9 @@ def diagnose(
     pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
     return replace(
         diagnosis,
-        where=diagnosis.where if pushed else traced_to(task.rig, forces) or diagnosis.where,
+        where=diagnosis.where if pushed else traced_to(campaign.rig, forces) or diagnosis.where,
         missing_force=force_of_one_motion(
-            found.context, found.reidentified, task.absent_spring is not None, rng
+            found.context, found.reidentified, campaign.absent_spring is not None, rng
         ),
         joint_forces=forces,
     )
@@ -159,13 +161,13 @@ def _least_left(found: Examination) -> float:
 
 
 def _assembled(
-    task: Task,
+    campaign: Campaign,
     found: Examination,
     notes: Sequence[str],
     scored_on: str,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    rig, context, before, reidentified = task.rig, found.context, found.before, found.reidentified
+    rig, context, before, reidentified = campaign.rig, found.context, found.before, found.reidentified
     ranking, judgement, floors = found.ranking, found.judgement, found.floors
     is_effect = judgement.verdict == "effect"
     after = judgement.model if is_effect else (before if judgement.verdict == "none" else reidentified)
@@ -209,7 +211,7 @@ def _assembled(
     if judgement.verdict != "unknown":
         floors = _with_disturbance(context, judgement.model, floors, found.windowing.bandwidth)
     return Diagnosis(
-        title=task.title,
+        title=campaign.title,
         rig=rig.name,
         verdict=judgement.verdict,
         effects=tuple(effect.name for effect in chosen),
@@ -222,7 +224,7 @@ def _assembled(
         noise_floors=floors,
         traces=traces,
         units={signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)},
-        model=Model.of(after.fit.structure, after.fit.values, task.records[0].hold).to_json(),
+        model=Model.of(after.fit.structure, after.fit.values, campaign.records[0].hold).to_json(),
         notes=tuple(notes),
         windows=found.windowing.length,
         window_cycles=found.windowing.cycles,

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.checks import data_quality, with_best_model, with_offsets_told
 from rigsight.diagnose.data_quality.finding import DataQuality
 from rigsight.diagnose.data_quality.offsets_by_record import asked_offsets, with_offsets_free
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of, start_values_of
-from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing, leading_output
 from rigsight.diagnose.noise.adequacy import Adequacy, Checks
 from rigsight.diagnose.noise.detection import noise_floors
@@ -96,7 +96,7 @@ class Examination:
 
 
 def examine(
-    task: Task,
+    campaign: Campaign,
     effects: Sequence[Effect],
     rng: np.random.Generator,
     n_jobs: int,
@@ -109,7 +109,7 @@ def examine(
 
     Parameters
     ----------
-    task
+    campaign
         Records and the simulation in question.
     effects
         Candidates.
@@ -127,19 +127,19 @@ def examine(
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
-    drifts = task.drifts or not brings_back(task)
-    floors = noise_floors(task.rig, task.records, drifts, at_rest)
+    drifts = campaign.drifts or not brings_back(campaign)
+    floors = noise_floors(campaign.rig, campaign.records, drifts, at_rest)
     say("noise floor")
     noise = {floor.output: floor.std for floor in floors}
     lower_bound = any(floor.lower_bound for floor in floors)
     at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
     windowing = Windowing()
     if drifts:
-        windowing, amplified = windowing_of(task, noise, n_jobs)
+        windowing, amplified = windowing_of(campaign, noise, n_jobs)
         floors = tuple(_raised(floor, amplified.get(floor.output, 1.0)) for floor in floors)
         noise = {floor.output: floor.std for floor in floors}
-    ready = preparing(prepare, windowing.cut(task.records))
-    models = _singly(task, noise, effects, windowing, n_jobs, say, ready, memory)
+    ready = preparing(prepare, windowing.cut(campaign.records))
+    models = _singly(campaign, noise, effects, windowing, n_jobs, say, ready, memory)
     allowed = VERDICT.at_lower_bound if lower_bound else most_left(models.reidentified.error_over_noise)
     asked = (
         asked_offsets(models.context, models.reidentified, models.singles, allowed)
@@ -148,7 +148,7 @@ def examine(
     )
     if asked is not None:
         say("offsets by record")
-        freed = with_offsets_free(task)
+        freed = with_offsets_free(campaign)
         again = examine(freed, effects, rng, n_jobs, say, prepare, memory, at_rest)
         return replace(again, quality=replace(again.quality, findings=(asked, *again.quality.findings)))
     pairs: list[Scored] = []
@@ -157,7 +157,7 @@ def examine(
     if windowing.whole and not is_predictable(
         models.context, models.reidentified, models.singles, at_floor, rng
     ):
-        cut = _cut(task, noise, models)
+        cut = _cut(campaign, noise, models)
         say("in windows")
         in_windows = _explained(cut, cut.singles, at_floor)
     checks = Checks(models.context, rng, VERDICT.at_floor, np.inf if lower_bound else VERDICT.most_left)
@@ -167,7 +167,7 @@ def examine(
         )
         models = replace(models, singles=refit_singles(models.context, models.singles, pairs))
         if windowing.whole and not is_predictable(models.context, models.reidentified, pairs, allowed, rng):
-            cut = cut or _cut(task, noise, models)
+            cut = cut or _cut(campaign, noise, models)
             found = pairs_in_windows(models.context, cut.context, models.reidentified, pairs)
             say("pairs in windows")
             in_windows = _explained(cut, found, VERDICT.at_floor)
@@ -185,7 +185,7 @@ def examine(
     if not in_windows:
         stand = beyond_disturbance(evidence, models.singles, forms.with_own_evidence(models.singles, pairs))
         pairs = with_parts(stand, pairs)
-    vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
+    vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
     candidates = [*models.singles, *pairs]
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
     # A likelihood takes what is left for noise: it counts where the likeliest model leaves no more than that.
@@ -204,14 +204,14 @@ def examine(
                 counts,
             )
         if ranking.order[0].error_over_noise > allowed:
-            ranking = plausible_first(ranking, reidentified, _places(task.rig, ranking))
+            ranking = plausible_first(ranking, reidentified, _places(campaign.rig, ranking))
         best, tied = ranking.order[0], ranking.tied
         judgement = judge(
             before.error_over_noise,
             reidentified,
             best,
             checks.is_adequate,
-            lambda: main_cause(task.rig, reidentified, best, tied, vector, rng),
+            lambda: main_cause(campaign.rig, reidentified, best, tied, vector, rng),
             lower_bound,
         )
     else:
@@ -262,7 +262,7 @@ class _Singly:
 
 
 def _singly(
-    task: Task,
+    campaign: Campaign,
     noise: Mapping[str, float],
     effects: Sequence[Effect],
     windowing: Windowing,
@@ -271,22 +271,22 @@ def _singly(
     prepare: Prepare | None,
     memory: FitMemory | None,
 ) -> _Singly:
-    context = fit_context_of(task, noise, windowing, memory, IdleThreads(n_jobs))
+    context = fit_context_of(campaign, noise, windowing, memory, IdleThreads(n_jobs))
     reidentified = reidentify(context, context.start)
     if not reidentified.residuals:
         raise SimulationError(
-            f"The equations of {task.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
+            f"The equations of {campaign.rig.name} cannot be fitted to the records: {reidentified.fit.message}"
         )
-    bent = bool(task.given) and context.leaves_numbers_open(reidentified.fit)
-    if bent or not task.rig.has_one_motion:
+    bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
+    if bent or not campaign.rig.has_one_motion:
         # What moves between the sensors, and which forces do it, is known once the equations fit, or from the given simulation.
-        known = {**task.constants, **reidentified.fit.values, **(task.given if bent else {})}
-        context = replace(context, scales=characteristic_scales(task.rig, task.estimation, known))
+        known = {**campaign.constants, **reidentified.fit.values, **(campaign.given if bent else {})}
+        context = replace(context, scales=characteristic_scales(campaign.rig, campaign.estimation, known))
     say("re-identified")
-    before = _before(task, context, reidentified)
-    if task.given:
+    before = _before(campaign, context, reidentified)
+    if campaign.given:
         say("given simulation")
-    quality = data_quality(context, task.records, reidentified)
+    quality = data_quality(context, campaign.records, reidentified)
     search = search_places(context, reidentified, context.offered(effects))
     say("suspects")
     if prepare is not None:
@@ -303,14 +303,14 @@ def _singly(
     return _Singly(windowing, context, before, reidentified, quality, singles, search)
 
 
-def _cut(task: Task, noise: Mapping[str, float], models: _Singly) -> _Singly:
+def _cut(campaign: Campaign, noise: Mapping[str, float], models: _Singly) -> _Singly:
     """Return the models in windows of a few cycles."""
-    leading = leading_output(task.rig, task.records)
+    leading = leading_output(campaign.rig, campaign.records)
     windowing = Windowing.by_cycles({leading: noise[leading], **noise})
-    context = fit_context_of(task, noise, windowing, models.context.memory, models.context.threads)
+    context = fit_context_of(campaign, noise, windowing, models.context.memory, models.context.threads)
     reidentified = reidentify(context, models.reidentified.fit.values)
     singles = fitted_in_windows(context, reidentified, models.singles)
-    before = _before(task, context, reidentified) if reidentified.residuals else models.before
+    before = _before(campaign, context, reidentified) if reidentified.residuals else models.before
     return _Singly(windowing, context, before, reidentified, models.quality, singles, models.search)
 
 
@@ -320,13 +320,13 @@ def _explained(cut: _Singly, models: Sequence[Scored], at_floor: float) -> bool:
     return bool(cut.reidentified.residuals) and best <= at_floor < cut.reidentified.error_over_noise
 
 
-def _before(task: Task, context: FitContext, reidentified: Scored) -> Scored:
+def _before(campaign: Campaign, context: FitContext, reidentified: Scored) -> Scored:
     """Score the given simulation; parameters that were not given are identified with the given ones held."""
-    if not task.given:
+    if not campaign.given:
         return reidentified
     structure = context.composed()
-    start = {**start_values_of(task), **reidentified.fit.values, **task.given}
-    missing = [name for name in context.free_parameters(structure) if name not in task.given]
+    start = {**start_values_of(campaign), **reidentified.fit.values, **campaign.given}
+    missing = [name for name in context.free_parameters(structure) if name not in campaign.given]
     fit = context.problem(structure, context.estimation).fit(start, missing)
     if not fit.residuals:
         raise InputError(_why_not_run(context, structure, start))

@@ -10,9 +10,9 @@ import numpy as np
 
 from rigsight.discover.bench import Bench, Trial
 from rigsight.discover.doubts import doubts, warnings_of
+from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import Selection, criterion, next_terms
-from rigsight.discover.task import Task
 from rigsight.discover.terms.equations import equations
 from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.identify import FitResult
@@ -37,9 +37,9 @@ class Found:
     held: str
 
 
-def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Found) -> Discovery:
+def assembled(data: RegressionData, method: str, pointwise: bool, bench: Bench, found: Found) -> Discovery:
     """Return the result of a discovery: equations, terms with their doubts, alternatives, free runs, model."""
-    rig, final, selection = task.rig, found.final, found.selection
+    rig, final, selection = data.rig, found.final, found.selection
     output = rig.outputs[0].name
     structure = final.structure
     constants = {p.name for p in rig.constants}
@@ -56,7 +56,7 @@ def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Fou
     measured = np.concatenate([record[output] for record in found.held_out])
     size = float(np.std(measured)) or 1.0
     warnings = warnings_of(
-        task,
+        data,
         found.estimation,
         found.held_out,
         found.how,
@@ -66,11 +66,11 @@ def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Fou
         terms,
         found.held,
         found.force,
-        task.noise[output] / size,
+        data.noise[output] / size,
         next(iter(next_terms(bench, found.chosen.support)), ""),
     )
     return Discovery(
-        title=task.title,
+        title=data.campaign.title,
         rig=rig.name,
         method=method,
         form="pointwise" if pointwise else "weak",
@@ -82,8 +82,8 @@ def assembled(task: Task, method: str, pointwise: bool, bench: Bench, found: Fou
         force_equation={} if found.force is None else dict(found.force.inclusion),
         held_out=tuple(record.name for record in found.held_out),
         held_out_error=found.judged.error_over_noise,
-        held_out_nrmse=found.judged.error_over_noise * task.noise[output] / size,
-        noise_floor=task.noise[output] / size,
+        held_out_nrmse=found.judged.error_over_noise * data.noise[output] / size,
+        noise_floor=data.noise[output] / size,
         independent=selection.independent,
         runs=_runs(bench, found, output),
         output=output,

@@ -17,9 +17,9 @@ from rigsight.discover.joints.joint_discovery import discover_at_joints
 from rigsight.discover.motion import Motion, motion_of
 from rigsight.discover.own_regression import own_regression, own_terms, rows_of
 from rigsight.discover.regression import Projected, alike
+from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Discovery
 from rigsight.discover.selection import STRONG, Selection, criterion, select
-from rigsight.discover.task import Task
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import Candidate, candidates, offered_effects
 from rigsight.discover.weak_form import Rows
@@ -48,7 +48,7 @@ _CLEARLY_OFF = 3.0
 
 
 def discover(
-    task: Task,
+    data: RegressionData,
     method: Method = "discrepancy",
     pointwise: bool = False,
     seed: int = 0,
@@ -59,7 +59,7 @@ def discover(
 
     Parameters
     ----------
-    task
+    data
         Records and rig.
     method
         ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term.
@@ -80,85 +80,88 @@ def discover(
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
-    if not task.rig.has_one_motion:
+    if not data.rig.has_one_motion:
         if method != "discrepancy" or pointwise:
             raise InputError(
-                f"The rig '{task.rig.name}' has several joints: its missing forces are regressed through its responses, in the "
+                f"The rig '{data.rig.name}' has several joints: its missing forces are regressed through its responses, in the "
                 "discrepancy form. Leave the form and the point-wise rows to rigs of one motion."
             )
-        return discover_at_joints(task, seed, progress, n_jobs)
+        return discover_at_joints(data, seed, progress, n_jobs)
     say = progress or (lambda _: None)
     threads = IdleThreads(n_jobs)
     rng = np.random.default_rng(seed)
-    estimation, held_out, how = split(task)
-    values = _linear_values(task, estimation)
-    scales = characteristic_scales(task.rig, estimation, values)
-    output = task.rig.outputs[0].name
+    estimation, held_out, how = split(data)
+    values = _linear_values(data, estimation)
+    scales = characteristic_scales(data.rig, estimation, values)
+    output = data.rig.outputs[0].name
     # What the motion knows nothing of would be simulated in every fit.
-    alone = tuple(_without_downstream(task.rig, record) for record in estimation)
-    swallowed, centered = _offsets_found(task, alone, values, scales, _held(task))
+    alone = tuple(_without_downstream(data.rig, record) for record in estimation)
+    swallowed, centered = _offsets_found(data, alone, values, scales, _held(data))
     motions = threads.results(
-        lambda index: motion_of(task.rig, centered[index], values, task.noise[output]),
+        lambda index: motion_of(data.rig, centered[index], values, data.noise[output]),
         [record.n_samples for record in estimation],
     )
     say("motion smoothed")
     rows = rows_of(motions, scales["time"], pointwise)
-    projected = own_regression(task.rig, task.no_spring, motions, rows)
-    library = _library(task, motions, rows, projected, scales, threads)
+    projected = own_regression(data.rig, data.no_spring, motions, rows)
+    library = _library(data, motions, rows, projected, scales, threads)
     library, same = _distinct(library, projected)
     say("library")
     bench = Bench(
-        rig=task.rig.motion_alone(),
+        rig=data.rig.motion_alone(),
         estimation=alone,
-        held_out=tuple(_without_downstream(task.rig, record) for record in held_out),
+        held_out=tuple(_without_downstream(data.rig, record) for record in held_out),
         values=values,
         scales=scales,
-        noise=task.noise,
-        held=_held(task) | swallowed,
+        noise=data.noise,
+        held=_held(data) | swallowed,
         candidates={candidate.name: candidate for candidate in library},
         projected=projected,
-        own_terms=own_terms(task.rig, task.no_spring, projected) if method == "full" else {},
+        own_terms=own_terms(data.rig, data.no_spring, projected) if method == "full" else {},
         threads=threads,
     )
     selection = select(bench, say)
     if not math.isfinite(selection.best.error_over_noise):
         raise SimulationError(
-            f"The equations of {task.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
+            f"The equations of {data.rig.name} cannot be simulated near these records: {selection.best.fit.message}"
         )
     chosen = _without_damper(bench, selection, say)
-    final, held = _polished(task, bench, chosen)
+    final, held = _polished(data, bench, chosen)
     # A record that was set aside is fitted by the polish as well: only the equation before it has not seen it.
     judged = chosen if how else bench.scored(chosen.support, final)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The polished equations cannot be simulated on the held-out records.")
     say("polished")
-    included = inclusion(task, bench, selection, final, motions, rows, rng)
+    included = inclusion(data, bench, selection, final, motions, rows, rng)
     force = regressed_force(bench, final, motions, rows, rng)
     say("ensembles")
     found = Found(estimation, held_out, how, selection, chosen, judged, final, included, force, same, held)
-    return assembled(task, method, pointwise, bench, found)
+    return assembled(data, method, pointwise, bench, found)
 
 
-def _linear_values(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
-    known = {"k": 0.0} if task.no_spring else {}
-    return {**task.constants, **linear_start(task.rig, estimation, task.constants, {**known, **task.held})}
+def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[str, float]:
+    known = {"k": 0.0} if data.no_spring else {}
+    return {
+        **data.campaign.constants,
+        **linear_start(data.rig, estimation, data.campaign.constants, {**known, **data.held}),
+    }
 
 
-def _held(task: Task) -> frozenset[str]:
+def _held(data: RegressionData) -> frozenset[str]:
     """Return what no fit moves while terms are chosen: what the motion knows nothing of, and one of two rests."""
-    motion = task.rig.motion
-    held = {*task.rig.downstream_parameters, *task.held}
-    if task.rig.is_driven:
+    motion = data.rig.motion
+    held = {*data.rig.downstream_parameters, *data.held}
+    if data.rig.is_driven:
         # A linear spring cannot tell a constant force from a shifted rest position.
         rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
-        held |= {symbol.name for symbol in (rest if task.no_spring else bias)}
-    if task.no_spring:
+        held |= {symbol.name for symbol in (rest if data.no_spring else bias)}
+    if data.no_spring:
         held.add(motion.stiffness.name)
     return frozenset(held)
 
 
 def _offsets_found(
-    task: Task,
+    data: RegressionData,
     records: Sequence[Record],
     values: Mapping[str, float],
     scales: Mapping[str, float],
@@ -167,12 +170,12 @@ def _offsets_found(
     """Return parameters that offsets of the records' own make up for, and the records without the offsets of a first fit."""
     if not any(record.free_offsets for record in records):
         return frozenset(), records
-    structure = compose(task.rig.motion_alone())
-    asked = [p.name for p in task.rig.parameters if p.name in structure.names and p.name not in held]
+    structure = compose(data.rig.motion_alone())
+    asked = [p.name for p in data.rig.parameters if p.name in structure.names and p.name not in held]
     known = {name: values[name] for name in structure.names}
-    swallowed = frozenset(swallowed_by_offsets(structure, records, scales, task.noise, known, asked))
+    swallowed = frozenset(swallowed_by_offsets(structure, records, scales, data.noise, known, asked))
     free = [name for name in asked if name not in swallowed]
-    fit = GreyBoxFit(structure, records, scales, task.noise).fit(known, free, finish=False)
+    fit = GreyBoxFit(structure, records, scales, data.noise).fit(known, free, finish=False)
     return swallowed, without_offsets(records, fit)
 
 
@@ -183,17 +186,17 @@ def _without_downstream(rig: Rig, record: Record) -> Record:
 
 
 def _library(
-    task: Task,
+    data: RegressionData,
     motions: Sequence[Motion],
     rows: Rows,
     projected: Projected,
     scales: Mapping[str, float],
     threads: IdleThreads,
 ) -> list[Candidate]:
-    effects = offered_effects(task.rig, not task.no_spring)
+    effects = offered_effects(data.rig, not data.no_spring)
     if all(is_constant(motion.u) for motion in motions):
         effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
-    found = candidates(effects, motions, rows, projected, scales, task.rig.is_driven, threads)
+    found = candidates(effects, motions, rows, projected, scales, data.rig.is_driven, threads)
     return [c for c in found if np.all(np.isfinite(c.column)) and np.any(c.column)]
 
 
@@ -236,14 +239,14 @@ def _without_damper(bench: Bench, selection: Selection, say: Callable[[str], Non
     return without if worse < STRONG else chosen
 
 
-def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
+def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
     """Fit the chosen structure once more, all outputs and all records that may be fitted, to full precision.
 
     A special value (an exponent of 1) is released as well: where the fit leaves it clearly, the intervals of everything else
     would be wrong with it. Returns the fit and, where the special value was kept, a note on how well it is known.
     """
-    records = tuple(record for record in task.records if record.role == "estimation")
-    rig = task.rig
+    records = tuple(record for record in data.records if record.role == "estimation")
+    rig = data.rig
     free = set(chosen.fit.free)
     measured = {name for record in records for name in record.signals}
     if any(symbol.name in measured for symbol in rig.downstream):

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigsight.discover.bench import Trial
+from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Coefficient, Term
 from rigsight.discover.selection import STRONG, Selection, criterion
-from rigsight.discover.task import Task
 from rigsight.discover.terms.force_law import ForceEquation
 from rigsight.effects import Effect
 from rigsight.records.periods import same_signal
@@ -60,7 +60,7 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
 
 
 def warnings_of(
-    task: Task,
+    data: RegressionData,
     estimation: Sequence[Record],
     held_out: Sequence[Record],
     how: str,
@@ -75,7 +75,7 @@ def warnings_of(
 ) -> tuple[str, ...]:
     """Return what a user should know, one sentence each."""
     found = [note for note in (how, held) if note]
-    source = task.rig.inputs[0].name
+    source = data.rig.inputs[0].name
     sizes = [float(np.std(record[source])) for record in estimation]
     if max(sizes) < 1.2 * min(sizes):
         found.append(_one_amplitude(selection, chosen))

@@ -12,8 +12,8 @@ from rigsight.discover.bench import Bench
 from rigsight.discover.motion import Motion
 from rigsight.discover.own_regression import own_regression, own_terms
 from rigsight.discover.regression import inclusion_probabilities
+from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.selection import Selection, proposals
-from rigsight.discover.task import Task
 from rigsight.discover.terms.force_law import ForceEquation, ForceLaw, force_equation
 from rigsight.discover.terms.hysteresis import is_loop
 from rigsight.discover.terms.library import candidates, torque_along
@@ -26,7 +26,7 @@ _SAME_REST = 1e-5
 
 
 def inclusion(
-    task: Task,
+    data: RegressionData,
     bench: Bench,
     selection: Selection,
     final: FitResult,
@@ -54,15 +54,15 @@ def inclusion(
     if abs(shift) < _SAME_REST * bench.scales["x"]:
         shift = 0.0
     moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
-    projected = own_regression(task.rig, task.no_spring, moved, rows) if shift else bench.projected
-    own_columns = own_terms(task.rig, task.no_spring, projected) if bench.own_terms else {}
+    projected = own_regression(data.rig, data.no_spring, moved, rows) if shift else bench.projected
+    own_columns = own_terms(data.rig, data.no_spring, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
         # The loop does not know where rest is.
         loops = [candidate for candidate in library if is_loop(candidate.effect)]
         effects = [candidate.effect for candidate in library if not is_loop(candidate.effect)]
         library = loops + candidates(
-            effects, moved, rows, projected, bench.scales, task.rig.is_driven, bench.threads
+            effects, moved, rows, projected, bench.scales, data.rig.is_driven, bench.threads
         )
     again = replace(
         bench,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigsight.discover.task import Task
+from rigsight.discover.regression_data import RegressionData
 from rigsight.errors import InputError
 from rigsight.records.record import Record
 
@@ -14,7 +14,7 @@ _LEAST_SAMPLES = 200
 _HELD_BACK = 0.3
 
 
-def split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
+def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
     """Return the records to fit, those to score, and in words how the latter were found.
 
     Raises
@@ -22,8 +22,8 @@ def split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
     InputError
         If there is no estimation record, or one is too short.
     """
-    estimation = tuple(r for r in task.records if r.role == "estimation")
-    validation = tuple(r for r in task.records if r.role == "validation")
+    estimation = tuple(r for r in data.records if r.role == "estimation")
+    validation = tuple(r for r in data.records if r.role == "validation")
     if not estimation:
         raise InputError('A discovery needs at least one record with role = "estimation".')
     for record in estimation:
@@ -34,7 +34,7 @@ def split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
     if validation:
         return estimation, validation, ""
     if len(estimation) > 1:
-        names = [signal.name for signal in task.rig.inputs or task.rig.outputs]
+        names = [signal.name for signal in data.rig.inputs or data.rig.outputs]
 
         def strength(record: Record) -> float:
             return float(np.sqrt(sum(np.var(record[name]) for name in names if name in record)))

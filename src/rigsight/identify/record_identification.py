@@ -48,7 +48,7 @@ _SHARES = tuple(float(share) for share in np.geomspace(0.01, 0.4, 7))
 
 
 @dataclass(frozen=True)
-class Wishes:
+class EstimationOptions:
     """How records are to be read.
 
     Attributes
@@ -56,7 +56,7 @@ class Wishes:
     method
         Estimator of the frequency responses.
     resolution
-        Width wished for [rad/s]; None takes what each record gives.
+        Width asked for [rad/s]; None takes what each record gives.
     """
 
     method: Method = "local_rational"
@@ -64,7 +64,7 @@ class Wishes:
 
 
 def identify_record(
-    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, wishes: Wishes
+    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, options: EstimationOptions
 ) -> RecordIdentification:
     """Identify what one record shows.
 
@@ -78,25 +78,25 @@ def identify_record(
         The rig's constants by name.
     no_spring
         True for an axis without a spring: it is identified from its velocity.
-    wishes
+    options
         How to read it.
 
     Raises
     ------
     InputError
-        If the record is too short for the resolution wished for. Whatever else a record cannot tell is told in the result.
+        If the record is too short for the resolution asked for. Whatever else a record cannot tell is told in the result.
     """
     amplitude = record.amplitude if record.amplitude is not None else measured_amplitude(record, rig)[0]
     if not rig.is_driven:
-        return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, wishes),))
+        return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, options),))
     forward = _driven_forward(record, constants.get("gain", 1.0))
     instrument = instrument_of(record, [signal.name for signal in (*rig.inputs, *rig.outputs)])
-    motion, seen = _motion(forward, rig, constants, no_spring, wishes, instrument)
+    motion, seen = _motion(forward, rig, constants, no_spring, options, instrument)
     unused = "" if seen is None else seen.unused_instrument
     paths, warnings = [motion], _resolution_warning(motion, seen, record)
     warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
     if rig.downstream:
-        paths.append(_lateral(record, constants, wishes, motion))
+        paths.append(_lateral(record, constants, options, motion))
     warnings = [*(f"{p.source} -> {p.response}: {p.problem}" for p in paths if p.problem), *warnings]
     return RecordIdentification(
         record=record,
@@ -134,7 +134,7 @@ def _motion(
     rig: Rig,
     constants: Mapping[str, float],
     no_spring: bool,
-    wishes: Wishes,
+    options: EstimationOptions,
     instrument: str | None,
 ) -> tuple[PathIdentification, RecordResponse | None]:
     source, response = rig.inputs[0].name, rig.outputs[0].name
@@ -157,22 +157,22 @@ def _motion(
                 source,
                 response,
                 order,
-                wishes.method,
-                wishes.resolution,
+                options.method,
+                options.resolution,
                 record.hold,
                 instrument=instrument,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(_velocity(seen.response) if no_spring else seen.response, order, seen, wishes)
+            fit = _fit(_velocity(seen.response) if no_spring else seen.response, order, seen, options)
         return _judged(path, fit, physical), seen
     except InputError as error:
-        if wishes.resolution is not None and "too short for a resolution" in str(error):
+        if options.resolution is not None and "too short for a resolution" in str(error):
             raise
         return replace(path, problem=str(error)), seen
 
 
 def _lateral(
-    record: Record, constants: Mapping[str, float], wishes: Wishes, motion: PathIdentification
+    record: Record, constants: Mapping[str, float], options: EstimationOptions, motion: PathIdentification
 ) -> PathIdentification:
     path = PathIdentification("psi", "y")
     if "y" not in record:
@@ -189,34 +189,38 @@ def _lateral(
         if record.kind == "step":
             fit = fit_step(_from_rest(record, motion.fit), "psi", "y", "pt1")
         else:
-            seen = record_response(record, "psi", "y", "pt1", wishes.method, wishes.resolution, smooth, band)
+            seen = record_response(
+                record, "psi", "y", "pt1", options.method, options.resolution, smooth, band
+            )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(seen.response, "pt1", seen, wishes)
+            fit = _fit(seen.response, "pt1", seen, options)
         return _judged(path, fit, lambda found: lateral_parameters(found, constants))
     except InputError as error:
         return replace(path, problem=str(error))
 
 
-def _dynamic_stiffness(record: Record, rig: Rig, wishes: Wishes) -> PathIdentification:
+def _dynamic_stiffness(record: Record, rig: Rig, options: EstimationOptions) -> PathIdentification:
     path = PathIdentification(rig.inputs[0].name, rig.outputs[0].name)
     if record.kind == "step":
         return path
     try:
-        method: Method = "local_rational" if wishes.method == "thesis" else wishes.method
+        method: Method = "local_rational" if options.method == "thesis" else options.method
         seen = record_response(
-            record, path.source, path.response, "pt2", method, wishes.resolution, "band_limited"
+            record, path.source, path.response, "pt2", method, options.resolution, "band_limited"
         )
     except InputError as error:
-        if wishes.resolution is not None and "too short for a resolution" in str(error):
+        if options.resolution is not None and "too short for a resolution" in str(error):
             raise
         return replace(path, problem=str(error))
     return replace(path, measured=seen.response, coherence=seen.coherence)
 
 
-def _fit(response: FrequencyResponse, order: Order, seen: RecordResponse, wishes: Wishes) -> TransferFit:
+def _fit(
+    response: FrequencyResponse, order: Order, seen: RecordResponse, options: EstimationOptions
+) -> TransferFit:
     """Fit with standard errors that count independent values, not lines."""
     # The thesis reads magnitudes only (section 4.4): its phases are rescaled.
-    by_magnitude = wishes.method == "thesis"
+    by_magnitude = options.method == "thesis"
     fit = fit_frequency_response(response, order, magnitude_only=by_magnitude)
     factor = 1.0 if response.noise_shares is not None else seen.lines_per_value
     if fit.misfit > MISFIT and order == "pt2" and not by_magnitude:

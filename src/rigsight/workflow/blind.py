@@ -9,16 +9,16 @@ from typing import Any
 
 from rigsight.blind import Design, Outcome, n_trials
 from rigsight.errors import InputError, nearest
-from rigsight.workflow.blind_bench.execution import finished
-from rigsight.workflow.blind_bench.external import ExternalBench
-from rigsight.workflow.blind_bench.files import EXTERNAL, STORE_FILE, BenchFolder, read_json, trial_name
-from rigsight.workflow.blind_bench.score_files import score_bench
-from rigsight.workflow.blind_bench.scoring import score_trial
-from rigsight.workflow.blind_bench.store import TrialStore
-from rigsight.workflow.blind_bench.trial import diagnose_trial, make_trial
-from rigsight.workflow.files.results import check_writable
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.bench.execution import finished
+from rigsight.workflow.bench.external import ExternalBench
+from rigsight.workflow.bench.files import EXTERNAL, STORE_FILE, BenchFolder, read_json, trial_name
+from rigsight.workflow.bench.score_files import score_bench
+from rigsight.workflow.bench.scoring import score_trial
+from rigsight.workflow.bench.store import TrialStore
+from rigsight.workflow.bench.trial import diagnose_trial, make_trial
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable
 
 RUNNING = "Blind trials"
 SCORING = "Scoring trials anew"
@@ -27,6 +27,7 @@ SCORING = "Scoring trials anew"
 def run_blind(
     out: str | Path,
     *,
+    start: Sequence[str],
     design: Design = "standard",
     trials: int | None = None,
     seed: int = 0,
@@ -42,6 +43,8 @@ def run_blind(
     ----------
     out
         Folder for the bench.
+    start
+        Arguments with which Python starts the command line of a trial: ``rigsight.cli.trial_process.START``.
     design
         List of cells to draw from: ``"small"``, ``"standard"``, ``"joints"`` for the effects of servo and robot joints,
         ``"rigs"`` for effects at all places of every built-in rig, ``"laboratory"`` for records as laboratories take them, or
@@ -89,7 +92,7 @@ def run_blind(
         for number in numbers:
             if trial_name(number) in scored:
                 stage.finished(f"{number} (done before)")
-        run_one = functools.partial(_run_drawn, folder, design, seed)
+        run_one = functools.partial(_run_drawn, folder, design, seed, start)
         for outcome in finished(run_one, waiting, jobs, cluster, folder=folder.path, say=_say(listener)):
             store.add([outcome])
             stage.finished(outcome.trial)
@@ -101,6 +104,7 @@ def run_external(
     keys: str | Path,
     out: str | Path,
     *,
+    start: Sequence[str],
     only: Sequence[str] = (),
     n_jobs: int | None = None,
     cluster: str | None = None,
@@ -117,6 +121,8 @@ def run_external(
         Folder with a key ``NAME.json`` for each of these folders; see `blind_external`.
     out
         Folder for the results.
+    start
+        As for `run_blind`.
     only
         Names of the campaigns to run; all if empty.
     n_jobs, cluster, listener, command
@@ -150,7 +156,12 @@ def run_external(
             if name not in waiting:
                 stage.finished(f"{name} (done before)")
         for outcome in finished(
-            functools.partial(_run, folder), waiting, jobs, cluster, folder=folder.path, say=_say(listener)
+            functools.partial(_run, folder, start),
+            waiting,
+            jobs,
+            cluster,
+            folder=folder.path,
+            say=_say(listener),
         ):
             store.add([outcome])
             stage.finished(outcome.trial)
@@ -200,14 +211,14 @@ def rescore(
         return score_bench(folder.path, store, command)
 
 
-def _run_drawn(folder: BenchFolder, design: Design, seed: int, number: int) -> Outcome:
+def _run_drawn(folder: BenchFolder, design: Design, seed: int, start: Sequence[str], number: int) -> Outcome:
     make_trial(folder, design, seed, number)
-    return _run(folder, trial_name(number))
+    return _run(folder, start, trial_name(number))
 
 
-def _run(folder: BenchFolder, name: str) -> Outcome:
+def _run(folder: BenchFolder, start: Sequence[str], name: str) -> Outcome:
     """Diagnose a trial, unless that has been done, and score it."""
-    diagnose_trial(folder, name)
+    diagnose_trial(folder, name, start)
     return score_trial(folder, name)
 
 

@@ -10,8 +10,9 @@ from typing import cast
 
 from joblib import Parallel, delayed
 
+from rigsight.campaign import Campaign
 from rigsight.compare import Comparison, Competitor, Floor, Yardstick, compare_on_record
-from rigsight.diagnose.fitting.drift import can_drift
+from rigsight.compare.comparison_files import comparison_csv, comparison_json
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.errors import InputError, check_option
@@ -19,14 +20,14 @@ from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.plot import svg_text
 from rigsight.report import comparison_figures, render_comparison
+from rigsight.simulate.drift import can_drift
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.compare_files import comparison_csv, comparison_json
-from rigsight.workflow.diagnose import versions
-from rigsight.workflow.files.model_file import MODEL_FILE, named_model
-from rigsight.workflow.files.results import check_writable, json_text, write_together
-from rigsight.workflow.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.campaign.model_file import MODEL_FILE, named_model
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.versions import versions
 
 COMPARISON_FILE, TABLE_FILE, PAGE_FILE = "comparison.json", "comparison.csv", "comparison.html"
 COMPARING = "Comparing"

@@ -18,12 +18,12 @@ from rigsight.records import Hold, Kind, Record, Role
 from rigsight.rigs import RUNNING_GEAR
 from rigsight.rigs.published import PublishedSet, published_sets
 from rigsight.simulate import Structure
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.campaign.virtual_rig import VirtualRig
 from rigsight.workflow.diagnose import diagnose_campaign, result_files
-from rigsight.workflow.files.results import check_writable, write_together
-from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.virtual_rig import VirtualRig
+from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, write_together
 
 CAMPAIGN_FOLDER = "campaign"
 HIDDEN_EFFECT = "iwan_hysteresis"

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import contextlib
-import platform
 import shlex
 from collections.abc import Callable, Iterable, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from rigsight.diagnose import Diagnosis, Task, candidates_on, diagnose, structures_to_fit
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, candidates_on, diagnose, structures_to_fit
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.report import render_report
 from rigsight.rigs import Rig
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.files.fit_journal import FitJournal
-from rigsight.workflow.files.model_file import MODEL_FILE
-from rigsight.workflow.files.results import check_writable, json_text, write_together
-from rigsight.workflow.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.not_yet import check_takes
+from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import effects_on
-from rigsight.workflow.progress import Listener, Stage, Step, silent
+from rigsight.workflow.run.fit_journal import FitJournal
+from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
+from rigsight.workflow.run.progress import Listener, Stage, Step, silent
+from rigsight.workflow.run.results import (
+    DIAGNOSIS_FILE,
+    REPORT_FILE,
+    check_writable,
+    json_text,
+    write_together,
+)
+from rigsight.workflow.run.versions import versions
 
-DIAGNOSIS_FILE = "diagnosis.json"
-REPORT_FILE = "report.html"
 DIAGNOSING = "Diagnosing"
-_VERSIONS_OF = ("rigsight", "numpy", "scipy")
 # Noise floor, re-identified equations and the given simulation, before the candidates.
 _STEPS_BEFORE_CANDIDATES = 3
 
@@ -118,15 +120,13 @@ def diagnose_campaign(
     SimulationError
         If the given simulation cannot be run.
     """
-    check_takes("diagnose", campaign.rig, campaign.records)
     # What nobody put anywhere is passed over where it makes no sense; a place that was named must be there.
     named = [effect for effect in effects if effect.at is None] + [
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
     ]
     candidates = candidates_on(campaign.rig, named, campaign.modelled)
     tried = structures_to_try(campaign.rig, candidates, campaign.modelled)
-    task = task_of(campaign)
-    prepare_kernels(structures_to_fit(task, tried), n_jobs, listener)
+    prepare_kernels(structures_to_fit(campaign, tried), n_jobs, listener)
     stage = Stage(DIAGNOSING, _STEPS_BEFORE_CANDIDATES + len(candidates), listener)
     journal = (
         contextlib.nullcontext()
@@ -136,7 +136,7 @@ def diagnose_campaign(
     # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
         diagnosis = diagnose(
-            task,
+            campaign,
             candidates,
             seed=seed,
             n_jobs=n_jobs,
@@ -154,12 +154,6 @@ def _tell_going_on(count: int, listener: Listener) -> None:
     stage = f"Going on: {count} fit{'' if count == 1 else 's'} done before the interruption"
     listener(Step(stage, "", 0, count))
     listener(Step(stage, "", count, count))
-
-
-def task_of(campaign: Campaign) -> Task:
-    """Return what a campaign asks to be diagnosed, with alternative parameters turned into the rig's own."""
-    given = campaign.rig.in_own_parameters(campaign.parameters, campaign.constants)
-    return Task(campaign.title, campaign.rig, campaign.constants, given, campaign.records, campaign.modelled)
 
 
 def write_diagnosis(
@@ -186,14 +180,3 @@ def result_files(
             diagnosis, command=command, versions=versions(), seed=seed, own_effects=effects
         ),
     }
-
-
-def versions() -> dict[str, str]:
-    """Return the versions on which figures depend, by package."""
-    found = {"python": platform.python_version()}
-    for package in _VERSIONS_OF:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found

@@ -10,21 +10,23 @@ from typing import cast
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
-from rigsight.discover import METHODS, Discovery, Task, discover
+from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
-from rigsight.errors import RigsightError, check_option
+from rigsight.discover.regression_data import has_no_spring
+from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text
 from rigsight.plot.discovery import discovery_figure
 from rigsight.records import Record
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.files.model_file import MODEL_FILE
-from rigsight.workflow.files.results import check_writable, json_text, write_together
-from rigsight.workflow.kernels import checked_jobs
-from rigsight.workflow.not_yet import check_takes
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.rigs import RIGS, is_built_in_motion
+from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.campaign.read_campaign import read_campaign
+from rigsight.workflow.run.kernels import checked_jobs
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
 FIGURE_FILE = "discovery.svg"
@@ -117,12 +119,11 @@ def discover_campaign(
         If the rig's own equations cannot be simulated near the records.
     """
     chosen = cast("Method", check_option("The method", method, METHODS))
-    check_takes("discover", campaign.rig, campaign.records)
-    task = discovery_task(campaign)
+    data = regression_data(campaign)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        found = discover(task, chosen, pointwise, seed, stage.finished, n_jobs)
+        found = discover(data, chosen, pointwise, seed, stage.finished, n_jobs)
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
         notes += tuple(closed_loop_notes(campaign.records, campaign.rig, "It is not used in a discovery."))
         factor = campaign.open_factor
@@ -130,31 +131,29 @@ def discover_campaign(
         found = replace(found, warnings=(*found.warnings, *notes))
         if not one_by_one:
             return found
-        alone = _one_by_one(campaign, task, chosen, pointwise, seed, n_jobs, stage.finished)
+        alone = _one_by_one(campaign, data, chosen, pointwise, seed, n_jobs, stage.finished)
         return replace(found, by_record=alone)
 
 
-def discovery_task(campaign: Campaign) -> Task:
-    """Return what is to be discovered in a campaign; records of a rig that drifts are cut into windows.
+def regression_data(campaign: Campaign) -> RegressionData:
+    """Return what of a campaign is regressed; records of a rig that drifts are cut into windows.
 
     Parameters
     ----------
     campaign
         A campaign that was read.
+
+    Raises
+    ------
+    InputError
+        If its rig of one motion is told in other words than the built-in ones, or records have constants of their own.
     """
-    no_spring = campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0
-    length = window_length(campaign.rig, campaign.estimation) if no_spring else None
+    _check_can_be_discovered(campaign)
+    no_spring = has_no_spring(campaign)
     floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
-    noise = {floor.output: floor.std for floor in floors}
-    factor = campaign.open_factor
-    return Task(
-        title=campaign.title,
-        rig=campaign.rig,
-        constants=campaign.constants,
-        records=cut(campaign.records, length),
-        noise=noise,
-        no_spring=no_spring,
-        held={} if factor is None else {factor.held: factor.value},
+    length = window_length(campaign.rig, campaign.estimation) if no_spring else None
+    return RegressionData(
+        campaign, {floor.output: floor.std for floor in floors}, cut(campaign.records, length)
     )
 
 
@@ -176,9 +175,27 @@ def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
     )
 
 
+def _check_can_be_discovered(campaign: Campaign) -> None:
+    """Refuse what a discovery would ignore: other words for one motion than the built-in rigs', constants of single records."""
+    rig = campaign.rig
+    if rig.has_one_motion and not is_built_in_motion(rig):
+        listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
+        raise InputError(
+            f"'rigsight discover' cannot take the rig '{rig.name}' of your own yet: of rigs of one motion it takes {listed}. "
+            "If the equation is the same, write it in their words."
+        )
+    for record in campaign.records:
+        if record.constants:
+            listed = ", ".join(record.constants)
+            raise InputError(
+                "'rigsight discover' cannot take constants that differ from record to record yet, and record "
+                f"'{record.name}' gives {listed}. Give them under [rig.constants], or leave the record out."
+            )
+
+
 def _one_by_one(
     campaign: Campaign,
-    task: Task,
+    data: RegressionData,
     method: Method,
     pointwise: bool,
     seed: int,
@@ -188,9 +205,9 @@ def _one_by_one(
     """Discover on each estimation record alone; where that fails, the reason stands in its place."""
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
-        own = [r for r in task.records if r.role == "validation" or r.name.startswith(record.name)]
+        own = [r for r in data.records if r.role == "validation" or r.name.startswith(record.name)]
         try:
-            return record.name, discover(replace(task, records=tuple(own)), method, pointwise, seed)
+            return record.name, discover(replace(data, windows=tuple(own)), method, pointwise, seed)
         except RigsightError as error:
             return record.name, str(error)
 

@@ -12,8 +12,8 @@ from rigsight.export import TARGETS, export_model
 from rigsight.rigs import Rig
 from rigsight.simulate.input_hold import Hold
 from rigsight.simulate.model import Model
-from rigsight.workflow.files.model_file import read_model
-from rigsight.workflow.files.results import check_target, write_together
+from rigsight.workflow.campaign.model_file import read_model
+from rigsight.workflow.run.results import check_target, write_together
 
 
 @dataclass(frozen=True)

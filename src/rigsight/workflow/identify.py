@@ -11,19 +11,18 @@ from typing import cast
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from rigsight.campaign import Campaign
 from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
-from rigsight.identify.record_identification import Wishes, identify_record
+from rigsight.identify.record_identification import EstimationOptions, identify_record
 from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.identify.transfer.record_response import METHODS, Method
 from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign, read_campaign
-from rigsight.workflow.diagnose import versions
-from rigsight.workflow.files.model_file import MODEL_FILE
-from rigsight.workflow.files.results import check_writable, json_text, write_together
+from rigsight.workflow.campaign.model_file import MODEL_FILE
+from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.identification.any_rig import IDENTIFYING, has_transfer_forms, identify_any_rig
 from rigsight.workflow.identification.figures import amplitudes_figure, identification_figures, view_figure
 from rigsight.workflow.identification.joint import identify_jointly
@@ -34,8 +33,10 @@ from rigsight.workflow.identification.warnings import (
     offsets_of_records,
     out_of_band,
 )
-from rigsight.workflow.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.versions import versions
 
 IDENTIFICATION_FILE = "identification.json"
 PAGE_FILE = "identification.html"
@@ -62,7 +63,7 @@ def run_identify(
     method
         Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     resolution
-        Width in frequency wished for [rad/s]; None takes what each record gives.
+        Width in frequency asked for [rad/s]; None takes what each record gives.
     n_jobs
         Records identified at the same time; None for one per processor.
     listener
@@ -71,20 +72,20 @@ def run_identify(
     Raises
     ------
     InputError
-        If the campaign cannot be used, a record is too short for the resolution wished for, no record shows the motion, or the
+        If the campaign cannot be used, a record is too short for the resolution asked for, no record shows the motion, or the
         results cannot be written; nothing is written then.
     """
-    wishes = checked_wishes(method, resolution)
+    options = checked_options(method, resolution)
     jobs = checked_jobs(n_jobs)
     if out is not None:
         check_writable(Path(out))
-    identification = identify_campaign(read_campaign(campaign), wishes, jobs, listener)
+    identification = identify_campaign(read_campaign(campaign), options, jobs, listener)
     if out is not None:
         write_identification(identification, Path(out), f"rigsight identify {campaign} --out {out}")
     return identification
 
 
-def checked_wishes(method: str, resolution: float | None) -> Wishes:
+def checked_options(method: str, resolution: float | None) -> EstimationOptions:
     """Return how records are to be read.
 
     Parameters
@@ -100,11 +101,11 @@ def checked_wishes(method: str, resolution: float | None) -> Wishes:
     check_option("The method", method, METHODS)
     if resolution is not None and not (math.isfinite(resolution) and resolution > 0.0):
         raise InputError(f"The resolution must be a positive number of rad/s, got {resolution!r}.")
-    return Wishes(cast("Method", method), resolution)
+    return EstimationOptions(cast("Method", method), resolution)
 
 
 def identify_campaign(
-    campaign: Campaign, wishes: Wishes, n_jobs: int = 1, listener: Listener = silent
+    campaign: Campaign, options: EstimationOptions, n_jobs: int = 1, listener: Listener = silent
 ) -> Identification:
     """Identify each estimation record, then all of them together, and score the validation records.
 
@@ -112,7 +113,7 @@ def identify_campaign(
     ----------
     campaign
         A campaign that was read or made of records.
-    wishes
+    options
         How its records are to be read.
     n_jobs
         Records identified at the same time.
@@ -122,10 +123,10 @@ def identify_campaign(
     Raises
     ------
     InputError
-        If a record is too short for the resolution wished for, or no record shows the motion.
+        If a record is too short for the resolution asked for, or no record shows the motion.
     """
     if not has_transfer_forms(campaign):
-        return identify_any_rig(campaign, wishes, n_jobs, listener)
+        return identify_any_rig(campaign, options, n_jobs, listener)
     no_spring = campaign.parameters.get("k") == 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
@@ -134,7 +135,7 @@ def identify_campaign(
     with threadpool_limits(limits=1, user_api="blas"):
         parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
         for record in parallel(
-            delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, wishes)
+            delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, options)
             for record in campaign.estimation
         ):
             found.append(record)
@@ -150,7 +151,7 @@ def identify_campaign(
     identification = Identification(
         title=campaign.title,
         rig=campaign.rig.name,
-        method=wishes.method,
+        method=options.method,
         units=units,
         records=tuple(found),
         amplitude_statement=statement,

@@ -19,10 +19,10 @@ from rigsight.records.read_record import TIME
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector, record_input, record_values, rest_state, simulate
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.given_simulation import checked_numbers
-from rigsight.workflow.campaigns.where import Where
-from rigsight.workflow.files.model_file import MODEL_FILE, read_model
-from rigsight.workflow.files.results import check_target, write_together
+from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.model_file import MODEL_FILE, read_model
+from rigsight.workflow.campaign.where import Where
+from rigsight.workflow.run.results import check_target, write_together
 
 _DIGITS = "%.12g"
 

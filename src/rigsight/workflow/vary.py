@@ -18,11 +18,11 @@ from rigsight.plot.variation import Curve, picture_files, varied_responses
 from rigsight.records import Record
 from rigsight.simulate import simulate
 from rigsight.simulate.model import Model
-from rigsight.workflow.files.model_file import named_model
-from rigsight.workflow.files.results import check_writable, json_text, write_together
-from rigsight.workflow.kernels import prepare_kernels
-from rigsight.workflow.progress import Listener, Stage, silent
-from rigsight.workflow.variation_sweep import MARGIN, Pair, variation_sweep
+from rigsight.workflow.campaign.model_file import named_model
+from rigsight.workflow.run.kernels import prepare_kernels
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import check_writable, json_text, write_together
+from rigsight.workflow.run.variation_sweep import MARGIN, Pair, variation_sweep
 
 VARY_FILE = "vary.json"
 VARYING = "Sweeping"

@@ -20,8 +20,8 @@ from rigsight.identify import characteristic_scales
 from rigsight.rigs import RIGS
 from rigsight.simulate import compose
 from rigsight.units import characteristic_value
-from rigsight.workflow.blind_bench.files import BenchFolder
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.bench.files import BenchFolder
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 SEED = 7
 SIZES = Sizes(x=0.1, v=1.0, force=5.0, stiffness=50.0, input=2.0)

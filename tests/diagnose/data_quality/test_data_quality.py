@@ -25,7 +25,7 @@ from rigsight.identify import characteristic_scales, linear_start
 from rigsight.records import Hold, Record
 from rigsight.rigs import AXIS, ELEMENT, RIGS, RUNNING_GEAR, Rig
 from rigsight.simulate import compose, simulate
-from rigsight.workflow.campaigns.campaign import read_campaign
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 CONSTANTS = {"gain": 1.0}
 VALUES = {**CONSTANTS, "m": 2.0, "d": 5.0, "k": 800.0, "x_off": 0.0, "force_off": 0.0}

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, diagnose
 from rigsight.diagnose.search.starts import restart_values
 from rigsight.effects import effect_named
 from rigsight.excitation import linear_sweep
@@ -38,7 +39,7 @@ TRUTHS = {
 }
 
 
-def recorded(truth: Mapping[str, float], draw: int = 0, disturbance: int = 0) -> Task:
+def recorded(truth: Mapping[str, float], draw: int = 0, disturbance: int = 0) -> Campaign:
     """Records with a draw of noise, and on request disturbed by 1e-9 of it."""
     noise, rounding = np.random.default_rng(draw), np.random.default_rng([draw, disturbance])
     t = DT * np.arange(2000)
@@ -54,7 +55,7 @@ def recorded(truth: Mapping[str, float], draw: int = 0, disturbance: int = 0) ->
         if disturbance:
             x = x + rounding.normal(scale=1e-9 * NOISE, size=t.size)
         records.append(clean.with_signals(x=x))
-    return Task("memory", AXIS, {"gain": 1.0}, {}, tuple(records))
+    return Campaign("memory", AXIS, {"gain": 1.0}, {}, tuple(records))
 
 
 @cache

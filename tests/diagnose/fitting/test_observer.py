@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rigsight.diagnose import Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.observer import Observer, followed_sensors, structures_to_fit
 from rigsight.diagnose.search.horizon import windowing_of
 from rigsight.effects import CATALOGUE, effect_named, placed
@@ -125,12 +126,14 @@ def test_an_observer_is_no_part_of_a_result() -> None:
 
 def test_only_a_rig_that_drifts_is_followed_and_by_sensors_of_its_motion() -> None:
     records = stage({})
-    assert followed_sensors(Task("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)) == ("x",)
-    assert followed_sensors(Task("s", ELEMENT, {}, {}, (Record("r", DT, {"x": T, "force": T}, {}),))) == ()
-    sprung = Task("s", AXIS, {"gain": 1.0}, {"k": 50.0}, records)
+    assert followed_sensors(Campaign("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)) == ("x",)
+    assert (
+        followed_sensors(Campaign("s", ELEMENT, {}, {}, (Record("r", DT, {"x": T, "force": T}, {}),))) == ()
+    )
+    sprung = Campaign("s", AXIS, {"gain": 1.0}, {"k": 50.0}, records)
     assert structures_to_fit(sprung, [compose(AXIS)]) == [compose(AXIS)]
-    task = Task("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)
-    (structure,) = structures_to_fit(task, [compose(AXIS)])
+    campaign = Campaign("s", AXIS, {"gain": 1.0}, {"k": 0.0}, records)
+    (structure,) = structures_to_fit(campaign, [compose(AXIS)])
     assert structure.observed == ("x",)
 
 
@@ -139,10 +142,10 @@ def test_friction_of_a_disturbed_stage_is_named_with_its_numbers(disturbance: fl
     """In free runs or long windows the drift that the disturbance makes hides the friction (97 and 15 % of the gap closed)."""
     names = ("coulomb_friction", "quadratic_damping", "flexible_mode", "input_dead_zone", "backlash")
     effects = [effect for effect in CATALOGUE if effect.name in names]
-    task = Task(
+    campaign = Campaign(
         "s", AXIS, {"gain": 1.0}, {"k": 0.0}, stage({"coulomb_friction": {"T_c": FRICTION}}, disturbance)
     )
-    found = diagnose(task, effects)
+    found = diagnose(campaign, effects)
     assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
     numbers = found.candidates[0].parameters
     assert numbers["T_c"].value == pytest.approx(FRICTION, rel=0.15)
@@ -153,8 +156,8 @@ def test_friction_of_a_disturbed_stage_is_named_with_its_numbers(disturbance: fl
 def test_a_spring_that_nobody_left_out_and_that_is_not_there_is_found_to_be_none() -> None:
     names = ("coulomb_friction", "bouc_wen_hysteresis", "quadratic_damping")
     effects = [effect for effect in CATALOGUE if effect.name in names]
-    task = Task("s", AXIS, {"gain": 1.0}, {}, stage({"coulomb_friction": {"T_c": FRICTION}}, 0.3))
-    found = diagnose(task, effects)
+    campaign = Campaign("s", AXIS, {"gain": 1.0}, {}, stage({"coulomb_friction": {"T_c": FRICTION}}, 0.3))
+    found = diagnose(campaign, effects)
     assert found.bandwidth is not None
     assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
     stiffness = found.candidates[0].parameters["k"]
@@ -221,8 +224,8 @@ def test_noise_that_is_followed_shows_in_a_pressure_and_counts_as_its_floor(tmp_
         shown = {name: run[name] + rng.normal(scale=std, size=T.size) for name, std in noise.items()}
         records.append(run.with_signals(**shown))
     given = {name: value for name, value in truth.items() if name not in ("area", "T_c")}
-    task = Task("cylinder", rig, {"area": 1e-3}, given, tuple(records))
-    windowing, amplified = windowing_of(task, noise, 1)
+    campaign = Campaign("cylinder", rig, {"area": 1e-3}, given, tuple(records))
+    windowing, amplified = windowing_of(campaign, noise, 1)
     left = {}
     for bandwidth in (100.0, windowing.bandwidth):
         (record,) = Observer(("position",), bandwidth).following(records[1:2])

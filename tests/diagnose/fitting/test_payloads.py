@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, diagnose
 from rigsight.effects import effect_named
 from rigsight.records import Record
 from rigsight.records.record import Role
@@ -80,8 +81,8 @@ def record(effect: str, own: Mapping[str, float], payload: float, role: Role, se
 def diagnosed(effect: str, own: Mapping[str, float], payloads: tuple[float, ...]) -> Diagnosis:
     records = [record(effect, own, payload, "estimation", i) for i, payload in enumerate(payloads)]
     records.append(record(effect, own, payloads[0], "validation", len(payloads)))
-    task = Task("lift", RIG, {"m": payloads[0]}, GIVEN, tuple(records))
-    return diagnose(task, [effect_named(f"{name}@guide") for name in TRIED])
+    campaign = Campaign("lift", RIG, {"m": payloads[0]}, GIVEN, tuple(records))
+    return diagnose(campaign, [effect_named(f"{name}@guide") for name in TRIED])
 
 
 @pytest.mark.parametrize(

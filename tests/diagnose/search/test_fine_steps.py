@@ -9,15 +9,14 @@ from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.diagnose.search.single_effects import reidentify
 from rigsight.identify import IdleThreads
-from rigsight.workflow.campaigns.campaign import read_campaign
-from rigsight.workflow.diagnose import task_of
+from rigsight.workflow.campaign.read_campaign import read_campaign
 
 
 def test_a_mass_that_samples_do_not_show_is_not_followed_to_zero(shared_data: Path) -> None:
     # At 50 samples a second the pole of a measured servo went to -1073 rad/s, in 16 steps a sample, for a thousandth of the cost.
-    task = task_of(read_campaign(shared_data / "so101" / "elbow" / "campaign.toml"))
-    noise = {floor.output: floor.std for floor in noise_floors(task.rig, task.records)}
-    context = fit_context_of(task, noise, Windowing(), None, IdleThreads())
+    campaign = read_campaign(shared_data / "so101" / "elbow" / "campaign.toml")
+    noise = {floor.output: floor.std for floor in noise_floors(campaign.rig, campaign.records)}
+    context = fit_context_of(campaign, noise, Windowing(), None, IdleThreads())
     reidentified = reidentify(context, context.start)
     assert max(reidentified.fit.substeps) <= 4
     finest = context.problem(reidentified.fit.structure, context.estimation).fit(

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.preparation import fit_context_of
-from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.diagnose.search.single_effects import fit_candidates, reidentify
 from rigsight.effects import effect_named, placed
@@ -66,8 +66,8 @@ def test_a_law_about_zero_does_no_harm_to_a_pendulum_that_hangs_at_pi(tmp_path: 
         records.append(
             Record(f"decay_{i}", dt, {"angle": angle + noise * rng.standard_normal(t.size)}, {}, role=role)
         )
-    task = Task("pendulum", rig, {"J": 1.0}, {}, tuple(records))
-    context = fit_context_of(task, {"angle": noise}, Windowing(), None, IdleThreads(1))
+    campaign = Campaign("pendulum", rig, {"J": 1.0}, {}, tuple(records))
+    context = fit_context_of(campaign, {"angle": noise}, Windowing(), None, IdleThreads(1))
     reidentified = reidentify(context, context.start)
     (model,) = fit_candidates(context, reidentified, [effect_named("cubic_stiffness")])
     assert model.fit.cost < 1.01 * reidentified.fit.cost

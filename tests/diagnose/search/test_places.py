@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Task, candidates_on, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import candidates_on, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.search.places import search_places
 from rigsight.diagnose.search.single_effects import reidentify
@@ -46,7 +47,7 @@ def test_the_place_comes_first(train: Any, name: str, place: str, values: dict[s
 
 def test_effect_and_place_are_named(train: Any) -> None:
     records = train.records([placed(effect_named("quadratic_damping"), "load_bearing")], {"c_2": 2e-4})
-    found = diagnose(Task("train", TRAIN, {"k_t": 0.05}, {}, records), EFFECTS[:2])
+    found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, records), EFFECTS[:2])
     assert (found.verdict, found.effects) == ("effect", ("quadratic_damping@load_bearing",))
     told = found.to_json()
     assert (told["effects"], told["where"]) == (["quadratic_damping"], ["load_bearing"])
@@ -59,6 +60,8 @@ def test_effect_and_place_are_named(train: Any) -> None:
 def test_a_record_may_lack_a_sensor(train: Any) -> None:
     records = train.records()
     partial = replace(records[1], signals={n: s for n, s in records[1].signals.items() if n != "motor_angle"})
-    found = diagnose(Task("train", TRAIN, {"k_t": 0.05}, {}, (records[0], partial, records[2])), EFFECTS[:1])
+    found = diagnose(
+        Campaign("train", TRAIN, {"k_t": 0.05}, {}, (records[0], partial, records[2])), EFFECTS[:1]
+    )
     assert found.verdict == "none"
     assert np.isfinite(found.gap["motor_angle"].after)

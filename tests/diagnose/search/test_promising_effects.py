@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, liveliest
 from rigsight.diagnose.search.places import Search, search_places
 from rigsight.diagnose.search.screening import Lineup
@@ -48,8 +49,8 @@ def records(effects: Sequence[str], values: Mapping[str, float]) -> tuple[Record
 
 
 def diagnosed(effects: Sequence[str], values: Mapping[str, float], tried: Sequence[str]) -> Diagnosis:
-    task = Task("stage", AXIS, {"gain": 1.0}, {}, records(effects, values))
-    return diagnose(task, [effect_named(name) for name in tried])
+    campaign = Campaign("stage", AXIS, {"gain": 1.0}, {}, records(effects, values))
+    return diagnose(campaign, [effect_named(name) for name in tried])
 
 
 def looked_at(name: str, values: Mapping[str, float]) -> tuple[Search, list[Effect]]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rigsight.diagnose import Diagnosis, Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import Diagnosis, diagnose
 from rigsight.effects import Effect, effect_named
 from rigsight.excitation import log_sweep
 from rigsight.records import Record
@@ -41,8 +42,8 @@ def measured(effects: Sequence[str], own: dict[str, float], n_samples: int = 800
 
 
 def diagnosed(records: Sequence[Record], effects: Sequence[Effect]) -> Diagnosis:
-    task = Task("play", AXIS, {"gain": RIG["gain"]}, {}, tuple(records))
-    return diagnose(task, effects)
+    campaign = Campaign("play", AXIS, {"gain": RIG["gain"]}, {}, tuple(records))
+    return diagnose(campaign, effects)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import kstest
 
-from rigsight.diagnose import Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.fitting.observer import Observer
 from rigsight.diagnose.policy import TRUST
@@ -287,7 +288,7 @@ def test_a_diagnosis_carries_it() -> None:
     records = axis_records((1.0, 4.0, 0.5), effects, {"T_c": 0.3})
     named = tuple(replace(r, role="validation" if i == 2 else "estimation") for i, r in enumerate(records))
     given = {"m": 1.0, "d": 2.5, "k": 95.0, "x_off": 0.0, "force_off": 0.0}
-    found = diagnose(Task("axis", AXIS, {"gain": 1.0}, given, named), list(effects))
+    found = diagnose(Campaign("axis", AXIS, {"gain": 1.0}, given, named), list(effects))
     assert found.effects == ("coulomb_friction",)
     told = found.to_json()["trust"]
     assert told["stable"]

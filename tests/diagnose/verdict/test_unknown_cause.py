@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.fit_context import liveliest
 from rigsight.diagnose.verdict.unknown_cause import traced_to
 from rigsight.discover import JointForce, JointLaw
@@ -32,7 +33,7 @@ def without(record: Record, sensor: str) -> Record:
 def test_a_missing_force_is_traced_to_its_joint(train: Any) -> None:
     """Neither candidate is the quadratic damping of the load; no push of theirs takes much of the gap away."""
     records = replace(train, n_samples=240).records(HIDDEN, {"c_2": 1e-3})
-    found = diagnose(Task("train", TRAIN, {"k_t": 0.05}, {}, records), [effect_named("sensor_lag")])
+    found = diagnose(Campaign("train", TRAIN, {"k_t": 0.05}, {}, records), [effect_named("sensor_lag")])
     assert (found.verdict, found.where) == ("unknown", ("load_bearing",))
     told = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert told["missing_force"] is None

@@ -11,16 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.drift import can_drift
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
-from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import WINDOW
 from rigsight.diagnose.policy import SEARCH, VERDICT
 from rigsight.effects import Effect, Place
 from rigsight.identify import OFFSETS_MEND, DifferingMeans, differing_means, swallowed_by_offsets
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
+from rigsight.simulate.drift import can_drift
 
 _TOLERANCE = 1e-5
 _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to have it so in every command.'
@@ -143,9 +143,9 @@ def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
     return differing_means(names, records, residuals, [signal.name for signal in context.rig.outputs])
 
 
-def with_offsets_free(task: Task) -> Task:
-    """Return a task in which each sensor has an offset of its own in each record."""
-    return replace(task, records=_freed(task.rig, task.records))
+def with_offsets_free(campaign: Campaign) -> Campaign:
+    """Return a campaign in which each sensor has an offset of its own in each record."""
+    return replace(campaign, records=_freed(campaign.rig, campaign.records))
 
 
 def _remembers(effects: Iterable[Effect]) -> bool:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from rigsight.diagnose.fitting.task import Task
+from rigsight.campaign import Campaign
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate import Structure, compose, structure_of_fit
@@ -49,22 +49,22 @@ def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
     return frozenset(sensor for record in records for sensor in record.observed)
 
 
-def followed_sensors(task: Task) -> tuple[str, ...]:
-    """Return the sensors that models of a task can follow: those that show nothing but the motion.
+def followed_sensors(campaign: Campaign) -> tuple[str, ...]:
+    """Return the sensors that models of a campaign can follow: those that show nothing but the motion.
 
     Parameters
     ----------
-    task
+    campaign
         Records and the simulation in question.
     """
-    shown = {name for record in task.records for name in record.signals}
-    return tuple(name for name in sensors_of_motion(task.rig) if name in shown)
+    shown = {name for record in campaign.records for name in record.signals}
+    return tuple(name for name in sensors_of_motion(campaign.rig) if name in shown)
 
 
-def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Structure]:
-    """Return structures as they are simulated in fits to the records of a task: with free offsets and with an observer."""
-    any_bandwidth = Observer(followed_sensors(task) if task.drifts else (), 0.0)
-    records = any_bandwidth.following(task.records)
+def structures_to_fit(campaign: Campaign, structures: Iterable[Structure]) -> list[Structure]:
+    """Return structures as they are simulated in fits to the records of a campaign: with free offsets and with an observer."""
+    any_bandwidth = Observer(followed_sensors(campaign) if campaign.drifts else (), 0.0)
+    records = any_bandwidth.following(campaign.records)
     return [structure_of_fit(structure, records) for structure in structures]
 
 

@@ -1,11 +1,11 @@
-"""What are the candidates of a task fitted with: which records, scales, start values, and which numbers are held?"""
+"""What are the candidates of a campaign fitted with: which records, scales, start values, and which numbers are held?"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.fit_context import FitContext, liveliest, until_rest
-from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing
 from rigsight.identify import (
     FitMemory,
@@ -21,17 +21,17 @@ Prepare = Callable[[Sequence[Structure]], None]
 
 
 def fit_context_of(
-    task: Task,
+    campaign: Campaign,
     noise: Mapping[str, float],
     windowing: Windowing,
     memory: FitMemory | None,
     threads: IdleThreads,
 ) -> FitContext:
-    """Return what candidates of a task are fitted and scored with.
+    """Return what candidates of a campaign are fitted and scored with.
 
     Parameters
     ----------
-    task
+    campaign
         Records and the simulation in question.
     noise
         Noise floor of each output.
@@ -40,51 +40,60 @@ def fit_context_of(
     memory, threads
         As of `FitContext`.
     """
-    start = start_values_of(task)
-    fitted = windowing.cut(task.estimation)
-    moving = until_rest(fitted, task.rig)
-    held = _held(task)
-    asked = [p.name for p in task.rig.parameters if p.name not in held]
-    scales = characteristic_scales(task.rig, task.estimation, start)
-    held |= frozenset(swallowed_by_offsets(compose(task.rig), task.estimation, scales, noise, start, asked))
+    start = start_values_of(campaign)
+    fitted = windowing.cut(campaign.estimation)
+    moving = until_rest(fitted, campaign.rig)
+    held = _held(campaign)
+    asked = [p.name for p in campaign.rig.parameters if p.name not in held]
+    scales = characteristic_scales(campaign.rig, campaign.estimation, start)
+    held |= frozenset(
+        swallowed_by_offsets(compose(campaign.rig), campaign.estimation, scales, noise, start, asked)
+    )
     return FitContext(
-        rig=task.rig,
+        rig=campaign.rig,
         estimation=fitted,
-        look=liveliest(moving, task.rig),
-        scoring=windowing.cut(task.validation or task.estimation),
+        look=liveliest(moving, campaign.rig),
+        scoring=windowing.cut(campaign.validation or campaign.estimation),
         scales=scales,
         noise=noise,
         held=held,
         start=start,
-        given=task.given,
-        modelled=task.modelled,
+        given=campaign.given,
+        modelled=campaign.modelled,
         memory=memory,
         threads=threads,
     )
 
 
-def start_values_of(task: Task) -> dict[str, float]:
+def start_values_of(campaign: Campaign) -> dict[str, float]:
     """Return values of all constants and parameters before any fit."""
-    held = {} if task.absent_spring is None else {task.absent_spring: 0.0}
-    if task.open_factor is not None:
-        held[task.open_factor.held] = task.open_factor.value
-    start = {**task.constants, **linear_start(task.rig, task.estimation, task.constants, held)}
+    held = {} if campaign.absent_spring is None else {campaign.absent_spring: 0.0}
+    if campaign.open_factor is not None:
+        held[campaign.open_factor.held] = campaign.open_factor.value
+    start = {
+        **campaign.constants,
+        **linear_start(campaign.rig, campaign.estimation, campaign.constants, held),
+    }
     # Numbers fitted without the effects that the simulation has are farther off than those it came with.
-    return {**start, **task.given} if task.modelled or task.rig.mechanism.bodies_are_nonlinear else start
+    return (
+        {**start, **campaign.given}
+        if campaign.modelled or campaign.rig.mechanism.bodies_are_nonlinear
+        else start
+    )
 
 
-def _held(task: Task) -> frozenset[str]:
+def _held(campaign: Campaign) -> frozenset[str]:
     """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
-    held = set() if task.absent_spring is None else {task.absent_spring}
-    if task.open_factor is not None:
-        held.add(task.open_factor.held)
-    if not task.rig.has_one_motion:
+    held = set() if campaign.absent_spring is None else {campaign.absent_spring}
+    if campaign.open_factor is not None:
+        held.add(campaign.open_factor.held)
+    if not campaign.rig.has_one_motion:
         return frozenset(held)
     unmeasured = [
         symbol
-        for symbol in task.rig.downstream
-        if not any(symbol.name in record for record in task.estimation)
+        for symbol in campaign.rig.downstream
+        if not any(symbol.name in record for record in campaign.estimation)
     ]
     if unmeasured:
-        held |= task.rig.downstream_parameters
+        held |= campaign.rig.downstream_parameters
     return frozenset(held)

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.fit_context import FitContext
 from rigsight.diagnose.fitting.observer import Observer, followed_sensors
 from rigsight.diagnose.fitting.preparation import Prepare, fit_context_of, start_values_of
-from rigsight.diagnose.fitting.task import Task
 from rigsight.diagnose.fitting.windows import Windowing, typical_period, window_length
 from rigsight.diagnose.policy import HORIZON, VERDICT
 from rigsight.diagnose.search.single_effects import reidentify
@@ -20,17 +20,19 @@ from rigsight.rigs import evaluated
 from rigsight.simulate import parameter_vector, simulate_outputs, structure_of_fit
 
 
-def brings_back(task: Task) -> bool:
+def brings_back(campaign: Campaign) -> bool:
     """Return True if a spring brings one mass back before the loosest observer would: weaker ones let errors of force add up."""
-    if not (task.rig.has_one_motion and task.rig.is_driven):
+    if not (campaign.rig.has_one_motion and campaign.rig.is_driven):
         return True
-    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
-    motion, values = task.rig.motion, start_values_of(task)
+    typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
+    motion, values = campaign.rig.motion, start_values_of(campaign)
     numbers = [evaluated(part, values) for part in (motion.inertia, motion.damping, motion.stiffness)]
     return bool(np.min(np.abs(np.roots(numbers))) >= HORIZON.observer_loose * typical)
 
 
-def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[Windowing, dict[str, float]]:
+def windowing_of(
+    campaign: Campaign, noise: Mapping[str, float], n_jobs: int
+) -> tuple[Windowing, dict[str, float]]:
     """Return how records of a rig that drifts are compared with models: by an observer.
 
     The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
@@ -39,7 +41,7 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[W
 
     Parameters
     ----------
-    task
+    campaign
         Records and the simulation in question.
     noise
         Noise floor of each output.
@@ -53,18 +55,18 @@ def windowing_of(task: Task, noise: Mapping[str, float], n_jobs: int) -> tuple[W
     amplified
         What a true model then leaves of each output's noise, in units of it; at least 1.
     """
-    sensors = followed_sensors(task)
+    sensors = followed_sensors(campaign)
     if not sensors:
-        return Windowing(window_length(task.rig, task.estimation)), dict.fromkeys(noise, 1.0)
-    typical = 2.0 * np.pi / typical_period(task.rig, task.estimation)
+        return Windowing(window_length(campaign.rig, campaign.estimation)), dict.fromkeys(noise, 1.0)
+    typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
     bandwidth = min(
         HORIZON.observer_close * typical,
-        HORIZON.observer_sampling / max(record.dt for record in task.records),
+        HORIZON.observer_sampling / max(record.dt for record in campaign.records),
     )
     values: Mapping[str, float] | None = None
     while True:
         windowing = Windowing(observer=Observer(sensors, bandwidth))
-        context = fit_context_of(task, noise, windowing, None, IdleThreads(n_jobs))
+        context = fit_context_of(campaign, noise, windowing, None, IdleThreads(n_jobs))
         reidentified = reidentify(context, values or context.start)
         amplified = noise_of_following(context, reidentified.fit)
         shows = (

@@ -17,9 +17,9 @@ from rigsight.discover.held_out import split
 from rigsight.discover.joints.joint_force import JointForce, missing_forces, not_contradicted
 from rigsight.discover.joints.joint_law import LawTerm
 from rigsight.discover.regression import information_criterion
+from rigsight.discover.regression_data import RegressionData
 from rigsight.discover.result import Alternative, Coefficient, Discovery, Run, Term
 from rigsight.discover.selection import STRONG, independent_samples
-from rigsight.discover.task import Task
 from rigsight.discover.terms.equations import equations
 from rigsight.effects import effect_named, placed
 from rigsight.effects.placed import kind_of
@@ -60,13 +60,13 @@ class _Polished:
 
 
 def discover_at_joints(
-    task: Task, seed: int = 0, progress: Callable[[str], None] | None = None, n_jobs: int = 1
+    data: RegressionData, seed: int = 0, progress: Callable[[str], None] | None = None, n_jobs: int = 1
 ) -> Discovery:
     """Discover which force is missing at which joint, and complete the rig's equations with its law.
 
     Parameters
     ----------
-    task
+    data
         Records and rig.
     seed
         Seed of the ensembles.
@@ -83,16 +83,16 @@ def discover_at_joints(
         If the rig's own equations cannot be simulated near the records.
     """
     say = progress or (lambda _: None)
-    polisher = _Polisher(task, IdleThreads(n_jobs))
+    polisher = _Polisher(data, IdleThreads(n_jobs))
     alone = polisher.polished((), polisher.start)
     if not math.isfinite(alone.fit.cost):
         raise SimulationError(
-            f"The equations of {task.rig.name} cannot be simulated near these records: {alone.fit.message}"
+            f"The equations of {data.rig.name} cannot be simulated near these records: {alone.fit.message}"
         )
     say("re-identified")
-    known = {**task.constants, **alone.fit.values}
+    known = {**data.campaign.constants, **alone.fit.values}
     centered = without_offsets(polisher.estimation, alone.fit)
-    joints = missing_forces(task.rig, centered, known, task.noise, np.random.default_rng(seed))
+    joints = missing_forces(data.rig, centered, known, data.noise, np.random.default_rng(seed))
     say("missing forces")
     found = [alone]
     # The law of a joint that is ruled out is not polished.
@@ -102,7 +102,7 @@ def discover_at_joints(
             found.append(polisher.polished(force.law.terms, start))
             say(", ".join(term.effect.name for term in force.law.terms))
     found += _shorter(polisher, min(found, key=lambda one: one.error_over_noise), say)
-    return _assembled(task, polisher, found, joints)
+    return _assembled(data, polisher, found, joints)
 
 
 def _shorter(polisher: _Polisher, best: _Polished, say: Callable[[str], None]) -> list[_Polished]:
@@ -142,13 +142,16 @@ def _simpler(one: _Polished) -> list[tuple[LawTerm, ...]]:
 class _Polisher:
     """Fits the rig with terms at its joints, and scores it on records it has not seen."""
 
-    def __init__(self, task: Task, threads: IdleThreads) -> None:
-        self.rig, self.noise, self._threads = task.rig, task.noise, threads
-        self._free = {p.name for p in task.rig.parameters if p.fitted} - set(task.held)
-        self.estimation, self.held_out, self.how = split(task)
-        self.start = {**task.constants, **linear_start(task.rig, self.estimation, task.constants, task.held)}
-        self._scales = characteristic_scales(task.rig, self.estimation, self.start)
-        structure, asked = compose(task.rig), sorted(self._free)
+    def __init__(self, data: RegressionData, threads: IdleThreads) -> None:
+        self.rig, self.noise, self._threads = data.rig, data.noise, threads
+        self._free = {p.name for p in data.rig.parameters if p.fitted} - set(data.held)
+        self.estimation, self.held_out, self.how = split(data)
+        self.start = {
+            **data.campaign.constants,
+            **linear_start(data.rig, self.estimation, data.campaign.constants, data.held),
+        }
+        self._scales = characteristic_scales(data.rig, self.estimation, self.start)
+        structure, asked = compose(data.rig), sorted(self._free)
         self._free -= set(
             swallowed_by_offsets(structure, self.estimation, self._scales, self.noise, self.start, asked)
         )
@@ -176,9 +179,9 @@ class _Polisher:
 
 
 def _assembled(
-    task: Task, polisher: _Polisher, found: Sequence[_Polished], joints: tuple[JointForce, ...]
+    data: RegressionData, polisher: _Polisher, found: Sequence[_Polished], joints: tuple[JointForce, ...]
 ) -> Discovery:
-    rig, held_out = task.rig, polisher.held_out
+    rig, held_out = data.rig, polisher.held_out
     finest = min(found, key=lambda one: one.error_over_noise)
     if not math.isfinite(finest.error_over_noise):
         raise SimulationError("The polished equations cannot be simulated on the held-out records.")
@@ -205,10 +208,10 @@ def _assembled(
         for name in chosen.fit.free
     }
     own = {p.name for p in rig.parameters}
-    nrmse, floor = _relative(rig, task.noise, held_out, chosen)
+    nrmse, floor = _relative(rig, data.noise, held_out, chosen)
     first = rig.outputs[0]
     return Discovery(
-        title=task.title,
+        title=data.campaign.title,
         rig=rig.name,
         method="discrepancy",
         form="linearized responses",

@@ -155,7 +155,7 @@ def search(
 
     generation = 0
 
-    def told(*_: object) -> None:
+    def count_generation(*_: object) -> None:
         nonlocal generation
         generation += 1
         if progress is not None:
@@ -176,7 +176,7 @@ def search(
         polish=False,
         updating="deferred",
         vectorized=True,
-        callback=told,
+        callback=count_generation,
     )
     # The population ends in one basin, which the costs of a coarse simulation may mistake; others were seen on the way.
     places, costs = np.concatenate(seen), np.concatenate(paid)

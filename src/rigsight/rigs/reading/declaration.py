@@ -18,7 +18,7 @@ from rigsight.rigs.reading.expressions import (
     parsed,
     rate_name,
 )
-from rigsight.rigs.reading.rig_tables import RigTable, told
+from rigsight.rigs.reading.rig_tables import RigTable, path_and_sentence
 
 Path = tuple[str | int, ...]
 
@@ -71,7 +71,7 @@ class Declaration:
         except ValidationError as error:
             # A key that is missing may be the one that is misspelled.
             first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-            self.refuse(*told(first))
+            self.refuse(*path_and_sentence(first))
         self.expressions: dict[Path, Expression] = {}
         self._parse()
         self.symbols = self._declared_symbols()

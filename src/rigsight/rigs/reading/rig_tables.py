@@ -130,7 +130,7 @@ _FORMULA = "constrained-str"
 """What pydantic appends to the path of a formula that is no text."""
 
 
-def told(error: Any) -> tuple[tuple[str | int, ...], str]:
+def path_and_sentence(error: Any) -> tuple[tuple[str | int, ...], str]:
     """Return the path of what pydantic found, and one sentence for it.
 
     Parameters

@@ -9,6 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.errors import SimulationError, check_option
 from rigsight.identify import (
@@ -30,7 +31,7 @@ from rigsight.identify.identification import (
 )
 from rigsight.identify.information import Information, information
 from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
-from rigsight.identify.record_identification import Wishes, measured_amplitude
+from rigsight.identify.record_identification import EstimationOptions, measured_amplitude
 from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
@@ -39,15 +40,14 @@ from rigsight.rigs import Rig, is_built_in_motion
 from rigsight.simulate import Structure, compose
 from rigsight.simulate.linearization import Linearization
 from rigsight.simulate.model import Model
-from rigsight.workflow.campaigns.campaign import Campaign
 from rigsight.workflow.identification.joint import fit_any_rig_jointly, held_parameters, parent
 from rigsight.workflow.identification.warnings import (
     any_rig_warnings,
     beyond_identified_amplitudes,
     offsets_of_records,
 )
-from rigsight.workflow.kernels import prepare_kernels
-from rigsight.workflow.progress import Listener, Stage
+from rigsight.workflow.run.kernels import prepare_kernels
+from rigsight.workflow.run.progress import Listener, Stage
 
 IDENTIFYING = "Identifying"
 METHODS = ("local_rational", "local_polynomial")
@@ -71,14 +71,16 @@ def has_transfer_forms(campaign: Campaign) -> bool:
     return not any(is_constant(record[rig.inputs[0].name]) for record in campaign.estimation)
 
 
-def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: Listener) -> Identification:
+def identify_any_rig(
+    campaign: Campaign, options: EstimationOptions, n_jobs: int, listener: Listener
+) -> Identification:
     """Identify a rig of any shape.
 
     Parameters
     ----------
     campaign
         A campaign that was read or made of records.
-    wishes
+    options
         How its records are to be read.
     n_jobs
         Records read at the same time.
@@ -90,7 +92,7 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
     InputError
         If the method cannot tell inputs apart.
     """
-    check_option("The method for a rig of several inputs or sensors", wishes.method, METHODS)
+    check_option("The method for a rig of several inputs or sensors", options.method, METHODS)
     rig, structure = campaign.rig, compose(campaign.rig)
     records = campaign.estimation
     prepare_kernels([structure], n_jobs, listener)
@@ -98,7 +100,7 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
     found = []
     with threadpool_limits(limits=1, user_api="blas"):
         parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
-        for record in parallel(delayed(_record)(record, rig, wishes) for record in records):
+        for record in parallel(delayed(_record)(record, rig, options) for record in records):
             found.append(record)
             stage.finished(record.record.name)
         factor = campaign.open_factor
@@ -111,7 +113,7 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
         known, joint = _with_errors(joint, structure, cut(records, length), factor)
         found = [_with_own(record, joint, rig) for record in found]
         stage.finished("what is identifiable")
-        views = tuple(_views(structure, joint.fit.fit.values, records, wishes, known))
+        views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
     units = {p.name: p.unit for p in structure.parameters}
     units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
     statement, changing = amplitude_dependence(found, units, units.get(found[0].source, ""))
@@ -124,7 +126,7 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
     identification = Identification(
         title=campaign.title,
         rig=rig.name,
-        method=wishes.method,
+        method=options.method,
         units=units,
         records=tuple(found),
         amplitude_statement=statement,
@@ -145,9 +147,9 @@ def identify_any_rig(campaign: Campaign, wishes: Wishes, n_jobs: int, listener: 
     return identification
 
 
-def _record(record: Record, rig: Rig, wishes: Wishes) -> RecordIdentification:
+def _record(record: Record, rig: Rig, options: EstimationOptions) -> RecordIdentification:
     """Return what one record shows by itself of the responses to the inputs that move in it."""
-    measured = measured_responses([record], rig, wishes.method, wishes.resolution)
+    measured = measured_responses([record], rig, options.method, options.resolution)
     paths = [
         PathIdentification(
             source.name,
@@ -303,14 +305,14 @@ def _views(
     structure: Structure,
     values: Mapping[str, float],
     records: Sequence[Record],
-    wishes: Wishes,
+    options: EstimationOptions,
     known: Information | None,
 ) -> list[LinearView]:
     if known is None:
         return []
     views = []
     for group in by_constants(records):
-        measured = measured_responses(group, structure.rig, wishes.method, wishes.resolution)
+        measured = measured_responses(group, structure.rig, options.method, options.resolution)
         try:
             views.append(linear_view(structure, values, group, measured, known))
         except SimulationError:

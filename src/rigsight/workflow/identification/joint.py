@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.windows import WINDOW, cut, window_length
 from rigsight.errors import InputError
 from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conicity, fit_jointly
@@ -20,7 +21,6 @@ from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
 from rigsight.report.quantities import gap_percent
 from rigsight.simulate import Structure, compose
-from rigsight.workflow.campaigns.campaign import Campaign
 
 _DIFFERENT = 0.01
 """Probability of differences as large by chance below which records are said to need sets of their own."""

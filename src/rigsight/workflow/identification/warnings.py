@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigsight.campaign import Campaign
 from rigsight.diagnose.fitting.windows import cut
 from rigsight.identify import OFFSETS_MEND, differing_means
 from rigsight.identify.closed_loop import closed_loop_notes
@@ -17,7 +18,6 @@ from rigsight.identify.record_identification import MISFIT, measured_amplitude
 from rigsight.identify.transfer.record_response import driven_band
 from rigsight.records import Record
 from rigsight.rigs import evaluated
-from rigsight.workflow.campaigns.campaign import Campaign
 from rigsight.workflow.identification.joint import parent
 
 _TOLERANCE = 0.02

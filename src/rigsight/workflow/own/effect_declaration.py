@@ -1,6 +1,6 @@
 """Is an effect's declaration complete and consistent, so that a rig can be simulated and fitted with it?
 
-What is checked here needs no simulation; `rigsight.workflow.own.effect_promises` holds the rest.
+What is checked here needs no simulation; `rigsight.workflow.own.effect_checks` holds the rest.
 """
 
 from __future__ import annotations

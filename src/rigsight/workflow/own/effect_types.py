@@ -1,158 +1,95 @@
-"""Does every field of a declared effect hold what it should, so that the rest of it can be looked at?
+"""Does every field of a declared effect hold what its annotation says, so that the rest of it can be looked at?
 
 Python does not check what a user's file puts into a field; what is wrong there would only show in the middle of a fit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import fields
+from functools import cache
+from typing import Annotated, Any, get_type_hints
 
 import numpy as np
-import sympy as sp
+from pydantic import BaseModel, ConfigDict, InstanceOf, PlainValidator, ValidationError, create_model
 
-from rigsight.effects import Effect, Energy, Place, Signature, Start, State, SumAndDifference
+from rigsight.effects import Effect, Energy, GainTrend, Place, Signature, Start, State, SumAndDifference
 from rigsight.errors import shown
 from rigsight.parameters import Parameter
 
-EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "measured_late")
-"""Fields of an effect that change a part of the rig."""
-Check = tuple[Callable[[Any], bool], str]
-"""Whether a value is right, and what to give instead."""
+_PARTS = (Parameter, Signature, Start, State, SumAndDifference)
+_BEHIND = "(with a comma behind a single one)"
+_WANTED = {
+    "str": "a text",
+    "float": "a number",
+    "bool": "True or False",
+    "sp.Symbol": "a sympy symbol",
+    "sp.Expr": "an expression of sympy symbols",
+    "dict[str, sp.Expr]": "a dictionary of names and expressions of sympy symbols",
+    "dict[str, float]": "a dictionary of parameter names and numbers",
+    "tuple[float, float]": "two numbers in a tuple",
+    "tuple[float, ...]": f"numbers in a tuple {_BEHIND}",
+    "tuple[tuple[str, str], ...]": 'a tuple of pairs of parameter names, such as (("T_s", "T_c"),)',
+    "Signature": "a Signature, for instance Signature(GainTrend.FALLS)",
+    **{f"tuple[{part.__name__}, ...]": f"a tuple of {part.__name__} objects {_BEHIND}" for part in _PARTS},
+    **{
+        kind.__name__: f"one of {', '.join(f'{kind.__name__}.{one.name}' for one in kind)}"
+        for kind in (Energy, GainTrend, Place)
+    },
+}
+"""Annotation of a field -> what to give."""
 
 
-def _is_number(value: object) -> bool:
+def _number(value: object) -> float:
+    # Pydantic takes whatever can be turned into a float, such as an array of one value.
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
+        raise ValueError("no number")
     try:
-        float(value)
+        return float(value)
     except OverflowError:
-        return False
-    return True
+        raise ValueError("too large") from None
 
 
-def _is_pair(value: object) -> bool:
-    return isinstance(value, tuple) and len(value) == 2 and all(map(_is_number, value))
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
-
-
-def _is_formula(value: object) -> bool:
-    return isinstance(value, sp.Expr)
-
-
-def _or_none(check: Check) -> Check:
-    return (lambda value: value is None or check[0](value)), f"{check[1]}, or None"
-
-
-_TEXT: Check = (_is_text, "a text")
-_NUMBER: Check = (_is_number, "a number")
-_YES_OR_NO: Check = (lambda value: isinstance(value, bool), "True or False")
-_PAIR: Check = (_is_pair, "two numbers in a tuple")
-_FORMULA: Check = (_is_formula, "an expression of sympy symbols")
-_MEMBERS: dict[type, dict[str, Check]] = {
-    Parameter: {
-        "name": _TEXT,
-        "description": _TEXT,
-        "dimension": _TEXT,
-        "unit": _TEXT,
-        "lower": _NUMBER,
-        "upper": _NUMBER,
-        "null": _or_none(_NUMBER),
-        "default": _or_none(_NUMBER),
-        "starts": (
-            lambda value: isinstance(value, tuple) and all(map(_is_number, value)),
-            "numbers in a tuple (with a comma behind a single one)",
-        ),
-        "search": _PAIR,
-        "logarithmic": _YES_OR_NO,
-        "fitted": _YES_OR_NO,
-    },
-    State: {
-        "symbol": (lambda value: isinstance(value, sp.Symbol), "a sympy symbol"),
-        "rate": _FORMULA,
-        "dimension": _TEXT,
-        "limit": _or_none(_FORMULA),
-    },
-    Start: {
-        "values": (
-            lambda value: (
-                isinstance(value, dict) and all(_is_text(k) and _is_formula(v) for k, v in value.items())
-            ),
-            "a dictionary of names and expressions of sympy symbols",
-        ),
-        "parent": _or_none(_TEXT),
-    },
-    SumAndDifference: {
-        "first": _TEXT,
-        "second": _TEXT,
-        "sum_range": _PAIR,
-        "difference_range": _PAIR,
-        "exponent": _or_none(_TEXT),
-    },
-}
-_LISTS: dict[str, type] = {
-    "parameters": Parameter,
-    "states": State,
-    "starts": Start,
-    "searched_as": SumAndDifference,
-}
-_OTHERS: dict[str, Check] = {
-    "special_cases": (
-        lambda value: (
-            isinstance(value, dict) and all(_is_text(k) and _is_number(v) for k, v in value.items())
-        ),
-        "a dictionary of parameter names and numbers",
-    ),
-    "ordered": (
-        lambda value: (
-            isinstance(value, tuple)
-            and all(isinstance(pair, tuple) and len(pair) == 2 and all(map(_is_text, pair)) for pair in value)
-        ),
-        'a tuple of pairs of parameter names, such as (("T_s", "T_c"),)',
-    ),
-    "elastic_share": _or_none(_TEXT),
-    "pulsation": _or_none(_TEXT),
-    "wave_number": _or_none(_TEXT),
-    "needs_inertia": _YES_OR_NO,
-}
+@cache
+def _models() -> dict[type, type[BaseModel]]:
+    """Return for an effect and for each of its parts a model that takes in every field only what its annotation says."""
+    instance: Any = InstanceOf
+    # A part is checked field by field on its own, so that a sentence names its field.
+    own = {part.__name__: instance[part] for part in _PARTS}
+    own["float"] = Annotated[float, PlainValidator(_number)]
+    config = ConfigDict(strict=True, arbitrary_types_allowed=True)
+    found: dict[type, type[BaseModel]] = {}
+    for declared in (Effect, *_PARTS):
+        hints = get_type_hints(declared, localns=own, include_extras=True)
+        types: dict[str, Any] = {name: (hint, ...) for name, hint in hints.items()}
+        found[declared] = create_model(declared.__name__, __config__=config, **types)
+    return found
 
 
 def type_faults(effect: Effect) -> Iterator[str]:
-    """Yield a sentence for each field that holds something else than it should."""
-    for field, wanted in (("name", str), ("summary", str), ("place", Place), ("energy", Energy)):
-        if not isinstance(getattr(effect, field), wanted):
-            yield f"{field} is {shown(getattr(effect, field))}; give a {wanted.__name__}{_options(wanted)}."
-    signature: object = effect.signature
-    if not isinstance(signature, Signature):
-        yield f"signature is {shown(signature)}; give a Signature, for instance Signature(GainTrend.FALLS)."
-    for field, member_type in _LISTS.items():
-        members = getattr(effect, field)
-        if not isinstance(members, tuple):
-            yield f"{field} is a {type(members).__name__}; give a tuple (with a comma behind a single one)."
-            continue
-        for member in members:
-            if isinstance(member, member_type):
-                yield from _faults(f"{field}: ", member, _MEMBERS[member_type])
-            else:
-                yield f"{field} holds {shown(member)}; give a {member_type.__name__}."
-    yield from _faults("", effect, _OTHERS)
-    for field in EXPRESSIONS:
-        expression = getattr(effect, field)
-        if expression is not None and not _is_formula(expression):
-            yield f"{field} is {shown(expression)}; give an expression of sympy symbols."
+    """Yield a sentence for each field of an effect, and of its parts, that holds something else than it should."""
+    yield from _faults("", Effect, effect)
 
 
-def _faults(where: str, holder: object, checks: dict[str, Check]) -> Iterator[str]:
-    for field, (is_right, wanted) in checks.items():
-        value = getattr(holder, field)
-        if not is_right(value):
-            yield f"{where}{field} is {shown(value)}; give {wanted}."
+def _faults(where: str, declared: type, holder: object) -> Iterator[str]:
+    values = {field.name: getattr(holder, field.name) for field in fields(declared)}
+    wrong: dict[str, object] = {}
+    try:
+        _models()[declared].model_validate(values)
+    except ValidationError as error:
+        for one in error.errors():
+            wrong.setdefault(str(one["loc"][0]), one["input"])
+    for field in fields(declared):
+        value = values[field.name]
+        if field.name in wrong:
+            got = wrong[field.name]
+            yield f"{where}{field.name} {'is' if got is value else 'holds'} {shown(got)}; give {_wanted(str(field.type))}."
+        for part in value if isinstance(value, tuple) else (value,):
+            for kind in _PARTS:
+                if isinstance(part, kind):
+                    yield from _faults(f"{field.name}: ", kind, part)
 
 
-def _options(wanted: type) -> str:
-    return (
-        f" ({', '.join(f'{wanted.__name__}.{o.name}' for o in wanted)})" if wanted in (Place, Energy) else ""
-    )
+def _wanted(annotation: str) -> str:
+    kind = annotation.removesuffix(" | None")
+    return _WANTED[kind] if kind == annotation else f"{_WANTED[kind]}, or None"

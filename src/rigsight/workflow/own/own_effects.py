@@ -16,10 +16,10 @@ from rigsight.discover.terms.monomials import known_terms
 from rigsight.effects import AT, CATALOGUE, Effect, placed
 from rigsight.errors import InputError, check_option
 from rigsight.simulate.printing.text import text
+from rigsight.workflow.own.effect_checks import failed_checks
 from rigsight.workflow.own.effect_declaration import declaration_faults, equations
-from rigsight.workflow.own.effect_promises import broken_promises
 from rigsight.workflow.own.python_file import run_python_file
-from rigsight.workflow.progress import Listener, Stage, silent
+from rigsight.workflow.run.progress import Listener, Stage, silent
 
 ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
@@ -46,7 +46,7 @@ def own_effects(
     files
         Python files that declare effects.
     check
-        Simulate and fit each of them, to see that it keeps what the catalogue's effects promise; False where a model that
+        Simulate and fit each of them, to see that it passes the checks of the catalogue's effects; False where a model that
         was already fitted is only to be run.
     listener
         Told of every checked effect.
@@ -54,7 +54,7 @@ def own_effects(
     Raises
     ------
     InputError
-        Naming file and line, if a file cannot be run, declares no effect or a name twice, or an effect breaks a promise.
+        Naming file and line, if a file cannot be run, declares no effect or a name twice, or an effect fails a check.
     """
     found: list[OwnEffect] = []
     taken = {effect.name: "the catalogue" for effect in known_terms().values()}
@@ -77,7 +77,7 @@ def own_effects(
     for own in found:
         _check_parents(own, taken)
         if check:
-            broken = broken_promises(own.effect)
+            broken = failed_checks(own.effect)
             if broken:
                 raise InputError(_message(own, broken))
             stage.finished(own.effect.name)

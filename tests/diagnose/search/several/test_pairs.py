@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rigsight.diagnose import Task, diagnose
+from rigsight.campaign import Campaign
+from rigsight.diagnose import diagnose
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.search.several import pairs as pair_search
@@ -28,7 +29,7 @@ NOISE = 2e-5
 TRIED = ("cubic_stiffness", "coulomb_friction", "actuator_lag", "quadratic_damping")
 
 
-def measured(effects: dict[str, dict[str, float]], seed: int) -> Task:
+def measured(effects: dict[str, dict[str, float]], seed: int) -> Campaign:
     rng = np.random.default_rng(seed)
     structure = compose(AXIS, [effect_named(name) for name in effects])
     truth = {**VALUES, **{name: value for own in effects.values() for name, value in own.items()}}
@@ -44,13 +45,13 @@ def measured(effects: dict[str, dict[str, float]], seed: int) -> Task:
         clean = simulate(structure, truth, Record(name, DT, {"u": u}, {}, role=role, hold="zoh"))
         records.append(clean.with_signals(x=clean["x"] + rng.normal(scale=NOISE, size=t.size)))
     given = {name: VALUES[name] * 1.05 for name in ("m", "d", "k")}
-    return Task("two", AXIS, {"gain": 1.0}, given, tuple(records))
+    return Campaign("two", AXIS, {"gain": 1.0}, given, tuple(records))
 
 
 @pytest.mark.slow
 def test_two_effects_are_found_and_the_stronger_comes_first():
-    task = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0)
-    found = diagnose(task, [effect_named(name) for name in TRIED])
+    campaign = measured({"cubic_stiffness": {"k_3": 4e5}, "actuator_lag": {"T_a": 0.01}}, seed=0)
+    found = diagnose(campaign, [effect_named(name) for name in TRIED])
     assert found.verdict == "effect"
     assert found.effects == ("cubic_stiffness", "actuator_lag")
     assert found.where == ("dynamics", "actuator")
@@ -66,11 +67,11 @@ def test_two_effects_are_found_and_the_stronger_comes_first():
 
 @pytest.mark.slow
 def test_three_effects_are_found_where_the_second_closes_less_than_half():
-    task = measured(
+    campaign = measured(
         {"cubic_stiffness": {"k_3": 2e5}, "coulomb_friction": {"T_c": 0.05}, "actuator_lag": {"T_a": 0.01}},
         seed=0,
     )
-    found = diagnose(task, [effect_named(name) for name in TRIED])
+    found = diagnose(campaign, [effect_named(name) for name in TRIED])
     assert found.verdict == "effect"
     assert set(found.effects) == {"cubic_stiffness", "coulomb_friction", "actuator_lag"}
     assert found.effects[0] == "cubic_stiffness"
@@ -86,8 +87,8 @@ def test_three_effects_are_found_where_the_second_closes_less_than_half():
 
 
 def test_one_effect_stays_one():
-    task = measured({"coulomb_friction": {"T_c": 0.1}}, seed=1)
-    found = diagnose(task, [effect_named(name) for name in TRIED])
+    campaign = measured({"coulomb_friction": {"T_c": 0.1}}, seed=1)
+    found = diagnose(campaign, [effect_named(name) for name in TRIED])
     assert (found.verdict, found.effects) == ("effect", ("coulomb_friction",))
     assert all(len(candidate.effects) < 2 for candidate in found.candidates)
 

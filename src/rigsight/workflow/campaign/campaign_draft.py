@@ -1,0 +1,176 @@
+"""How is a `campaign.toml` written from the measured files of a folder, and which of them become its records?"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rigsight.errors import InputError
+from rigsight.records import Role
+from rigsight.records.formats.channel_file import SUFFIXES
+from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.rigs import Rig
+from rigsight.workflow.campaign.record_proposal import BLANK, Proposal, propose, quoted
+
+MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", *SUFFIXES)
+_SCORED = re.compile(r"valid|verif|test|check|pruef|prüf|score", re.IGNORECASE)
+
+
+def measured_files(folder: Path) -> list[Path]:
+    """Return the files of a folder that may hold records, in the order of their names."""
+    return sorted(
+        file
+        for file in folder.iterdir()
+        if file.is_file() and not file.name.startswith(".") and file.suffix.lower() in MEASURED_SUFFIXES
+    )
+
+
+def proposed_records(
+    files: Sequence[Path], rigs: Sequence[Rig]
+) -> tuple[list[Proposal], list[tuple[str, str]]]:
+    """Return every file as a record of one rig, and the files that are none with the reason.
+
+    Parameters
+    ----------
+    files
+        Measured files.
+    rigs
+        Rigs that they may be of; the one that most of them fit is taken.
+    """
+    found: dict[Path, Proposal] = {}
+    left_out = []
+    for file in files:
+        try:
+            with open_measurement(file) as opened:
+                if not opened.channels:
+                    raise InputError(f"{file.name} holds no signal over time.")
+                found[file] = propose(file, opened, rigs)
+        except InputError as error:
+            left_out.append((file.name, str(error).removeprefix(file.name).lstrip(":, ")))
+    if len(rigs) > 1 and found:
+        fitting = Counter(
+            one.guess.rig.name for one in found.values() if one.guess.open_questions == 0
+        ) or Counter(one.guess.rig.name for one in found.values())
+        model = fitting.most_common(1)[0][0]
+        chosen = [rig for rig in rigs if rig.name == model]
+        for file, one in found.items():
+            if one.guess.rig.name != model:
+                with open_measurement(file) as opened:
+                    found[file] = propose(file, opened, chosen)
+    proposals = []
+    for file, one in found.items():
+        signals = one.guess.signals
+        if not any(guess.is_clear or guess.candidates for guess in signals) and len(found) > 1:
+            left_out.append((file.name, "no channel looks like a signal of the rig"))
+        else:
+            proposals.append(one)
+    return proposals or list(found.values()), left_out if proposals or not found else []
+
+
+def campaign_text(
+    folder: Path,
+    rig: Rig,
+    file: Path | None,
+    others: Sequence[str],
+    values: Mapping[str, float] | None,
+    proposals: Sequence[Proposal],
+    left_out: Sequence[tuple[str, str]],
+) -> tuple[str, int]:
+    """Return the campaign as text, and the number of blanks in it.
+
+    Parameters
+    ----------
+    folder
+        Where it is written.
+    rig
+        The rig.
+    file
+        The rig's file, inside the folder; None for a built-in rig.
+    others
+        Rigs that it was chosen from, where it is a guess.
+    values
+        Parameters of the simulation in question, where they are known.
+    proposals
+        Its records.
+    left_out
+        Other measured files, and why they were not taken.
+    """
+    open_constants = [constant for constant in rig.constants if constant.default is None]
+    n_blanks = len(open_constants) + sum(proposal.n_blanks for proposal in proposals)
+    lines = [
+        "# Written by rigsight init from the files of this folder. What stands behind a # was guessed: check it.",
+    ]
+    if n_blanks:
+        lines.append(f"# What could not be guessed reads {BLANK} ({_times(n_blanks)}): fill it in.")
+    lines += ["", f"title = {quoted(folder.resolve().name)}", "", *_rig_lines(folder, rig, file, others)]
+    if rig.constants and (values is None or open_constants):
+        lines += ["", "[rig.constants]"]
+        for constant in rig.constants:
+            about = f"# {constant.description} [{constant.unit}]"
+            lines.append(
+                f"{constant.name} = {BLANK if constant.default is None else f'{constant.default:g}'}  {about}"
+            )
+    lines += [
+        "",
+        "[rig.parameters]  # the simulation in question; what stays a comment is identified from the records",
+    ]
+    known = values or {}
+    lines += [
+        f"{one.name} = {known[one.name]!r}  # {one.description} [{one.unit}]"
+        if one.name in known
+        else f"# {one.name} =    # {one.description} [{one.unit}]"
+        for one in rig.parameters
+    ]
+    for proposal, (role, remark) in zip(proposals, _roles(proposals), strict=True):
+        lines += ["", proposal.toml(role, remark).rstrip("\n")]
+        if values is not None and rig.inputs:
+            lines.append('hold = "zoh"  # a controller holds its command until the next one')
+    if left_out:
+        lines += ["", "# Not used:"]
+        lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]
+    return "\n".join(_printable(line) for text in lines for line in text.split("\n")) + "\n", n_blanks
+
+
+def _roles(proposals: Sequence[Proposal]) -> list[tuple[Role, str]]:
+    """Return the role of every record with a remark: validation by name, or else the last."""
+    if len(proposals) == 1:
+        return [
+            ("estimation", "measure a second one for validation: only what was not fitted can be trusted")
+        ]
+    scored = [bool(_SCORED.search(Path(proposal.file).stem)) for proposal in proposals]
+    if any(scored) and not all(scored):
+        return [("validation", "by its name; check") if named else ("estimation", "") for named in scored]
+    last = len(proposals) - 1
+    return [
+        ("validation", "never fitted, only scored; guessed, choose which")
+        if i == last
+        else ("estimation", "")
+        for i in range(len(proposals))
+    ]
+
+
+def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str]) -> list[str]:
+    """Return the lines that say which rig it is; `others` are the ones it was chosen from, if it is a guess."""
+    remark = f"# {rig.summary}"
+    if others:
+        remark = (
+            f"# guessed from the channels: {rig.summary} Others: {', '.join(others)} (init --model); or a rig file of your own: "
+            'file = "..." instead (rigsight rigs NAME prints one to begin with)'
+        )
+    bodies = rig.mechanism.bodies
+    simulator = [] if bodies is None else [f'simulator = "{bodies.kind}"  # it moves the bodies']
+    if file is None:
+        return ["[rig]", f'model = "{rig.name}"  {remark}', *simulator]
+    inside = file.resolve().relative_to(folder.resolve()).as_posix()
+    return ["[rig]", f"file = {quoted(inside)}  {remark}", *simulator]
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _printable(text: str) -> str:
+    """Return a line without the signs that TOML forbids in comments."""
+    return "".join(sign if sign == "\t" or sign.isprintable() else " " for sign in text)

@@ -1,0 +1,255 @@
+"""What may stand in a `campaign.toml`, and how is a user told what does not belong there?"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigsight.errors import InputError, nearest, shown
+from rigsight.records import Hold, Kind, Role
+from rigsight.records.formats.ordinary_file import file_size
+from rigsight.workflow.campaign.where import LISTS, Where
+
+MOST_RECORDS = 1000
+Offsets = Literal["shared", "per_record"]
+"""Whether the offset of a sensor is the same in all records."""
+WHICH_RIG = 'model = "NAME" for a rig that rigsight rigs lists, or file = "my_rig.toml" for one of your own.'
+LARGEST_FILE = 10_000_000
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Seconds = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
+
+
+class FileTable(BaseModel):
+    """A table of a file that somebody wrote: unknown keys and numbers in quotes are mistakes."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+Checked = TypeVar("Checked", bound=FileTable)
+
+
+class ColumnTable(FileTable):
+    """``{ name = "current", scale = 1.0, offset = 0.0 }``: value in SI = scale * column + offset; or ``unit = "mA"`` instead."""
+
+    name: str | int
+    scale: Number | None = None
+    offset: Number | None = None
+    unit: Annotated[str, Field(min_length=1)] | None = None
+
+
+class RigTable(FileTable):
+    """``[rig]``: which rig, what simulates it, the effects of the simulation in question, its constants and parameters."""
+
+    model: str | None = None
+    file: Annotated[str, Field(min_length=1)] | None = None
+    simulator: str | None = None
+    effects: list[str] = []
+    constants: dict[str, Number] = {}
+    parameters: dict[str, Number] = {}
+
+
+class RecordTable(FileTable):
+    """``[[records]]``: one measured file, what it is for, how it is written, and what is known of the rig in it."""
+
+    file: Annotated[str, Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1)] | None = None
+    role: Role = "estimation"
+    kind: Kind = "operation"
+    amplitude: Number | None = None
+    hold: Hold = "foh"
+    dt: Seconds | None = None
+    resample: Seconds | None = None
+    columns: dict[str, str | int | ColumnTable] = {}
+    separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Annotated[str, Field(pattern=r"^[.,]$")] | None = None
+    header: bool | Annotated[int, Field(ge=1)] | None = None
+    comment: Annotated[str, Field(min_length=1)] | None = None
+    constants: dict[str, Number] = {}
+    inputs: dict[str, Number] = {}
+
+
+class CampaignTable(FileTable):
+    """The whole file."""
+
+    title: str = ""
+    offsets: Offsets = "shared"
+    rig: RigTable
+    records: Annotated[list[RecordTable], Field(min_length=1, max_length=MOST_RECORDS)]
+
+
+def locate(campaign: Path) -> Path:
+    """Return the toml file for a toml file or its folder.
+
+    Raises
+    ------
+    InputError
+        If there is none; a folder's other toml files are listed.
+    """
+    if not campaign.exists():
+        raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that holds one.")
+    if not campaign.is_dir():
+        return campaign
+    path = campaign / "campaign.toml"
+    if path.is_file():
+        return path
+    others = ", ".join(sorted(other.name for other in campaign.glob("*.toml"))[:10])
+    mend = (
+        f"Name one of its files: {others}."
+        if others
+        else f"Write one beside the records; rigsight init {campaign} proposes it."
+    )
+    raise InputError(f"Folder {campaign} holds no campaign.toml. {mend}")
+
+
+def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
+    """Return the checked contents of a campaign file, and where its keys stand.
+
+    Raises
+    ------
+    InputError
+        Naming the file with line and column, and the key.
+    """
+    try:
+        if file_size(path, "the campaign.toml") > LARGEST_FILE:
+            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no campaign.toml.")
+        text = path.read_text(encoding="utf-8-sig")
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path.name} is not valid TOML: {error}. {_mend(str(error))}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); save it as UTF-8.") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    except InputError:
+        raise
+    except RecursionError:
+        raise InputError(f"{path.name} is nested deeper than a campaign ever is.") from None
+    except ValueError:
+        # The only thing that is valid TOML and yet fails is a whole number of thousands of digits.
+        raise InputError(f"{path.name} holds a whole number with more digits than are read.") from None
+    where = Where.of_toml(path.name, text, data)
+    return checked_file(where, data, CampaignTable), where
+
+
+def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Checked:
+    """Return what a file holds as a table.
+
+    Raises
+    ------
+    InputError
+        Naming the file and, for each of the first mistakes, the key, what was got and what is allowed.
+    """
+    try:
+        return table.model_validate(data)
+    except ValidationError as error:
+        told = _messages(where, data, table, [dict(problem) for problem in error.errors(include_url=False)])
+        more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
+        raise InputError("\n".join(told[:5]) + more) from None
+
+
+def _messages(
+    where: Where, data: dict[str, Any], table: type[FileTable], problems: list[dict[str, Any]]
+) -> list[str]:
+    """Return one line per mistake; an alternative that fails as a whole only repeats what another says in detail."""
+    keys = [_without_union_members(problem["loc"], data) for problem in problems]
+    told = [
+        _tell(where, data, table, problem)
+        for problem, key in zip(problems, keys, strict=True)
+        if not any(len(other) > len(key) and other[: len(key)] == key for other in keys)
+    ]
+    return list(dict.fromkeys(told))
+
+
+def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
+    location = _without_union_members(problem["loc"], data)
+    if not location:
+        # Only a key with half a sign in it belongs to no place.
+        return f"{where.name}: a key is no text: {shown(problem['input'])}. Use plain letters."
+    key = where.at(*location)
+    kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
+    if kind == "extra_forbidden":
+        allowed = _allowed_keys(location, table)
+        return f"{key}: unknown key.{nearest(str(location[-1]), allowed)} Allowed here: {', '.join(allowed)}."
+    if kind == "missing":
+        return f"{key}: is missing.{_how_to_write(location)}"
+    if kind == "literal_error":
+        allowed = context["expected"].replace(" or ", ", ")
+        hint = (
+            nearest(got, [option.strip("' ") for option in allowed.split(",")])
+            if isinstance(got, str)
+            else ""
+        )
+        return f"{key}: is {shown(got)}.{hint} Allowed: {allowed}."
+    if kind == "finite_number":
+        return f"{key}: must be a finite number, got {shown(got)}."
+    if kind == "float_type":
+        return f"{key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
+    if location == ("records",) and kind in ("too_short", "too_long"):
+        count = len(got)
+        return f"{key}: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
+    if location[-1] == "decimal":
+        return f'{key}: must be "." or ",", got {shown(got)}.'
+    if location[-1] == "header":
+        return (
+            f"{key}: must be true, false, or the number of the line that holds the names, got {shown(got)}."
+        )
+    if location[-1] == "separator":
+        return f"{key}: must be one character, got {shown(got)}; a blank stands for any white space."
+    if "columns" in location[:-1]:
+        return (
+            f"{key}: got {shown(got)}. Write the column's name, its number counted from 1, "
+            'or { name = "...", scale = 1.0, offset = 0.0 }, or { name = "...", unit = "mm" }.'
+        )
+    return (
+        f"{key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {shown(got)}.{_how_to_write(location)}"
+    )
+
+
+def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:
+    """Drop the names of alternatives that pydantic puts into a location: no key of the file."""
+    kept: list[str | int] = []
+    here: Any = data
+    for i, part in enumerate(location):
+        if "columns" in kept and i >= kept.index("columns") + 2 and part in ("str", "int", "ColumnTable"):
+            continue
+        if kept and kept[-1] == "header":
+            continue
+        kept.append(part)
+        try:
+            here = here[part]
+        except (KeyError, IndexError, TypeError):
+            here = None
+    return tuple(kept)
+
+
+def _allowed_keys(location: tuple[str | int, ...], table: type[FileTable]) -> list[str]:
+    if location[0] == "rig" and len(location) > 1:
+        table = RigTable
+    elif location[0] in LISTS and len(location) > 1:
+        table = ColumnTable if "columns" in location else RecordTable
+    return list(table.model_fields)
+
+
+def _how_to_write(location: tuple[str | int, ...]) -> str:
+    return {
+        "rig": f" Write [rig] and {WHICH_RIG}",
+        "model": f" Write {WHICH_RIG}",
+        "records": ' Write [[records]] and file = "..." for every record.',
+        "file": ' Write file = "name.csv".',
+    }.get(str(location[-1]), "")
+
+
+def _mend(error: str) -> str:
+    """Return what to write, for the mistakes of TOML that campaigns see most."""
+    if "Cannot declare" in error or "Cannot overwrite" in error or "Cannot mutate" in error:
+        return (
+            "Every record begins with [[records]], in double brackets; its columns follow it under [records.columns]. "
+            "Other tables and keys stand once."
+        )
+    if "Unescaped" in error and "\\" in error:
+        return "Write paths with / instead of \\."
+    return "Texts stand in quotes, tables in [brackets]."

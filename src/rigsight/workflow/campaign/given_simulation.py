@@ -1,0 +1,160 @@
+"""Which simulation is in question: which rig, with which effects, constants and parameters, and are they ones it can have?"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from rigsight.effects import Effect
+from rigsight.errors import InputError, nearest
+from rigsight.parameters import Parameter
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, compose
+from rigsight.workflow.campaign.where import Location, Where
+
+
+def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:
+    """Return the rig that ``rig.model`` names.
+
+    Parameters
+    ----------
+    where
+        Where keys stand.
+    name
+        Its name.
+    known
+        All rigs by name.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest rig, all of them, and how a rig of one's own is named.
+    """
+    if name not in known:
+        raise InputError(
+            f"{where.at('rig', 'model')}: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; a rig of your own is "
+            'named by its file: file = "my_rig.toml".'
+        )
+    return known[name]
+
+
+def checked_simulation(
+    where: Where,
+    rig: Rig,
+    modelled: Sequence[Effect],
+    constants: Mapping[str, float],
+    parameters: Mapping[str, float],
+    of_records: Collection[str] = (),
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return constants and parameters of the simulation in question, all defaults filled in.
+
+    Parameters
+    ----------
+    where
+        Where keys stand: in a file, or in a campaign in memory.
+    rig
+        The rig.
+    modelled
+        Effects that the simulation has already, at their places.
+    constants, parameters
+        Known numbers by name [SI].
+    of_records
+        Constants that every record gives by itself, so that none is needed for all of them.
+
+    Raises
+    ------
+    InputError
+        Naming the key of what is unknown, missing or out of range, and what is allowed.
+    """
+    known = _constants(where, rig, constants, of_records)
+    try:
+        structure = compose(rig, modelled)
+    except InputError as error:
+        raise InputError(f"{where.at('rig', 'effects')}: {error}") from None
+    return known, _parameters(where, structure, parameters)
+
+
+def checked_numbers(
+    where: Where, key: Location, rig: Rig, allowed: Iterable[Parameter], given: Mapping[str, float]
+) -> dict[str, float]:
+    """Return given numbers, each one that is allowed and within its range.
+
+    Parameters
+    ----------
+    where, key
+        Where keys stand, and the table in which the numbers are.
+    rig
+        Whose numbers they are.
+    allowed
+        What may be given.
+    given
+        Numbers by name [SI].
+
+    Raises
+    ------
+    InputError
+        Naming what is unknown, the nearest and all known names, or what is out of range.
+    """
+    known = {parameter.name: parameter for parameter in allowed}
+    checked = {}
+    for name, value in given.items():
+        here = where.at(*key, name)
+        if name not in known:
+            listed = ", ".join(known) or "none"
+            raise InputError(f"{here}: unknown to {rig.name}.{nearest(name, known)} Known: {listed}.")
+        try:
+            checked[name] = known[name].check(value)
+        except InputError as error:
+            raise InputError(f"{here}: {error}") from None
+    return checked
+
+
+def _constants(
+    where: Where, rig: Rig, given: Mapping[str, float], of_records: Collection[str]
+) -> dict[str, float]:
+    checked = checked_numbers(where, ("rig", "constants"), rig, rig.constants, given)
+    for constant in rig.constants:
+        if constant.name in checked or constant.name in of_records:
+            continue
+        if constant.default is None:
+            raise InputError(
+                f"{where.at('rig', 'constants', constant.name)}: is missing; {rig.name} needs it "
+                f"({constant.description} [{constant.unit}])."
+            )
+        checked[constant.name] = constant.default
+    if rig.has_one_motion:
+        gain = rig.motion.drive_gain
+        if checked.get(str(gain)) == 0.0:
+            raise InputError(
+                f"{where.at('rig', 'constants', str(gain))}: is 0, so that the input would drive nothing."
+            )
+    return {constant.name: checked[constant.name] for constant in rig.constants if constant.name in checked}
+
+
+def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) -> dict[str, float]:
+    rig = structure.rig
+    constants = {constant.name for constant in rig.constants}
+    own = [parameter for parameter in structure.parameters if parameter.name not in constants]
+    checked = checked_numbers(where, ("rig", "parameters"), rig, (*own, *rig.alternative_parameters), given)
+    for parameter in own:
+        if parameter not in rig.parameters and parameter.name not in checked:
+            if parameter.default is None:
+                raise InputError(
+                    f"{where.at('rig', 'parameters', parameter.name)}: is missing; the simulation is said to have an effect that "
+                    f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
+                )
+            checked[parameter.name] = parameter.default
+    for effect in structure.effects:
+        for pair in effect.ordered:
+            larger, smaller = (structure.parameter_name(effect, name) for name in pair)
+            if checked[larger] < checked[smaller]:
+                raise InputError(
+                    f"{where.at('rig', 'parameters', larger)}: must be at least {smaller} = {checked[smaller]:g} in "
+                    f"{effect.name}, got {checked[larger]:g}."
+                )
+    for alternative, determined in ((a.parameter.name, a.gives) for a in rig.alternatives):
+        if alternative in checked and determined in checked:
+            raise InputError(
+                f"{where.at('rig', 'parameters', alternative)}: stands beside {determined}, which it determines; "
+                "give one of the two."
+            )
+    return checked

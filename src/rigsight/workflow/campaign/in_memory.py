@@ -1,0 +1,211 @@
+"""How do records and numbers that are in memory become a campaign or a model, without files?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import get_args
+
+from rigsight.campaign import Campaign
+from rigsight.effects import Effect, effect_named
+from rigsight.errors import InputError, check_option
+from rigsight.parameters import ParameterSet
+from rigsight.records import Hold, Record
+from rigsight.records.plausibility import is_constant
+from rigsight.rigs import RIGS, Rig, rig_of_tables
+from rigsight.simulate import compose
+from rigsight.simulate.model import Model
+from rigsight.workflow.campaign.campaign_file import Offsets
+from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
+from rigsight.workflow.campaign.read_campaign import NO_VALIDATION, of_first_record
+from rigsight.workflow.campaign.where import Where
+from rigsight.workflow.own.effect_names import effects_on
+
+
+def make_campaign(
+    rig: str | Rig,
+    records: Sequence[Record],
+    *,
+    constants: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    effects: Sequence[str | Effect] = (),
+    title: str = "",
+    offsets: Offsets = "shared",
+) -> Campaign:
+    """Make a campaign of records in memory.
+
+    Parameters
+    ----------
+    rig
+        Name of a built-in rig (``rigsight rigs`` lists them), or a rig of your own.
+    records
+        With distinct names; each holds the inputs and outputs of the rig in SI units. Outputs may be missing, all but the
+        first of ``"running_gear"``, ``"axis"`` and ``"element"``, all but one of others. Roles say which may be fitted.
+    constants
+        Known numbers of the rig by name [SI].
+    parameters
+        The simulation whose gap is in question [SI]; what is missing is identified from the records.
+    effects
+        Effects that this simulation has already, by name or as declarations.
+    title
+        What a report calls the campaign; by default the name of the rig.
+    offsets
+        ``"per_record"`` where each sensor has an offset of its own in each record: it is estimated and no part of a model.
+
+    Raises
+    ------
+    InputError
+        Naming the number, effect, record or signal that cannot be used, and what is allowed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rigsight as rs
+    >>> u = np.sin(np.linspace(0.0, 60.0, 1000) ** 1.5)
+    >>> record = rs.Record("sweep", dt=0.01, signals={"u": u, "x": 0.01 * u}, units={"u": "N", "x": "m"})
+    >>> campaign = rs.make_campaign("axis", [record], parameters={"k": 100.0})
+    >>> campaign.rig.name, campaign.parameters, len(campaign.estimation)
+    ('axis', {'k': 100.0}, 1)
+    """
+    found = rig_of(rig)
+    called = title or found.name
+    by_record = set.intersection(*(set(record.constants) for record in records)) if records else set()
+    modelled = effects_on(found, effects_of(effects), called)
+    known, given = checked_simulation(
+        Where(called), found, modelled, constants or {}, parameters or {}, by_record
+    )
+    if all(record.role != "estimation" for record in records):
+        raise InputError(
+            f'{called}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
+        )
+    taken = [record.name for record in records]
+    twice = sorted({name for name in taken if taken.count(name) > 1})
+    if twice:
+        raise InputError(
+            f"{called}: records: several are called '{twice[0]}'. Give every record a name of its own."
+        )
+    judged = any(record.role == "validation" for record in records)
+    check_option("offsets", offsets, get_args(Offsets))
+    checked = tuple(_checked(called, record, found) for record in records)
+    if offsets == "per_record":
+        checked = tuple(
+            record.with_free_offsets(signal.name for signal in found.outputs) for record in checked
+        )
+    constants, differing = of_first_record(found, known, checked)
+    return Campaign(
+        title=called,
+        rig=found,
+        constants=constants,
+        parameters=given,
+        records=checked,
+        modelled=tuple(modelled),
+        notes=tuple(
+            note for note in (differing, "" if judged else NO_VALIDATION.format(file=called)) if note
+        ),
+    )
+
+
+def make_model(
+    rig: str | Rig, values: Mapping[str, float], effects: Sequence[str | Effect] = (), hold: Hold = "foh"
+) -> Model:
+    """Make a model of numbers in memory.
+
+    Parameters
+    ----------
+    rig
+        Name of a built-in rig (``rigsight rigs`` lists them), or a rig of your own.
+    values
+        Constants of the rig, its parameters and those of the effects, by name [SI]; one with a default may be missing.
+    effects
+        Effects of the model, by name or as declarations.
+    hold
+        How its input behaves between samples.
+
+    Raises
+    ------
+    InputError
+        Naming what is unknown, missing or out of range, and what is allowed.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> model = rs.make_model("axis", {"m": 2.0, "d": 5.0, "k": 800.0, "k_3": 5e6}, ["cubic_stiffness"])
+    >>> model.to_json()["effect_parameters"]
+    {'k_3': 5000000.0}
+    """
+    found = rig_of(rig)
+    structure = compose(found, effects_on(found, effects_of(effects), found.name))
+    defaults = {p.name: p.default for p in structure.parameters if p.default is not None}
+    complete = ParameterSet.from_mapping(structure.parameters, {**defaults, **values})
+    return Model(structure, complete.to_mapping(), hold)
+
+
+def rig_of(rig: str | Rig) -> Rig:
+    """Return a rig that was given by the name of a built-in one, or as it is.
+
+    Parameters
+    ----------
+    rig
+        Name or rig.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest and all built-in rigs where a name is unknown.
+    """
+    if isinstance(rig, str):
+        return RIGS[check_option("The rig", rig, RIGS)]
+    # The one of the same declaration that is known already, if there is one: its equations are made once.
+    return rig_of_tables(rig.declaration, f"Rig '{rig.name}'") if rig.declaration else rig
+
+
+def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
+    """Return effects that were given by name or as declarations.
+
+    Parameters
+    ----------
+    effects
+        One or several.
+
+    Raises
+    ------
+    InputError
+        Naming the nearest and all effects of the catalogue where a name is unknown.
+    """
+    # A lone name is a sequence too, of letters.
+    given = (effects,) if isinstance(effects, str | Effect) else effects
+    return tuple(effect if isinstance(effect, Effect) else effect_named(effect) for effect in given)
+
+
+def _checked(called: str, record: Record, rig: Rig) -> Record:
+    """Return a record with the units of its rig where it has none.
+
+    Raises
+    ------
+    InputError
+        If it lacks a signal that every record of the rig has, one of them never changes that must, or it has constants of another
+        rig.
+    """
+    outputs = rig.required_outputs or tuple(s.name for s in rig.outputs if s.name in record)
+    if not outputs:
+        listed = ", ".join(signal.name for signal in rig.outputs)
+        raise InputError(f"Record '{record.name}' has none of the outputs {listed}; give one at least.")
+    inputs = [signal.name for signal in rig.inputs]
+    may_rest = record.kind == "operation" and record.amplitude is None
+    must_move = {name: "input" for name in rig.moving_inputs if record.role == "estimation"}
+    if record.role == "estimation" and not may_rest and all(is_constant(record[name]) for name in inputs):
+        must_move |= dict.fromkeys(inputs, "input")
+    if rig.required_outputs or all(is_constant(record[name]) for name in outputs):
+        must_move |= dict.fromkeys(outputs, "output")
+    for name in (*inputs, *outputs):
+        if is_constant(record[name]) and name in must_move:
+            raise InputError(
+                f"Record '{record.name}': the {must_move[name]} {name} never changes ({record[name][0]:g}), so nothing can "
+                "be learned from it. Check the signal, or leave the record out; a record of a rig that moves freely has the kind "
+                '"operation" and no amplitude.'
+            )
+    checked_numbers(
+        Where(f"{called}: record '{record.name}'"), ("constants",), rig, rig.constants, record.constants
+    )
+    units = {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs) if signal.name in record}
+    return replace(record, units={**units, **record.units})

@@ -1,0 +1,171 @@
+"""How does a record that a file lists become a checked `Record` of a rig's signals?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from rigsight.errors import InputError, nearest, shown
+from rigsight.records import ColumnMapping, Record
+from rigsight.records.read_record import TIME, read_stretches
+from rigsight.records.reference import signals_beside
+from rigsight.rigs import Rig
+from rigsight.workflow.campaign.campaign_file import RecordTable
+from rigsight.workflow.campaign.given_simulation import checked_numbers
+from rigsight.workflow.campaign.where import Location, Where
+
+
+def inside(path: Path, where: str, asked: str) -> Path:
+    """Return a file that another one names; a campaign that was sent to someone must not read what is none of its business.
+
+    Parameters
+    ----------
+    path
+        The file that names it.
+    where
+        How messages begin.
+    asked
+        The name.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it lies outside the folder of `path`.
+    """
+    folder = path.parent.resolve()
+    name = Path(asked)
+    try:
+        is_inside, exists = (folder / name).resolve().is_relative_to(folder), (folder / name).is_file()
+    except (OSError, ValueError, RuntimeError):
+        # Longer than names may be, with a null or half a sign in it, or a link to itself.
+        raise InputError(f"{where}: is no file name that can be looked up: {shown(asked)}.") from None
+    if name.is_absolute() or ".." in name.parts or not is_inside:
+        is_link = not name.is_absolute() and ".." not in name.parts
+        how = "is a link that leaves" if is_link else "leaves"
+        raise InputError(f"{where}: '{asked}' {how} the campaign's folder; put the file beside {path.name}.")
+    if not exists:
+        files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
+        raise InputError(
+            f"{where}: '{asked}' does not exist in the folder of {path.name}.{nearest(asked, files)} Check the name."
+        )
+    return path.parent / name
+
+
+def file_inside(path: Path, number: int, record: RecordTable, where: Where | None = None) -> Path:
+    """Return the file of a record.
+
+    Parameters
+    ----------
+    path
+        The file that lists the record.
+    number
+        Place of the record in that file, from 1.
+    record
+        What is listed.
+    where
+        Where the keys of that file stand, if it is known.
+
+    Raises
+    ------
+    InputError
+        As `inside`.
+    """
+    # The message names the file by itself.
+    where = replace(where or Where(path.name), data={})
+    return inside(path, where.at("records", number - 1, "file"), record.file)
+
+
+def read_listed_record(
+    path: Path, rig: Rig, number: int, record: RecordTable, file: Path, where: Where | None = None
+) -> tuple[Record, ...]:
+    """Read a record as a file that lists it describes it, in stretches where its clock pauses.
+
+    Parameters
+    ----------
+    path
+        The file that lists the record.
+    rig
+        Rig whose signals it holds.
+    number
+        Place of the record in that file, from 1.
+    record
+        What is listed.
+    file, where
+        See `file_inside`.
+
+    Raises
+    ------
+    InputError
+        Naming the file that lists it, the record, and line and column of what cannot be used.
+    """
+    where = where or Where(path.name, {"records": [None] * (number - 1) + [{"file": record.file}]})
+    own = ("records", number - 1)
+    columns = _columns(where, own, rig, record)
+    constants = checked_numbers(where, (*own, "constants"), rig, rig.constants, record.constants)
+    _check_inputs(where, own, rig, record)
+    try:
+        return read_stretches(
+            file,
+            rig.inputs,
+            rig.outputs,
+            columns=columns,
+            required_outputs=rig.required_outputs,
+            absent_inputs=rig.absent_inputs,
+            constant_inputs=record.inputs,
+            moving_inputs=rig.moving_inputs,
+            name=record.name,
+            role=record.role,
+            kind=record.kind,
+            amplitude=record.amplitude,
+            hold=record.hold,
+            dt=record.dt,
+            resample=record.resample,
+            separator=record.separator,
+            decimal=record.decimal,
+            header=record.header,
+            comment=record.comment,
+            constants=constants,
+            beside=signals_beside(_own(rig)),
+        )
+    except InputError as error:
+        # What is wrong stands in the record's file, which the message names already.
+        raise InputError(f"{replace(where, data={}).at(*own)}: {error}") from None
+
+
+def _own(rig: Rig) -> list[str]:
+    return [signal.name for signal in (*rig.inputs, *rig.outputs)]
+
+
+def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict[str, ColumnMapping]:
+    known = [TIME, *_own(rig), *signals_beside(_own(rig))]
+    columns = {}
+    for signal, column in record.columns.items():
+        here = where.at(*own, "columns", signal)
+        if signal not in known:
+            raise InputError(
+                f"{here}: no signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
+            )
+        try:
+            if isinstance(column, str | int):
+                columns[signal] = ColumnMapping(column)
+            else:
+                columns[signal] = ColumnMapping(column.name, column.scale, column.offset, column.unit)
+        except InputError as error:
+            raise InputError(f"{here}: {error}") from None
+    return columns
+
+
+def _check_inputs(where: Where, own: Location, rig: Rig, record: RecordTable) -> None:
+    """Refuse constant values of what is no input, is recorded, or prescribes a motion."""
+    names = [signal.name for signal in rig.inputs]
+    for name in record.inputs:
+        here = where.at(*own, "inputs", name)
+        if name not in names:
+            listed = ", ".join(names) or "none"
+            raise InputError(f"{here}: no input of {rig.name}.{nearest(name, names)} Inputs: {listed}.")
+        if name in record.columns:
+            raise InputError(f"{here}: stands beside columns.{name}, which reads it; give one of the two.")
+        if name not in rig.absent_inputs:
+            raise InputError(
+                f"{here}: prescribes a motion of {rig.name}, which must be recorded. Map its column."
+            )

@@ -1,0 +1,254 @@
+"""How does a `model.json` become a simulation, and what is a user told who wrote or edited one?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rigsight.discover.terms.monomials import known_terms
+from rigsight.effects import Effect, effect_named, kind_of
+from rigsight.errors import InputError, nearest, shown
+from rigsight.records import Hold
+from rigsight.rigs import Rig, declared_rig
+from rigsight.rigs.published import published_sets
+from rigsight.simulate import Structure, compose, structure_named
+from rigsight.simulate.model import SCHEMA_VERSION, Model
+from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.own.own_rigs import known_rigs
+from rigsight.workflow.run.json_file import json_object
+
+MODEL_FILE = "model.json"
+_MEND = f"A model is the {MODEL_FILE} that 'rigsight diagnose' writes."
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+_GROUPS = ("constants", "parameters", "effect_parameters")
+
+
+class ModelTable(BaseModel):
+    """The whole file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    schema_version: Literal[1]
+    rig: str
+    declaration: dict[str, Any] = {}
+    hold: Hold = "foh"
+    constants: dict[str, Number] = {}
+    parameters: dict[str, Number] = {}
+    effects: Annotated[list[str], Field(max_length=50)] = []
+    effect_parameters: dict[str, Number] = {}
+    units: dict[str, str] = {}
+
+
+def read_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs: Iterable[Rig] = ()) -> Model:
+    """Read a model.
+
+    Parameters
+    ----------
+    model
+        A ``model.json`` or the folder that holds one.
+    own_effects
+        Effects that the model may name beside those known to everybody.
+    own_rigs
+        Rigs that a model without a declaration of its own may name beside the built-in ones.
+
+    Raises
+    ------
+    InputError
+        Naming file and key, or line and column, of what cannot be used, and the mend.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> rs.read_model("diagnosis")
+    Traceback (most recent call last):
+    rigsight.errors.InputError: diagnosis does not exist; name a model.json or the folder that holds one.
+    """
+    path = _locate(Path(model))
+    return _model(path, json_object(path, "model", _MEND), own_effects, own_rigs)
+
+
+def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> Model:
+    """Return the model that a result holds.
+
+    Parameters
+    ----------
+    content
+        What ``model.json`` would hold.
+    own_effects
+        Effects that the model may name beside those known to everybody.
+
+    Raises
+    ------
+    InputError
+        Naming the key of what cannot be used.
+    """
+    return _model(Path(MODEL_FILE), dict(content), own_effects)
+
+
+def _model(
+    path: Path, content: dict[str, Any], own_effects: Iterable[Effect], own_rigs: Iterable[Rig] = ()
+) -> Model:
+    table = _checked_table(path, content)
+    structure = _structure(path, table, _rig(path, table, own_rigs), own_effects)
+    return Model(structure, _values(path, structure, table), table.hold)
+
+
+def named_model(model: str | Path) -> Model:
+    """Read a model, or take a published set.
+
+    Parameters
+    ----------
+    model
+        A ``model.json``, the folder that holds one, or the name of a published set.
+
+    Raises
+    ------
+    InputError
+        As `read_model`, or listing the published sets where it is none of these.
+    """
+    if Path(model).exists() or str(model).endswith(".json"):
+        return read_model(model)
+    sets = published_sets()
+    if str(model) not in sets:
+        raise InputError(
+            f"'{model}' is neither a {MODEL_FILE}, nor a folder that holds one, nor a published set.{nearest(str(model), sets)} "
+            f"Published sets: {', '.join(sets)}."
+        )
+    found = sets[str(model)]
+    structure = structure_named(found.rig, [effect_named(name) for name in found.effects])
+    return Model(structure, {name: found.values()[name] for name in structure.names}, "foh")
+
+
+def _locate(model: Path) -> Path:
+    if not model.exists():
+        raise InputError(f"{model} does not exist; name a {MODEL_FILE} or the folder that holds one.")
+    if not model.is_dir():
+        return model
+    path = model / MODEL_FILE
+    if not path.is_file():
+        raise InputError(
+            f"Folder {model} holds no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
+        )
+    return path
+
+
+def _checked_table(path: Path, data: dict[str, Any]) -> ModelTable:
+    try:
+        return ModelTable.model_validate(data)
+    except ValidationError as error:
+        told = [_tell(path, problem) for problem in map(dict, error.errors(include_url=False))]
+        more = f"\n(and {len(told) - 5} more)" if len(told) > 5 else ""
+        raise InputError("\n".join(told[:5]) + more) from None
+
+
+def _tell(path: Path, problem: dict[str, Any]) -> str:
+    key = ".".join(map(str, problem["loc"]))
+    start, kind, got = f"{path.name}: {key}: ", problem["type"], problem["input"]
+    if kind == "extra_forbidden":
+        known = list(ModelTable.model_fields)
+        return f"{start}unknown key.{nearest(key, known)} Allowed: {', '.join(known)}."
+    if kind == "missing":
+        return f"{start}is missing."
+    if key == "schema_version":
+        return f"{start}is {shown(got)}, this version reads {SCHEMA_VERSION}. Use the rigsight that wrote the model."
+    if kind == "literal_error":
+        options = str(problem["ctx"]["expected"]).replace(" or ", ", ")
+        return f"{start}is {shown(got)}. Allowed: {options}."
+    if kind == "float_type":
+        return f"{start}must be a number, got {shown(got)}."
+    if kind == "finite_number":
+        return f"{start}must be a finite number, got {shown(got)}."
+    message = str(problem["msg"])
+    return f"{start}{message[0].lower()}{message[1:]}, got {shown(got)}."
+
+
+def _rig(path: Path, table: ModelTable, own_rigs: Iterable[Rig]) -> Rig:
+    """Return the rig that a model declares, or names."""
+    if table.declaration:
+        rig = declared_rig(table.rig, table.declaration, f"{path.name}: declaration")
+        assert rig is not None
+        if rig.name != table.rig:
+            raise InputError(
+                f"{path.name}: rig: is '{table.rig}', but declaration.name '{rig.name}'. Write the same for both."
+            )
+        return rig
+    known = known_rigs(own_rigs)
+    if table.rig not in known:
+        raise InputError(
+            f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, known)} Allowed: {', '.join(known)}, or a rig of your "
+            "own whose tables stand under 'declaration'."
+        )
+    return known[table.rig]
+
+
+def _structure(path: Path, table: ModelTable, rig: Rig, own_effects: Iterable[Effect]) -> Structure:
+    known = {**known_terms(), **{effect.name: effect for effect in own_effects}}
+    for name in table.effects:
+        kind = kind_of(name)
+        if kind not in known:
+            raise InputError(
+                f"{path.name}: effects: '{kind}' is unknown.{nearest(kind, known)} If it is an effect of your own, name the file "
+                f"that declares it: rigsight simulate MODEL RECORD --effects FILE. Known: {', '.join(known)}."
+            )
+    effects = [effect_on(rig, name, known, f"{path.name}: effects") for name in table.effects]
+    try:
+        return compose(rig, effects)
+    except InputError as error:
+        raise InputError(f"{path.name}: effects: {error}") from None
+
+
+def _values(path: Path, structure: Structure, table: ModelTable) -> dict[str, float]:
+    """Return the value of every parameter; one with a default may be left out of a model written by hand."""
+    rig = structure.rig
+    known = {p.name: p for p in structure.parameters}
+    constants = [p.name for p in rig.constants]
+    parameters = [p.name for p in rig.parameters]
+    of_effects = [name for name in known if name not in (*constants, *parameters)]
+    values: dict[str, float] = {}
+    missing: list[str] = []
+    for group, names in zip(_GROUPS, (constants, parameters, of_effects), strict=True):
+        given: dict[str, float] = getattr(table, group)
+        for name in given:
+            if name not in names:
+                listed = ", ".join(names) or "none"
+                raise InputError(
+                    f"{path.name}: {group}.{name}: unknown to {_described(structure)}.{nearest(name, names)} Known: {listed}."
+                )
+        for name in names:
+            value = given.get(name, known[name].default)
+            if value is None:
+                missing.append(f"{group}.{name}")
+                continue
+            try:
+                values[name] = known[name].check(value)
+            except InputError as error:
+                raise InputError(f"{path.name}: {group}.{name}: {error}") from None
+    if missing:
+        raise InputError(
+            f"{path.name}: {_described(structure)} needs {', '.join(missing)}; give a number for each."
+        )
+    _check_units(path, structure, table)
+    return {name: values[name] for name in structure.names}
+
+
+def _described(structure: Structure) -> str:
+    effects = " and ".join(structure.effect_names)
+    return f"{structure.rig.name} with {effects}" if effects else structure.rig.name
+
+
+def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
+    """Refuse another unit than the one the number is taken in: nothing is converted by it."""
+    units = {p.name: p.unit for p in structure.parameters}
+    for name, unit in table.units.items():
+        if name not in units:
+            raise InputError(
+                f"{path.name}: units.{name}: unknown to {_described(structure)}.{nearest(name, units)}"
+            )
+        if unit != units[name]:
+            raise InputError(
+                f"{path.name}: units.{name}: is '{unit}', but numbers are taken in '{units[name]}'. Convert the value instead."
+            )

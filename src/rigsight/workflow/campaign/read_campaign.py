@@ -1,0 +1,237 @@
+"""How is a `campaign.toml` read, with its rig and all its records, and what of it is worth a note?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.effects import CATALOGUE, Effect
+from rigsight.errors import InputError
+from rigsight.records import Record
+from rigsight.rigs import Rig, read_rig_file
+from rigsight.workflow.campaign.campaign_file import (
+    WHICH_RIG,
+    RecordTable,
+    RigTable,
+    locate,
+    read_campaign_table,
+)
+from rigsight.workflow.campaign.given_simulation import checked_simulation, rig_named
+from rigsight.workflow.campaign.listed_records import file_inside, inside, read_listed_record
+from rigsight.workflow.campaign.where import Where
+from rigsight.workflow.own.effect_names import effect_on
+from rigsight.workflow.own.own_rigs import known_rigs
+
+_SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
+"""How far the amplitude of an input may lie below and above half its range: one line of many, and a step counted from rest."""
+_RATES_APART = 100.0
+"""Ratio of sample times from which they are asked about."""
+NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
+
+
+def read_campaign(
+    campaign: str | Path, own_effects: Iterable[Effect] = (), own_rigs: Iterable[Rig] = ()
+) -> Campaign:
+    """Read a campaign and all its records.
+
+    Parameters
+    ----------
+    campaign
+        The toml file or its folder.
+    own_effects
+        Effects that the simulation in question may have beside those of the catalogue.
+    own_rigs
+        Rigs that it may name beside the built-in ones.
+
+    Raises
+    ------
+    InputError
+        Naming file and key, or file, line and column, of what cannot be used, and the mend.
+
+    Examples
+    --------
+    >>> import rigsight as rs
+    >>> rs.read_campaign("measurements/march")
+    Traceback (most recent call last):
+    rigsight.errors.InputError: measurements/march does not exist; name a campaign.toml or the folder that holds one.
+    """
+    path = locate(Path(campaign))
+    table, where = read_campaign_table(path)
+    rig = listed_rig(path, table.rig, where, own_rigs)
+    known = {effect.name: effect for effect in (*CATALOGUE, *own_effects)}
+    by_record = set.intersection(*(set(record.constants) for record in table.records))
+    modelled = [effect_on(rig, name, known, where.at("rig", "effects")) for name in table.rig.effects]
+    known_constants, parameters = checked_simulation(
+        where, rig, modelled, table.rig.constants, table.rig.parameters, by_record
+    )
+    if all(record.role != "estimation" for record in table.records):
+        raise InputError(
+            f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
+        )
+    files = [file_inside(path, number, record, where) for number, record in enumerate(table.records, 1)]
+    read = [
+        (record, stretch)
+        for number, (record, file) in enumerate(zip(table.records, files, strict=True), 1)
+        for stretch in read_listed_record(path, rig, number, record, file, where)
+    ]
+    if table.offsets == "per_record":
+        outputs = [signal.name for signal in rig.outputs]
+        read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
+    records = tuple(record for _, record in read)
+    constants, differing = of_first_record(rig, known_constants, records)
+    notes = [
+        note
+        for note in (
+            differing,
+            _rates_apart(records),
+            *(_other_amplitude(r, rig) for r in records),
+            *_fitted_again(path.name, records),
+        )
+        if note
+    ]
+    if all(record.role != "validation" for record in records):
+        notes.append(NO_VALIDATION.format(file=path.name))
+    return Campaign(
+        title=table.title or path.parent.resolve().name,
+        rig=rig,
+        constants=constants,
+        parameters=parameters,
+        records=_with_distinct_names(read),
+        modelled=tuple(modelled),
+        path=path,
+        notes=tuple(notes),
+    )
+
+
+def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
+    for scored in (record for record in records if record.role == "validation"):
+        for fitted in (record for record in records if record.role == "estimation"):
+            if _holds_same_samples(scored, fitted):
+                yield (
+                    f"{file}: '{scored.name}' is for validation and holds the very samples of '{fitted.name}', which is fitted: "
+                    "its error proves nothing. Name another file."
+                )
+
+
+def _holds_same_samples(record: Record, other: Record) -> bool:
+    return record.signals.keys() == other.signals.keys() and all(
+        np.array_equal(samples, other[name]) for name, samples in record.signals.items()
+    )
+
+
+def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig] = ()) -> Rig:
+    """Return the rig that a campaign names, or whose file it names.
+
+    Parameters
+    ----------
+    path
+        The campaign's file.
+    table
+        Its ``[rig]``.
+    where
+        Where its keys stand.
+    own_rigs
+        Rigs that it may name beside the built-in ones.
+
+    Raises
+    ------
+    InputError
+        If not exactly one of ``model`` and ``file`` is given, there is no such rig, or its file cannot be used.
+    """
+    if table.model is not None and table.file is not None:
+        raise InputError(f"{where.at('rig', 'file')}: stands beside rig.model; give one of the two.")
+    if table.file is not None:
+        rig = read_rig_file(inside(path, where.at("rig", "file"), table.file))
+    elif table.model is not None:
+        rig = rig_named(where, table.model, known_rigs(own_rigs))
+    else:
+        raise InputError(f"{where.at('rig', 'model')}: is missing. Write {WHICH_RIG}")
+    _check_simulator(rig, table, where)
+    return rig
+
+
+def _check_simulator(rig: Rig, table: RigTable, where: Where) -> None:
+    """Refuse a campaign that says otherwise than its rig what simulates it: an FMU is a program that is run."""
+    bodies = rig.mechanism.bodies
+    own = None if bodies is None else bodies.kind
+    if table.simulator == own:
+        return
+    if own is None:
+        raise InputError(
+            f"{where.at('rig', 'simulator')}: is '{table.simulator}', but the rig's own equations move it. Take the line out, or "
+            "give the rig file a [simulator]."
+        )
+    got = "is missing" if table.simulator is None else f"is '{table.simulator}'"
+    key = where.at("rig", "simulator") if table.simulator is not None else where.at("rig")
+    raise InputError(
+        f'{key}: simulator {got}; the rig file leaves its bodies to {own}: write simulator = "{own}".'
+    )
+
+
+def of_first_record(
+    rig: Rig, known: Mapping[str, float], records: Sequence[Record]
+) -> tuple[dict[str, float], str]:
+    """Return all constants, those that only records give with the value of the first, and a note on these.
+
+    Parameters
+    ----------
+    rig
+        The rig.
+    known
+        Its constants that hold for all records [SI].
+    records
+        All records of the campaign.
+    """
+    first = {name: value for name, value in records[0].constants.items() if name not in known}
+    values = {**known, **first}
+    constants = {constant.name: values[constant.name] for constant in rig.constants}
+    if not first:
+        return constants, ""
+    listed = ", ".join(f"{name} = {value:g}" for name, value in first.items())
+    return (
+        constants,
+        f"Each record has its own {', '.join(first)}; models are written with those of the first, {listed}.",
+    )
+
+
+def _rates_apart(records: Sequence[Record]) -> str:
+    """Say that sample times lie so far apart that the time of one record is probably in another unit; empty if they do not."""
+    finest, coarsest = (choose(records, key=lambda record: record.dt) for choose in (min, max))
+    if coarsest.dt < _RATES_APART * finest.dt:
+        return ""
+    return (
+        f"The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' has "
+        f"{finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
+        't = { name = "...", unit = "ms" } for it.'
+    )
+
+
+def _other_amplitude(record: Record, rig: Rig) -> str:
+    """Say that the stated amplitude cannot be that of the input; empty if it can, as a peak, an RMS or that of a line."""
+    stated, halves = record.amplitude, {s.name: 0.5 * float(np.ptp(record[s.name])) for s in rig.inputs}
+    moving = {name: half for name, half in halves.items() if half > 0.0}
+    if stated is None or not moving:
+        return ""
+    if any(half / _SMALLEST_SHARE <= abs(stated) <= _LARGEST_SHARE * half for half in moving.values()):
+        return ""
+    listed = " and ".join(f"'{name}' moves by {half:.3g}" for name, half in moving.items())
+    return f"Record '{record.name}': amplitude = {stated:g}, but {listed} to each side. Is one of them in another unit?"
+
+
+def _with_distinct_names(read: Sequence[tuple[RecordTable, Record]]) -> tuple[Record, ...]:
+    """Give every record a name of its own: results are keyed by it."""
+    taken = {asked.name for asked, _ in read if asked.name is not None}
+    named: list[Record] = []
+    used: set[str] = set()
+    for asked, record in read:
+        name, count = record.name, 1
+        while name in used or (asked.name is None and name in taken):
+            count += 1
+            name = f"{record.name}_{count}"
+        used.add(name)
+        named.append(replace(record, name=name))
+    return tuple(named)

@@ -1,0 +1,249 @@
+"""How is a measured file written into a campaign, and what of it was guessed?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.errors import InputError
+from rigsight.records import Kind, Role
+from rigsight.records.channel_summary import step_and_gaps
+from rigsight.records.channel_units import has_si, in_drive_unit, is_a
+from rigsight.records.excitation_kind import guess_amplitude, guess_kind
+from rigsight.records.formats.channel import Channel, ChannelFile, as_floats
+from rigsight.records.read_record import TIME
+from rigsight.rigs import Rig
+from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, guess_file, telling
+
+BLANK = '"FILL IN"'
+"""Stands where nothing could be guessed; a diagnosis refuses it by the key's name."""
+_LISTED = 12
+_COARSE = 0.5
+"""Sample time [s] from which the unit of time is asked about."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A file as a record of a campaign.
+
+    Attributes
+    ----------
+    file
+        Its name, as the campaign is to call it.
+    guess
+        Which channels its signals probably are.
+    kind, amplitude
+        What probably drove the rig.
+    lines
+        Lines of TOML below ``role``, with what must be checked as comments.
+    n_blanks
+        How many values are left to be filled in.
+    """
+
+    file: str
+    guess: FileGuess
+    kind: Kind
+    amplitude: float | None
+    lines: tuple[str, ...]
+    n_blanks: int
+
+    def toml(self, role: Role, remark: str = "") -> str:
+        """Return the ``[[records]]`` entry, for a role that is explained by a remark."""
+        head = [
+            "[[records]]",
+            f"file = {quoted(self.file)}",
+            f'role = "{role}"' + (f"  # {remark}" if remark else ""),
+        ]
+        return "\n".join([*head, *self.lines]) + "\n"
+
+
+def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None = None) -> Proposal:
+    """Return how an open file is written into a campaign.
+
+    Parameters
+    ----------
+    path
+        The file.
+    file
+        Its channels.
+    rigs
+        Those that come into question.
+    name
+        How the campaign calls the file, by default its name.
+
+    Raises
+    ------
+    InputError
+        If a channel cannot be read.
+    """
+    is_text = file.format == "delimited text"
+    guess = guess_file(file.channels, is_text, rigs)
+    # Of several inputs none alone says what drove the rig.
+    driven = guess.signals[0] if len(guess.rig.inputs) == 1 else None
+    kind: Kind = "operation"
+    amplitude = None
+    if driven is not None and driven.channel is not None:
+        samples = as_floats(driven.channel.load())
+        if samples.size > 1 and np.isfinite(samples).all():
+            kind = guess_kind(samples)
+            amplitude = guess_amplitude(_in_si(samples, driven), kind)
+    remark = "" if driven is None or driven.channel is None else f"guessed from {driven.signal}; check: "
+    lines = [f'kind = "{kind}"  # {remark}sweep, step, multisine or operation']
+    if driven is not None and amplitude:
+        unit = f" [{driven.si}]" if has_si(driven.si) else ""
+        lines.append(f"amplitude = {amplitude:g}  # of {driven.signal}{unit}, guessed; check")
+    timing, timing_blanks = _timing(guess)
+    columns, column_blanks = _columns(guess, file.channels)
+    lines += timing
+    if columns:
+        lines += ["[records.columns]", *columns]
+    return Proposal(name or path.name, guess, kind, amplitude, tuple(lines), timing_blanks + column_blanks)
+
+
+def quoted(text: str) -> str:
+    """Return a text as TOML writes it."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _in_si(samples: NDArray[np.float64], guess: Guess) -> NDArray[np.float64]:
+    from rigsight.records.channel_units import UnknownUnitError, factor
+
+    if guess.unit is None:
+        return samples
+    if not has_si(guess.si):
+        found = in_drive_unit(guess.unit)
+        return samples if found is None else found[0] * samples
+    with suppress(UnknownUnitError):
+        return factor(guess.unit, guess.si) * samples
+    return samples
+
+
+def _timing(guess: FileGuess) -> tuple[list[str], int]:
+    """Return the keys that say where time comes from beside columns, and the number of blanks."""
+    found = [one.channel for one in guess.signals if one.channel is not None]
+    if guess.time.is_clear or guess.time.candidates:
+        return [], 0
+    if not found or any(channel.axis is None for channel in found):
+        return [f"dt = {BLANK}  # sample time [s]: no channel looks like time"], 1
+    steps = []
+    for channel in found:
+        with suppress(InputError):
+            assert channel.axis is not None
+            steps.append((channel.n_samples, step_and_gaps(channel.axis.stamps())[0]))
+    if len(set(steps)) <= 1:
+        return [], 0
+    finest = min((step for _, step in steps if step), default=None)
+    if finest is None:
+        return [], 0
+    return [f"resample = {finest:.9g}  # [s]: the signals have different rates; check that this is meant"], 0
+
+
+def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], int]:
+    """Return the lines of the columns table, and the number of blanks in them."""
+    lines, blanks = [], 0
+    needed = _needed(guess)
+    left = _left(guess, channels)
+    for one in (guess.time, *guess.signals):
+        if one.channel is not None and one.is_alone:
+            (line,) = _column(one)
+            mark = "; " if "  # " in line else "  # "
+            lines.append(f"{line}{mark}the only channel left: check")
+        elif one.channel is not None:
+            lines += _column(one)
+        elif one.candidates:
+            listed = ", ".join(quoted(name) for name in one.candidates[:_LISTED])
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {listed}")
+            blanks += 1
+        elif one.signal in guess.rig.absent_inputs and not left:
+            lines.append(
+                f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0, as nothing drives the rig"
+            )
+        elif one.signal in needed:
+            free = (
+                "; or remove this line: then nothing drove the rig"
+                if one.signal in guess.rig.absent_inputs
+                else ""
+            )
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{left or 'no channel is left'}{free}")
+            blanks += 1
+        elif one.signal in telling(guess.rig):
+            lines.append(
+                f"# {one.signal} =    # {_unit_of(one)}{left or 'no channel is left'}; or not recorded here"
+            )
+    reference = guess.reference.channel
+    if reference is not None and reference.name != guess.reference.signal:
+        lines.append(
+            f"{guess.reference.signal} = {quoted(reference.name)}  # of the controller, if it is one; else remove this line"
+        )
+    return lines, blanks
+
+
+def _needed(guess: FileGuess) -> set[str]:
+    """Return the signals without which a record cannot be used: inputs, the outputs of every record, and one output at all."""
+    rig = guess.rig
+    needed = {*(signal.name for signal in rig.inputs), *rig.required_outputs}
+    outputs = guess.signals[len(rig.inputs) :]
+    if not any(one.is_clear or one.candidates for one in outputs):
+        needed.add(outputs[0].signal)
+    return needed
+
+
+def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
+    """Return which channels are no signal yet; empty where all are."""
+    known = (guess.time, guess.reference, *guess.signals)
+    taken = {one.channel.name for one in known if one.channel is not None}
+    free = [quoted(channel.name) for channel in channels if channel.name not in taken]
+    return f"one of: {', '.join(free[:_LISTED])}" if free else ""
+
+
+def _coarse_step(time: Channel) -> float | None:
+    """Return the sample time that values taken in seconds make, if it is one that few rigs are measured with."""
+    with suppress(InputError):
+        stamps = as_floats(time.load())
+        if stamps.size > 1 and np.isfinite(stamps).all():
+            step = float(np.median(np.diff(stamps)))
+            return step if step >= _COARSE else None
+    return None
+
+
+def _unit_of(guess: Guess) -> str:
+    return f"[{guess.si}], " if has_si(guess.si) else ""
+
+
+def _column(guess: Guess) -> list[str]:
+    """Return the line that maps a signal, empty where its own name suffices."""
+    assert guess.channel is not None
+    name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
+    if guess.unit is None:
+        needed = guess.channel.name != guess.signal
+        if guess.signal == TIME and (step := _coarse_step(guess.channel)):
+            return [f"t = {name}  # taken in s, which makes the sample time {step:.3g} s; is it in ms? check"]
+        remark = (
+            f"  # taken to be in {guess.si}; check" if has_si(guess.si) else "  # taken as it stands; check"
+        )
+        return [f"{guess.signal} = {name}{remark}"] if needed else []
+    if not has_si(guess.si):
+        found = in_drive_unit(guess.unit)
+        if found is None or found[0] == 1.0:
+            return [f"{guess.signal} = {name}  # in {guess.unit}, taken as it stands"]
+        return [
+            f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}  # becomes {found[1]}; check gain"
+        ]
+    if not is_a(guess.unit, guess.si):
+        return [
+            f"{guess.signal} = {{ name = {name}, scale = 1.0 }}  # in {guess.unit}, taken as it stands; "
+            f"{guess.signal} is meant in {guess.si}: check"
+        ]
+    if guess.is_stated:
+        if guess.channel.name == guess.signal:
+            return []
+        return [f"{guess.signal} = {name}  # converted from {guess.unit}, as the file states it"]
+    if guess.unit == guess.si:
+        return [f"{guess.signal} = {name}"] if guess.channel.name != guess.signal else []
+    return [f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}"]

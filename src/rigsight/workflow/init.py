@@ -1,0 +1,196 @@
+"""What `rigsight init` does: a folder of measured files -> a commented `campaign.toml`; a robot's model -> its rig file too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigsight.errors import InputError, check_option
+from rigsight.rigs import RIGS
+from rigsight.robots import FreeRun, RigDraft, free_run, read_robot, rig_text, with_gears
+from rigsight.workflow.campaign.campaign_draft import (
+    MEASURED_SUFFIXES,
+    campaign_text,
+    measured_files,
+    proposed_records,
+)
+from rigsight.workflow.campaign.campaign_file import MOST_RECORDS
+from rigsight.workflow.own.own_rigs import own_rigs
+from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.results import write_together
+
+CAMPAIGN_FILE = "campaign.toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A campaign as it was written.
+
+    Attributes
+    ----------
+    path
+        The file.
+    model
+        The rig that the channels fit best.
+    records
+        Files taken as records.
+    left_out
+        Other measured files, and why they were not taken.
+    n_blanks
+        Values that are left to be filled in.
+    others
+        Rigs that it was chosen from, where it is a guess.
+    """
+
+    path: Path
+    model: str
+    records: tuple[str, ...]
+    left_out: tuple[tuple[str, str], ...]
+    n_blanks: int
+    others: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDraft:
+    """A rig file as it was written.
+
+    Attributes
+    ----------
+    path
+        The rig file.
+    draft
+        What it says, and what it leaves out.
+    run
+        How it moves beside MuJoCo.
+    campaign
+        The campaign beside it; None where the folder holds no records yet.
+    """
+
+    path: Path
+    draft: RigDraft
+    run: FreeRun
+    campaign: Draft | None
+
+
+def run_init(
+    folder: str | Path,
+    *,
+    model: str | None = None,
+    rig_files: Iterable[Path] = (),
+    values: Mapping[str, float] | None = None,
+) -> Draft:
+    """Write a `campaign.toml` for the measured files of a folder, and a copy of a rig file from elsewhere beside it.
+
+    Parameters
+    ----------
+    folder
+        Folder with the files; those in folders below it are not looked at.
+    model
+        The rig; None for the one that the channels fit best.
+    rig_files
+        Rigs of the user's own, beside the built-in ones.
+    values
+        Parameters of the simulation in question, where they are known; constants then keep what the rig file says.
+
+    Raises
+    ------
+    InputError
+        If there is a campaign already, no file can be used, another file is in the way, or nothing can be written there.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the folder that holds the measured files.")
+    path = folder / CAMPAIGN_FILE
+    if path.exists() or path.is_symlink():
+        raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
+    own = own_rigs(rig_files)
+    # A user's own come first: they win where a built-in one fits as well.
+    known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
+    rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
+    files = measured_files(folder)
+    if len(files) > MOST_RECORDS:
+        raise InputError(
+            f"{folder} holds {len(files)} measured files; a campaign has at most {MOST_RECORDS}."
+        )
+    proposals, left_out = proposed_records(files, rigs)
+    if not proposals:
+        reasons = "".join(f"\n{name}: {reason}" for name, reason in left_out[:5])
+        raise InputError(
+            f"{folder} holds no measured file that can be used ({', '.join(MEASURED_SUFFIXES)}).{reasons}"
+        )
+    rig = proposals[0].guess.rig
+    others = () if model is not None else tuple(name for name in known if name != rig.name)
+    source = {own_rig.name: file for file, own_rig in own.items()}.get(rig.name)
+    beside = {} if source is None else _copied(folder, source)
+    inside = source and (folder / source.name if beside else source)
+    text, n_blanks = campaign_text(folder, rig, inside, others, values, proposals, left_out)
+    write_together(folder, {**beside, CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
+    return Draft(
+        path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks, others
+    )
+
+
+def run_init_from_mjcf(
+    folder: str | Path,
+    model_file: str | Path,
+    *,
+    gears: Mapping[str, float] | None = None,
+    as_it_is: bool = False,
+    listener: Listener = silent,
+) -> ModelDraft:
+    """Write the rig file of a MuJoCo model or URDF, and a campaign if its folder holds measured files.
+
+    Parameters
+    ----------
+    folder
+        Where it is written; created if it does not exist.
+    model_file
+        MJCF or URDF.
+    gears
+        Name of a joint -> stiffness of its gear [N m/rad or N/m].
+    as_it_is
+        Leave the bodies to MuJoCo: contacts, ranges, equalities and tendons too.
+    listener
+        Told what is being done: equations of many joints take their time.
+
+    Raises
+    ------
+    InputError
+        If the model cannot be read or taken over, a file is in the way, or nothing can be written there.
+    """
+    folder, source = Path(folder), Path(model_file)
+    robot = read_robot(source, gears, as_it_is=as_it_is)
+    draft = robot.draft
+    stage = Stage(f"Equations of {len(draft.tables['coordinates'])} coordinates", 2, listener)
+    rig = draft.rig
+    stage.finished("derived")
+    path = folder / f"{rig.name}.toml"
+    text = rig_text(draft, source.name, folder)
+    # Once records are there, the same command goes on with the campaign.
+    if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
+        raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
+    campaign_file = folder / CAMPAIGN_FILE
+    if campaign_file.exists() or campaign_file.is_symlink():
+        raise InputError(
+            f"{campaign_file} exists already and is not overwritten; remove it, or edit it by hand."
+        )
+    run = free_run(with_gears(robot.spec, draft), draft)
+    stage.finished("compared with MuJoCo")
+    write_together(folder, {path.name: text}, "Make room or ask for the right to write there.")
+    campaign = None
+    if measured_files(folder):
+        campaign = run_init(folder, model=rig.name, rig_files=[path], values=draft.values)
+    return ModelDraft(path, draft, run, campaign)
+
+
+def _copied(folder: Path, file: Path) -> dict[str, str]:
+    """Return what to write beside a campaign so that it holds its rig file; nothing where that is inside already."""
+    if file.resolve().is_relative_to(folder.resolve()):
+        return {}
+    text, copy = file.read_text(encoding="utf-8"), folder / file.name
+    if copy.exists() and copy.read_text(encoding="utf-8", errors="replace") != text:
+        raise InputError(
+            f"{copy} differs from {file}, which would be copied there. Name the file in the folder with --rigs, or remove it."
+        )
+    return {file.name: text}

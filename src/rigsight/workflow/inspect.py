@@ -1,0 +1,103 @@
+"""What `rigsight inspect` does: a measured file -> its channels at a glance, and an entry for a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rigsight.errors import InputError
+from rigsight.records.channel_names import closeness
+from rigsight.records.channel_summary import ChannelSummary, summarize, time_summary
+from rigsight.records.formats.channel import Refused
+from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.records.read_record import TIME
+from rigsight.rigs import RIGS, Rig
+from rigsight.workflow.campaign.record_proposal import propose
+
+SCHEMA_VERSION = 1
+_NAMED = 2.0
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a file holds.
+
+    Attributes
+    ----------
+    file, format
+        Its name and the name of its format.
+    channels
+        In the order of the file.
+    times
+        Channel that looks like time -> median step in its unit and number of gaps, None where it does not rise.
+    refused
+        What else is in the file, and why it is no signal over time.
+    model
+        The rig that the channels fit best.
+    proposal
+        ``[[records]]`` entry, with what must be checked as comments.
+    n_blanks
+        Values that are left to be filled in there.
+    """
+
+    file: str
+    format: str
+    channels: tuple[ChannelSummary, ...]
+    times: dict[str, tuple[float | None, int | None]]
+    refused: tuple[Refused, ...]
+    model: str
+    proposal: str
+    n_blanks: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the same for machines."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "file": self.file,
+            "format": self.format,
+            "channels": [asdict(channel) for channel in self.channels],
+            "times": {name: {"step": step, "n_gaps": gaps} for name, (step, gaps) in self.times.items()},
+            "refused": [asdict(refused) for refused in self.refused],
+            "proposal": {"model": self.model, "toml": self.proposal, "n_blanks": self.n_blanks},
+        }
+
+
+def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
+    """Look into a measured file of any format that is read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    own_rigs
+        Rigs whose signals it may hold beside those of the built-in ones.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    path = Path(path)
+    with open_measurement(path) as file:
+        channels = tuple(summarize(channel) for channel in file.channels)
+        times = {
+            channel.name: time_summary(channel)
+            for channel in file.channels
+            if closeness(channel.name, TIME) >= _NAMED
+        }
+        if not channels:
+            reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
+            raise InputError(f"{path.name} ({file.format}) holds no signal over time: {reasons}.")
+        proposal = propose(path, file, (*own_rigs, *RIGS.values()))
+    return Inspection(
+        path.name,
+        file.format,
+        channels,
+        times,
+        file.refused,
+        proposal.guess.rig.name,
+        proposal.toml("estimation", '"validation" for records that are only scored'),
+        proposal.n_blanks,
+    )

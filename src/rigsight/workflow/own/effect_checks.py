@@ -1,0 +1,346 @@
+"""Which checks must a simulated effect pass: does it vanish at null, stay finite, give no energy, and is it found again?
+
+Measured on one mass with a spring, lateral effects on the running gear, those of a prescribed motion on an element. Each function
+returns a sentence that says what is broken, or None.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigsight.effects import Effect, Energy, Place
+from rigsight.errors import SimulationError
+from rigsight.excitation import linear_sweep
+from rigsight.identify import GreyBoxFit, characteristic_scales
+from rigsight.records import Record
+from rigsight.rigs import AXIS, ELEMENT, RUNNING_GEAR, Rig, Signal, joint_of
+from rigsight.simulate import compose, simulate
+from rigsight.units import characteristic_value
+
+PER_PERIOD = 200
+"""Samples per period of a sine test."""
+RESONANCE = 10.0
+"""Angular frequency of the axis of the sine tests [rad/s]."""
+FULL, SMALL = 1.0, 0.3
+"""Amplitudes of sine tests."""
+_NEAR_NULL = 1e-6
+_CONTINUOUS = 1e-3
+"""Largest change of the response that far from null, in sizes of the motion."""
+_STEADY = 1e-3
+_ENERGY = 5e-3
+_NOISE = 1e-3
+"""Noise in shares of the motion: small enough for an effect to be seen, far above the integrator's error."""
+_LEVELS = (1.0, 50.0)
+"""Drive levels of the sweeps; the second is for effects that show at large angles only."""
+_WRONG = (1.05, 0.95)
+"""Factors on the true numbers from which fits start; play with memory makes ridges, over which only one way may lead."""
+_NOISE_ALONE = 0.05
+_SIGMAS = 4.5
+_SEEN = 0.3
+"""Largest standard error of a parameter that counts as determined, in sizes of the parameter."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A rig with numbers on which an effect is tried.
+
+    Attributes
+    ----------
+    rig, values
+        The rig and its numbers.
+    output
+        The output that the effect acts on.
+    swept
+        The rig's numbers in the sweeps in which the effect is to be found again.
+    free
+        Parameters of the rig that are found again with the effect's.
+    """
+
+    rig: Rig
+    values: dict[str, float]
+    output: str
+    swept: dict[str, float]
+    free: tuple[str, ...]
+
+
+AXIS_BENCH = Bench(
+    AXIS,
+    {"gain": 1.0, "m": 1.0, "d": 2.0, "k": RESONANCE**2, "x_off": 0.0, "force_off": 0.0},
+    "x",
+    {"gain": 2.0, "m": 1.5, "d": 4.0, "k": 300.0, "x_off": 1e-4, "force_off": 0.0},
+    ("m", "d", "k", "x_off"),
+)
+_GEAR_VALUES = {
+    "v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27, "J_z": 0.56, "k_c": 81.0, "k_d": 2.0, "l_0": 0.25, "c_y": 0.98,
+    "psi_off": 1e-4, "y_off": 1e-4,
+}  # fmt: skip
+GEAR_BENCH = Bench(
+    RUNNING_GEAR, _GEAR_VALUES, "y", _GEAR_VALUES, ("J_z", "k_c", "k_d", "l_0", "c_y", "psi_off", "y_off")
+)
+_ELEMENT_VALUES = {"d": 2.0, "k": RESONANCE**2, "force_off": 0.0}
+ELEMENT_BENCH = Bench(ELEMENT, _ELEMENT_VALUES, "force", _ELEMENT_VALUES, ("d", "k", "force_off"))
+
+
+def bench_of(effect: Effect) -> Bench:
+    """Return the bench on which an effect is tried: the first that offers it."""
+    benches = (AXIS_BENCH, GEAR_BENCH, ELEMENT_BENCH)
+    return next((bench for bench in benches if bench.rig.offers(effect)), GEAR_BENCH)
+
+
+def sine_record(
+    amplitude: float, n_periods: int, omega: float = 0.25 * RESONANCE, bench: Bench = AXIS_BENCH
+) -> Record:
+    """Return the input of a sine test; by default so low that the third harmonic stays below the resonance."""
+    dt = 2.0 * np.pi / omega / PER_PERIOD
+    time = dt * np.arange(n_periods * PER_PERIOD + 1)
+    source = bench.rig.inputs[0]
+    return Record("sine", dt, {source.name: amplitude * np.sin(omega * time)}, {source.name: source.unit})
+
+
+def sizes(bench: Bench, record: Record) -> dict[str, float]:
+    """Return the size of each base quantity when the rig without the effect runs a record."""
+    return characteristic_scales(
+        bench.rig, [simulate(compose(bench.rig), bench.values, record)], bench.values
+    )
+
+
+def start_values(effect: Effect) -> list[dict[str, float]]:
+    """Return the bench's values with all combinations of the effect's first two start values."""
+    bench = bench_of(effect)
+    scales = sizes(bench, sine_record(FULL, 3, bench=bench))
+    choices = []
+    for p in effect.parameters:
+        size = characteristic_value(p.dimension, scales)
+        starts = [start * size for start in p.starts[:2]] if p.starts else [p.default or 0.0]
+        choices.append([(p.name, value) for value in starts])
+    return [{**bench.values, **dict(choice)} for choice in itertools.product(*choices)]
+
+
+def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float]]:
+    """Return the bench's values with the corners of the search box and random points in it, as far as a search goes there."""
+    bench = bench_of(effect)
+    scales = sizes(bench, sine_record(FULL, 3, bench=bench))
+    fitted = [p for p in effect.parameters if p.fitted]
+    corners = list(itertools.product(*[p.search for p in fitted]))
+    inside = [tuple(rng.uniform(*p.search) for p in fitted) for _ in range(5)]
+    points = []
+    for point in corners + inside:
+        own = {
+            p.name: c * characteristic_value(p.dimension, scales) for p, c in zip(fitted, point, strict=True)
+        }
+        held = [p for p in effect.parameters if not p.fitted]
+        own |= {p.name: p.held_at(characteristic_value(p.dimension, scales)) for p in held}
+        # A search moves sum and difference themselves. A negative sum lets a memory grow without end; where the unloading branch
+        # is the steeper one, a saturated loop has nothing but its rounding to come back with.
+        if all(
+            own[pair.first] + own[pair.second] >= 0.0
+            and own[pair.first] - own[pair.second] >= min(pair.difference_range[0], 0.0)
+            for pair in effect.searched_as
+        ):
+            points.append({**bench.values, **own})
+    return points
+
+
+def null_gives_the_rig(effect: Effect) -> str | None:
+    """Check that its null values leave the rig exactly as it is."""
+    bench = bench_of(effect)
+    record = sine_record(FULL, 3, bench=bench)
+    null = effect.null_values()
+    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
+    with_effect = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **null}, record)
+    if np.array_equal(with_effect[bench.output], plain):
+        return None
+    return f"with {_told(null)} the simulation differs from the rig's: {_difference(with_effect[bench.output], plain)}."
+
+
+def vanishes_continuously(effect: Effect) -> str | None:
+    """Check that close to its null values the response is close to the rig's."""
+    bench = bench_of(effect)
+    record = sine_record(FULL, 3, bench=bench)
+    start = start_values(effect)[0]
+    near = {
+        name: null / 2.0 if abs(null) > 1e3 * abs(start[name]) else _close(null, start[name])
+        for name, null in effect.null_values().items()
+    }
+    plain = simulate(compose(bench.rig), bench.values, record)[bench.output]
+    with_effect = simulate(compose(bench.rig, [effect]), {**start, **near}, record)[bench.output]
+    if np.max(np.abs(with_effect - plain)) <= _CONTINUOUS * np.max(np.abs(plain)):
+        return None
+    return (
+        f"close to its null values ({_told(near)}) the simulation is not close to the rig's: "
+        f"{_difference(with_effect, plain)}. Null must be where the effect fades away."
+    )
+
+
+def _close(null: float, start: float) -> float:
+    return 1e-4 * start if null == 0.0 else null + _NEAR_NULL * (start - null)
+
+
+def gives_no_energy(effect: Effect) -> str | None:
+    """Check that in a steady cycle a dissipative effect takes energy, and a conservative one neither takes nor gives."""
+    if effect.place is not Place.DYNAMICS or effect.energy is Energy.ACTIVE:
+        return None
+    bench = bench_of(effect)
+    pushed, moved = ("u", "x") if bench is AXIS_BENCH else ("force", "x")
+    for omega in (0.4 * RESONANCE, 0.9 * RESONANCE):
+        record = sine_record(SMALL, 40, omega, bench)
+        for values in start_values(effect):
+            run = simulate(compose(bench.rig, [effect]), values, record)
+            x = run[moved]
+            cycle, before = last_period(x), x[-2 * PER_PERIOD - 1 : -PER_PERIOD - 1]
+            still = np.ptp(cycle) == 0.0
+            if still or np.max(np.abs(cycle - before)) > _STEADY * np.ptp(cycle):
+                continue
+            step = np.diff(np.append(cycle, cycle[0]))
+            force = last_period(run[pushed])
+            work = float(np.sum(0.5 * (force + np.roll(force, -1)) * step))
+            damper = values["d"] * float(np.sum(step**2)) / record.dt
+            size = abs(work) + damper
+            taken = (work - damper) / size
+            if taken < -_ENERGY or (effect.energy is Energy.CONSERVATIVE and taken > _ENERGY):
+                verb = "gives" if taken < 0.0 else "takes"
+                return (
+                    f"it is declared {effect.energy.value}, but {verb} {abs(taken):.1%} of the work of a cycle "
+                    f"({_told({p.name: values[p.name] for p in effect.parameters})}). Mind the sign: a torque resists the motion."
+                )
+    return None
+
+
+def last_period(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the last full period of a sine test, shape (PER_PERIOD,)."""
+    return samples[-PER_PERIOD - 1 : -1]
+
+
+def finite_where_searched(effect: Effect) -> str | None:
+    """Check that the simulation stays finite wherever a search may go."""
+    bench = bench_of(effect)
+    record = sine_record(FULL, 3, bench=bench)
+    may_escape = effect.energy is Energy.CONSERVATIVE and any(
+        p.null is not None and p.search[0] < p.null for p in effect.parameters
+    )
+    for values in box_values(effect, np.random.default_rng(11)):
+        try:
+            finite = bool(
+                np.all(np.isfinite(simulate(compose(bench.rig, [effect]), values, record)[bench.output]))
+            )
+        except SimulationError:
+            # A spring that softens to nothing lets the mass go: allowed only where the sign is free.
+            finite = may_escape
+        if not finite:
+            own = {p.name: values[p.name] for p in effect.parameters}
+            return f"it cannot be simulated at {_told(own)}, inside its search ranges; narrow them."
+    return None
+
+
+def is_found_again(effect: Effect) -> str | None:
+    """Check that a fit to its own noisy simulation returns its parameters."""
+    bench = bench_of(effect)
+    failed = None
+    for amplitude in _LEVELS:
+        failed = _recovered(effect, bench, amplitude)
+        if failed is None:
+            return None
+    return failed
+
+
+def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
+    rng = np.random.default_rng(4)
+    t = 0.01 * np.arange(1500, dtype=np.float64)
+    source = bench.rig.inputs[0].name
+    driven = [
+        Record("sweep", 0.01, {source: linear_sweep(t, share * amplitude, 1.0, 30.0)}, {}, hold="zoh")
+        for share in (0.4, 1.0)
+    ]
+    plain = [simulate(compose(bench.rig), bench.swept, record) for record in driven]
+    scales = characteristic_scales(bench.rig, plain, bench.swept)
+    structure = compose(bench.rig, [effect], effect.special_cases)
+    size = {p.name: characteristic_value(p.dimension, scales) for p in effect.parameters}
+    own = [p for p in effect.parameters if p.fitted and p.name not in effect.special_cases]
+    truth = {
+        **bench.swept,
+        **{p.name: p.default for p in effect.parameters if p.default is not None},
+        **{p.name: p.held_at(size[p.name]) for p in effect.parameters if not p.fitted},
+        **{p.name: p.starts[0] * size[p.name] for p in own},
+    }
+    noise = {signal.name: _NOISE * scales[base] for signal, base in _bases(bench.rig)}
+    records = []
+    for record in driven:
+        simulated = simulate(structure, truth, record)
+        noisy = {
+            name: simulated[name] + rng.normal(scale=s, size=record.n_samples) for name, s in noise.items()
+        }
+        records.append(simulated.with_signals(**noisy))
+    joint = joint_of(bench.rig, effect)
+    known = bench.rig.constant_forces_at(joint) if effect.holds_constant_force else frozenset()
+    free = [*(name for name in bench.free if name not in known), *(p.name for p in own)]
+    problem = GreyBoxFit(structure, records, scales, noise)
+    for wrong in _WRONG:
+        start = {name: value * (wrong if name in free else 1.0) for name, value in truth.items()}
+        if effect.place is Place.DISTURBANCE:
+            # A line that is off by more than a cycle over the record is another line to a fit over time.
+            for p in own:
+                if p.dimension == "time^-1":
+                    start[p.name] = truth[p.name] + 1.0 / float(t[-1])
+        result = problem.fit(start, free)
+        if abs(result.weighted_rms - 1.0) <= _NOISE_ALONE:
+            break
+    else:
+        return (
+            f"fits to its own simulation, started {_WRONG[0] - 1.0:.0%} off, leave {result.weighted_rms:.2f} times the noise; "
+            "the equation is too rough in its parameters, or starts and search do not suit it."
+        )
+    for p in own:
+        error = result.standard_errors[p.name]
+        if not error < _SEEN * (abs(truth[p.name]) or size[p.name]):
+            return (
+                f"records do not determine {p.name}: {truth[p.name]:.3g} comes back with a standard error of {error:.2g}. "
+                "Fix it (fitted=False with a default), or choose starts at which the effect is strong."
+            )
+    for name in free:
+        error = result.standard_errors[name]
+        if abs(result.values[name] - truth[name]) >= _SIGMAS * error:
+            return (
+                f"a fit to its own simulation returns {name} = {result.values[name]:.4g} +- {error:.2g} "
+                f"instead of {truth[name]:.4g}."
+            )
+    return None
+
+
+def _bases(rig: Rig) -> list[tuple[Signal, str]]:
+    return list(zip(rig.outputs, ("x", "length") if rig.is_driven else ("force",), strict=False))
+
+
+CHECKS: tuple[Callable[[Effect], str | None], ...] = (
+    null_gives_the_rig,
+    vanishes_continuously,
+    gives_no_energy,
+    finite_where_searched,
+    is_found_again,
+)
+"""In the order in which they are worth reading."""
+
+
+def failed_checks(effect: Effect) -> tuple[str, ...]:
+    """Return what an effect with a sound declaration does not pass, one sentence each."""
+    found: list[str] = []
+    for check in CHECKS:
+        try:
+            failed = check(effect)
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            failed = f"it cannot be simulated or fitted at its start values: {error}"
+        if failed is not None:
+            found.append(failed)
+    return tuple(found)
+
+
+def _told(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+
+
+def _difference(samples: NDArray[np.float64], plain: NDArray[np.float64]) -> str:
+    return f"by {float(np.max(np.abs(samples - plain)) / np.max(np.abs(plain))):.2g} of the motion"

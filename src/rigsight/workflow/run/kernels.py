@@ -1,0 +1,80 @@
+"""Which kernels a diagnosis needs, and how are they compiled before it starts?"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+
+from joblib import Parallel, delayed
+
+from rigsight.diagnose import candidates_on, structures_of_lineup
+from rigsight.effects import Effect
+from rigsight.errors import check_in_range
+from rigsight.rigs import Rig
+from rigsight.simulate import Structure, compose
+from rigsight.simulate.compiled.precompile import compile_kernels, compiled
+from rigsight.workflow.run.progress import Listener, Stage, silent
+
+COMPILING = "Compiling kernels (first time only)"
+_MOST_JOBS = 1024
+
+
+def checked_jobs(n_jobs: int | None) -> int:
+    """Return the number of jobs to run side by side: one per processor that this process may use, unless it is given.
+
+    Raises
+    ------
+    InputError
+        If it is not between 1 and 1024.
+    """
+    if n_jobs is not None:
+        return int(check_in_range("The number of jobs", n_jobs, 1, _MOST_JOBS))
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def structures_to_try(
+    rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
+) -> list[Structure]:
+    """Return the structures that a diagnosis simulates first: as modelled, pushed at every place, and each effect by itself."""
+    offered = candidates_on(rig, effects, modelled)
+    return [compose(rig, modelled), *structures_of_lineup(rig, offered, modelled)]
+
+
+def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:
+    """Compile what this machine does not hold yet, several at a time.
+
+    Parameters
+    ----------
+    structures
+        What is going to be simulated.
+    n_jobs
+        Compilers side by side.
+    listener
+        Told of every compiled kernel; not at all where there is nothing to compile.
+
+    Raises
+    ------
+    InputError
+        If there is no C compiler, or it fails, or the cache folder cannot be written.
+    """
+    missing = [structure for structure in structures if not compiled(structure)]
+    if not missing:
+        return
+    stage = Stage(COMPILING, len(missing), listener)
+    # A compiler is a process of its own, so threads are enough to keep several at work.
+    parallel = Parallel(
+        n_jobs=min(n_jobs, len(missing)), backend="threading", return_as="generator_unordered", batch_size=1
+    )
+    for name in parallel(delayed(_compile)(structure) for structure in missing):
+        stage.finished(name)
+
+
+def _compile(structure: Structure) -> str:
+    compile_kernels(structure)
+    return _described(structure)
+
+
+def _described(structure: Structure) -> str:
+    return ", ".join(structure.effect_names) or structure.rig.name

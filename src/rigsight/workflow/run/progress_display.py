@@ -1,0 +1,111 @@
+"""How does a person at a terminal see the progress of a command?"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import IO, Any, cast
+
+import typer
+
+from rigsight.workflow.run.progress import Listener, Step, silent
+
+_REMEMBERED = 24 * 3600.0
+"""Time [s] over which the speed of steps is averaged."""
+_BETWEEN_LINES = 30.0
+"""Time [s] after which a log is told how far the work is: often enough to see that it goes on, and no more."""
+
+
+@contextlib.contextmanager
+def listening(quiet: bool) -> Iterator[Listener]:
+    """Show progress on stderr: a bar on a terminal, a line now and then where the output is kept, nothing if quiet."""
+    # A process without a terminal may have no stderr at all.
+    if quiet or sys.stderr is None:
+        yield silent
+    elif not sys.stderr.isatty():
+        yield log_lines()
+    else:
+        with _bar() as listener:
+            yield listener
+
+
+def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time.monotonic) -> Listener:
+    """Return what says a line at the start of a stage, and later at most one in so many seconds."""
+    last = clock()
+
+    def say(step: Step) -> None:
+        nonlocal last
+        if step.done > 0 and clock() - last < between:
+            return
+        last = clock()
+        detail = f": {step.detail}" if step.detail else ""
+        line = (
+            f"{step.stage} ..." if step.done == 0 else f"{step.stage} ({step.done} of {step.total}){detail}"
+        )
+        # A log that is full, or a terminal that went away, ends no work of hours.
+        with contextlib.suppress(OSError):
+            typer.echo(line, err=True)
+
+    return say
+
+
+class _Lasting:
+    """A terminal that may go away: what can no longer be shown ends no work of hours and hides no error."""
+
+    def __init__(self, terminal: IO[str]) -> None:
+        self._terminal = terminal
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._terminal, name)
+
+    def write(self, text: str, /) -> int:
+        with contextlib.suppress(OSError):
+            return self._terminal.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with contextlib.suppress(OSError):
+            self._terminal.flush()
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Listener]:
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[detail]}"),
+    )
+    # Single steps take minutes, and the time left is told from all of them.
+    with Progress(
+        *columns,
+        console=Console(file=cast("IO[str]", _Lasting(sys.stderr)), force_terminal=True),
+        transient=True,
+        speed_estimate_period=_REMEMBERED,
+    ) as progress:
+        tasks = {}
+        # The first seconds go into importing sympy and scipy: say that something happens.
+        starting = progress.add_task("Starting", total=None, detail="")
+
+        def listener(step: Step) -> None:
+            progress.update(starting, visible=False)
+            if step.stage not in tasks:
+                tasks[step.stage] = progress.add_task(step.stage, total=step.total, detail="")
+            progress.update(tasks[step.stage], completed=step.done, total=step.total, detail=step.detail)
+
+        yield listener

@@ -1,0 +1,392 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigsight.errors import InputError
+from rigsight.identify.closed_loop import closed_loop_notes
+from rigsight.records.reference import instrument_of
+from rigsight.rigs import rig_file_text
+from rigsight.workflow.campaign.read_campaign import read_campaign
+
+HEAD = """
+title = "rear axle"
+[rig]
+model = "running_gear"
+[rig.constants]
+v = 1.0
+r_0 = 0.1
+b = 0.3
+k_tau = 0.27
+[rig.parameters]
+J_z = 0.56
+"""
+RECORDS = """
+[[records]]
+file = "sweep.csv"
+kind = "sweep"
+amplitude = 0.25
+[[records]]
+file = "step.csv"
+role = "validation"
+kind = "step"
+hold = "zoh"
+"""
+Lines = list[str]
+
+
+@pytest.fixture
+def campaign(tmp_path: Path, write_csv: Callable[..., Path]) -> Callable[..., Path]:
+    """Write a campaign of two records and return its folder."""
+
+    def write(text: str = HEAD + RECORDS, change: Callable[[Lines], None] | None = None) -> Path:
+        write_csv("sweep.csv", change=change)
+        write_csv("step.csv", change=lambda lines: lines.pop())
+        (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+        return tmp_path
+
+    return write
+
+
+def test_a_campaign_is_read_whole(campaign: Callable[..., Path]) -> None:
+    folder = campaign()
+    read = read_campaign(folder)
+    assert (read.title, read.rig.name, read.folder) == ("rear axle", "running_gear", folder)
+    assert read.constants == {"v": 1.0, "r_0": 0.1, "b": 0.3, "k_tau": 0.27}
+    assert read.parameters == {"J_z": 0.56}
+    assert [record.name for record in read.estimation] == ["sweep"]
+    (step,) = read.validation
+    assert (step.kind, step.hold, step.role) == ("step", "zoh", "validation")
+    assert list(step.signals) == ["u", "psi", "y"]
+    assert read.notes == ()
+
+
+def test_the_toml_file_may_be_named_instead_of_its_folder(campaign: Callable[..., Path]) -> None:
+    folder = campaign()
+    (folder / "campaign.toml").rename(folder / "other.toml")
+    assert len(read_campaign(folder / "other.toml").records) == 2
+    with pytest.raises(InputError, match=r"holds no campaign.toml. Name one of its files: other.toml"):
+        read_campaign(folder)
+
+
+def test_columns_and_dialect_come_from_the_record(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
+    t = 0.01 * np.arange(80)
+    rows = np.column_stack([t, 1e3 * np.sin(t), np.cos(t)])
+    write_csv(
+        "log.txt", rows=rows, header=None, separator=";", change=lambda lines: lines.insert(0, "! remark")
+    )
+    (tmp_path / "campaign.toml").write_text(
+        '[rig]\nmodel = "element"\n[[records]]\nfile = "log.txt"\nname = "bench"\nseparator = ";"\ncomment = "!"\n'
+        'header = false\ndecimal = "."\n[records.columns]\nt = 1\nx = { name = 2, scale = 1e-3 }\nforce = "3"\n'
+    )
+    (record,) = read_campaign(tmp_path).records
+    assert record.name == "bench"
+    np.testing.assert_allclose(record["x"], np.sin(t), atol=1e-9)
+    np.testing.assert_allclose(record["force"], np.cos(t), atol=1e-9)
+
+
+def test_constants_with_a_default_may_be_left_out(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
+    write_csv(header="t,u,x,y")
+    (tmp_path / "campaign.toml").write_text('[rig]\nmodel = "axis"\n[[records]]\nfile = "sweep.csv"\n')
+    read = read_campaign(tmp_path)
+    assert read.constants == {"gain": 1.0}
+    assert 'no record has role = "validation"' in read.notes[0]
+
+
+def test_conicity_passes_instead_of_the_creep_factor(campaign: Callable[..., Path]) -> None:
+    text = (HEAD + RECORDS).replace("J_z = 0.56", "delta_0 = 0.02")
+    assert read_campaign(campaign(text)).parameters == {"delta_0": 0.02}
+
+
+def test_records_of_one_file_get_names_of_their_own(campaign: Callable[..., Path]) -> None:
+    text = (
+        HEAD + RECORDS + '[[records]]\nfile = "sweep.csv"\n[[records]]\nfile = "step.csv"\nname = "sweep_2"\n'
+    )
+    names = [record.name for record in read_campaign(campaign(text)).records]
+    assert len(set(names)) == 4
+    assert names[0] == "sweep"
+    assert names[3] == "sweep_2"
+
+
+def test_third_party_campaigns_read_without_a_repair(shared_data: Path) -> None:
+    files = sorted(shared_data.glob("*/*.toml"))
+    assert files
+    for file in files:
+        read = read_campaign(file)
+        assert read.estimation
+        assert read.validation
+        assert [note for record in read.records for note in record.notes] == []
+
+
+BROKEN: list[tuple[str, str, str, list[str]]] = [
+    ("syntax", "v = 1.0", "v = ", ["line 6", "column", "TOML"]),
+    ("unknown key at the top", 'title = "', 'titel = "', ["titel", "unknown key", "'title'"]),
+    ("unknown key in rig", "[rig.constants]", "[rig.constant]", ["rig.constant", "Did you mean 'constants'"]),
+    ("unknown key in record", "hold =", "holds =", ["record 2 (step.csv): holds", "Did you mean 'hold'"]),
+    ("model missing", 'model = "running_gear"', "", ["rig.model", "missing"]),
+    (
+        "model unknown",
+        '"running_gear"',
+        '"runing_gear"',
+        ["rig.model", "Did you mean 'running_gear'", "axis"],
+    ),
+    ("constant missing", "k_tau = 0.27", "", ["rig.constants.k_tau", "missing", "N m/A"]),
+    ("constant unknown", "k_tau = 0.27", "k_tua = 0.27", ["rig.constants.k_tua", "Did you mean 'k_tau'"]),
+    (
+        "constant as text",
+        "k_tau = 0.27",
+        'k_tau = "0.27"',
+        ["rig.constants.k_tau", "must be a number", "without quotes"],
+    ),
+    ("constant as truth value", "k_tau = 0.27", "k_tau = true", ["rig.constants.k_tau", "must be a number"]),
+    ("constant zero", "k_tau = 0.27", "k_tau = 0.0", ["rig.constants.k_tau"]),
+    ("constant NaN", "k_tau = 0.27", "k_tau = nan", ["rig.constants.k_tau", "finite"]),
+    ("constant out of range", "r_0 = 0.1", "r_0 = -0.1", ["rig.constants.r_0", "must lie in", "got -0.1"]),
+    ("parameter unknown", "J_z = 0.56", "J_zz = 0.56", ["rig.parameters.J_zz", "Did you mean 'J_z'"]),
+    ("parameter out of range", "J_z = 0.56", "J_z = -1.0", ["rig.parameters.J_z", "got -1"]),
+    (
+        "parameter twice",
+        "J_z = 0.56",
+        "c_y = 0.9\ndelta_0 = 0.1",
+        ["rig.parameters.delta_0", "c_y", "one of the two"],
+    ),
+    ("no records", RECORDS, "", ["records", "missing", "[[records]]"]),
+    ("empty records", RECORDS, "", ["records: 0 given, 1 to 1000"]),
+    ("records no list", "[[records]]\nfile", "[records]\nfile", ["campaign.toml", "begins with [[records]]"]),
+    ("path of Windows", '"sweep.csv"', '"C:\\data.csv"', ["campaign.toml", "Write paths with /"]),
+    ("file missing", 'file = "sweep.csv"', "", ["record 1: file", "missing"]),
+    (
+        "file not there",
+        '"sweep.csv"',
+        '"sweeps.csv"',
+        ["record 1: file", "does not exist", "Did you mean 'sweep.csv'"],
+    ),
+    ("absolute file", '"sweep.csv"', '"/etc/passwd"', ["record 1: file", "leaves the campaign's folder"]),
+    ("file above", '"sweep.csv"', '"../sweep.csv"', ["record 1: file", "leaves the campaign's folder"]),
+    ("file is a folder", '"sweep.csv"', '"."', ["record 1: file", "does not exist"]),
+    (
+        "role unknown",
+        '"validation"',
+        '"validate"',
+        ["record 2 (step.csv): role", "Did you mean 'validation'"],
+    ),
+    ("kind unknown", '"step"', '"jump"', ["record 2 (step.csv): kind", "'multisine'"]),
+    ("hold unknown", '"zoh"', '"ZOH"', ["record 2 (step.csv): hold", "'foh'"]),
+    ("amplitude as text", "0.25", '"0.25 A"', ["record 1 (sweep.csv): amplitude", "must be a number"]),
+    ("nothing to fit", 'kind = "sweep"', 'role = "validation"', ['none has role = "estimation"']),
+    (
+        "column signal unknown",
+        "amplitude = 0.25",
+        'columns = { phi = "psi" }',
+        ["record 1 (sweep.csv): columns.phi", "psi"],
+    ),
+    (
+        "column not there",
+        "amplitude = 0.25",
+        'columns = { u = "i" }',
+        ["record 1", "sweep.csv has no column 'i'", "'psi'"],
+    ),
+    (
+        "column key unknown",
+        "amplitude = 0.25",
+        'columns = { u = { name = "u", scal = 2.0 } }',
+        ["columns.u.scal", "'scale'"],
+    ),
+    (
+        "column of no use",
+        "amplitude = 0.25",
+        "columns = { u = true }",
+        ["columns.u", "number counted from 1"],
+    ),
+    (
+        "scale zero",
+        "amplitude = 0.25",
+        'columns = { u = { name = "u", scale = 0 } }',
+        ["columns.u", "other than 0"],
+    ),
+    ("decimal unknown", "amplitude = 0.25", 'decimal = ";"', ["record 1 (sweep.csv): decimal", '"." or ","']),
+    (
+        "separator too long",
+        "amplitude = 0.25",
+        'separator = "tab"',
+        ["record 1 (sweep.csv): separator", "one character"],
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"), [case[1:] for case in BROKEN], ids=[case[0] for case in BROKEN]
+)
+def test_broken_campaigns_are_told_with_key_and_mend(
+    campaign: Callable[..., Path], old: str, new: str, told: list[str], request: pytest.FixtureRequest
+) -> None:
+    text = HEAD + RECORDS
+    assert old in text
+    text = text.replace(old, new)
+    if request.node.callspec.id == "empty records":
+        text = "records = []\n" + text
+    folder = campaign(text)
+    with pytest.raises(InputError) as caught:
+        read_campaign(folder)
+    message = str(caught.value)
+    for fragment in ["campaign.toml", *told]:
+        assert fragment in message
+    assert len(message.splitlines()) == 1
+    assert "pydantic" not in message
+
+
+@pytest.mark.parametrize(("stated", "n_notes"), [(0.25, 0), (1.0, 0), (3.9, 0), (250.0, 1), (1e-3, 1)])
+def test_an_amplitude_that_cannot_be_is_asked_about(
+    stated: float, n_notes: int, campaign: Callable[..., Path]
+) -> None:
+    notes = read_campaign(campaign(HEAD + RECORDS.replace("0.25", f"{stated}"))).notes
+    assert len(notes) == n_notes
+    assert all(f"amplitude = {stated:g}" in note for note in notes)
+
+
+def test_a_gain_of_zero_is_refused(tmp_path: Path, write_csv: Callable[..., Path]) -> None:
+    write_csv("run.csv", header="t,u,x,y")
+    (tmp_path / "campaign.toml").write_text(
+        '[rig]\nmodel = "axis"\n[rig.constants]\ngain = 0\n[[records]]\nfile = "run.csv"\n', "utf-8"
+    )
+    with pytest.raises(InputError, match=r"rig.constants.gain: is 0"):
+        read_campaign(tmp_path)
+
+
+def test_sample_times_a_thousand_apart_are_asked_about(campaign: Callable[..., Path]) -> None:
+    def change(lines: Lines) -> None:
+        for i, line in enumerate(lines[1:], 1):
+            t, _, rest = line.partition(",")
+            lines[i] = f"{1e3 * float(t):.9g},{rest}"
+
+    (note,) = read_campaign(campaign(change=change)).notes
+    assert "factor of 1e+03" in note
+    assert "'sweep' 10 s" in note
+    assert 'unit = "ms"' in note
+
+
+def test_errors_of_a_record_name_campaign_file_and_line(campaign: Callable[..., Path]) -> None:
+    def change(lines: Lines) -> None:
+        lines[7] = lines[7].replace(lines[7].split(",")[1], "off")
+
+    with pytest.raises(
+        InputError, match=r"campaign.toml, line 13, column 1: record 1: sweep.csv, line 8, column 'u': 'off'"
+    ):
+        read_campaign(campaign(change=change))
+
+
+def test_a_link_that_leaves_the_folder_is_refused(
+    campaign: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = campaign()
+    outside = tmp_path_factory.mktemp("elsewhere") / "sweep.csv"
+    (folder / "sweep.csv").rename(outside)
+    (folder / "sweep.csv").symlink_to(outside)
+    with pytest.raises(InputError, match="is a link that leaves the campaign's folder"):
+        read_campaign(folder)
+
+
+def test_missing_empty_and_unreadable_campaigns_are_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="does not exist"):
+        read_campaign(tmp_path / "nowhere")
+    with pytest.raises(InputError, match=r"holds no campaign\.toml"):
+        read_campaign(tmp_path)
+    (tmp_path / "campaign.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not UTF-8"):
+        read_campaign(tmp_path)
+    (tmp_path / "campaign.toml").write_text("")
+    with pytest.raises(InputError, match=r"rig: is missing.*\n.*records: is missing"):
+        read_campaign(tmp_path)
+
+
+AXIS_LOOP = """
+[rig]
+model = "axis"
+[[records]]
+file = "sweep.csv"
+"""
+
+
+def loop_campaign(folder: Path, write_csv: Callable[..., Path], text: str = "", **options: Any) -> Path:
+    write_csv(**{"header": "t,u,x,goal"} | options)
+    (folder / "campaign.toml").write_text(AXIS_LOOP + text, encoding="utf-8")
+    return folder
+
+
+def test_a_record_may_hold_the_reference_of_a_closed_loop(
+    tmp_path: Path, write_csv: Callable[..., Path]
+) -> None:
+    mapped = '[records.columns]\nreference = { name = "goal", unit = "mm" }\n'
+    (record,) = read_campaign(loop_campaign(tmp_path, write_csv, mapped)).records
+    assert record.slice(10, 60)["reference"][0] == pytest.approx(0.01 * np.cos(0.2))
+    assert record.units["reference"] == "mm"
+    (by_name,) = read_campaign(loop_campaign(tmp_path, write_csv, header="t,u,x,reference")).records
+    np.testing.assert_array_equal(by_name["reference"], record["reference"])
+    (without,) = read_campaign(loop_campaign(tmp_path, write_csv)).records
+    assert "reference" not in without
+
+
+def test_a_reference_that_cannot_be_read_is_told_as_other_signals_are(
+    tmp_path: Path, write_csv: Callable[..., Path]
+) -> None:
+    def broken(lines: Lines) -> None:
+        lines[20] = lines[20].rpartition(",")[0] + ",abc"
+
+    mapped = '[records.columns]\nreference = "goal"\n'
+    with pytest.raises(InputError, match=r"record 1: sweep.csv, line 21.*'goal'"):
+        read_campaign(loop_campaign(tmp_path, write_csv, mapped, change=broken))
+    with pytest.raises(InputError, match="no column 'gaol'"):
+        read_campaign(loop_campaign(tmp_path, write_csv, mapped.replace("goal", "gaol")))
+    with pytest.raises(InputError, match=r"columns\.refrence.*Did you mean 'reference'"):
+        read_campaign(loop_campaign(tmp_path, write_csv, mapped.replace("reference", "refrence")))
+
+
+def test_a_rig_whose_own_input_is_called_reference_means_that(
+    tmp_path: Path, write_csv: Callable[..., Path]
+) -> None:
+    own = rig_file_text("servo").replace("goal", "reference").replace('name = "servo"', 'name = "own"')
+    (tmp_path / "own.toml").write_text(own, encoding="utf-8")
+    write_csv(header="t,reference,angle,other")
+    (tmp_path / "campaign.toml").write_text(
+        '[rig]\nfile = "own.toml"\n[[records]]\nfile = "sweep.csv"\n', encoding="utf-8"
+    )
+    campaign = read_campaign(tmp_path)
+    (record,) = campaign.records
+    names = [signal.name for signal in campaign.rig.inputs]
+    assert (names, list(record.signals)) == (["reference"], ["reference", "angle"])
+    assert instrument_of(record, names) is None
+    assert closed_loop_notes(campaign.records, campaign.rig, "") == []
+
+
+def test_time_is_no_signal(campaign: Callable[..., Path]) -> None:
+    folder = campaign(HEAD + RECORDS + '[records.columns]\nu = "t"\n')
+    with pytest.raises(InputError, match=r"step\.csv: u and t are both read from column 't'"):
+        read_campaign(folder)
+
+
+def test_a_fitted_record_that_is_to_validate_too_is_told(campaign: Callable[..., Path]) -> None:
+    folder = campaign(HEAD + RECORDS.replace('"step.csv"', '"sweep.csv"'))
+    (note,) = read_campaign(folder).notes
+    assert "is for validation and holds the very samples of 'sweep', which is fitted" in note
+
+
+def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callable[..., Path]) -> None:
+    text = (HEAD + RECORDS).replace("b = 0.3", "bb = 0.3")
+    line = 1 + text.splitlines().index("bb = 0.3")
+    folder = campaign(text)
+    told = (
+        rf"campaign.toml, line {line}, column 6: rig.constants.bb: unknown to running_gear. Did you mean 'b'"
+    )
+    with pytest.raises(InputError, match=told):
+        read_campaign(folder)
+
+
+def test_what_is_missing_is_told_with_the_line_of_its_table(campaign: Callable[..., Path]) -> None:
+    text = (HEAD + RECORDS).replace("b = 0.3\n", "")
+    line = 1 + text.splitlines().index("[rig.constants]")
+    with pytest.raises(InputError, match=rf"line {line}, column 1: rig.constants.b: is missing"):
+        read_campaign(campaign(text))
