@@ -41,7 +41,7 @@ DECLARATIONS: tuple[dict[str, Any], ...] = (
     },
 )  # fmt: skip
 """Sound ones."""
-_EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "measured_late")
+_EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "reading_delay")
 _FUNCTIONS = {
     "Abs": sp.Abs, "sign": sp.sign, "exp": sp.exp, "log": sp.log, "tanh": sp.tanh, "gamma": sp.gamma, "Max": sp.Max,
     "f": sp.Function("f"), "floor": sp.floor,

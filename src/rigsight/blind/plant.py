@@ -118,7 +118,7 @@ class Plant:
         SimulationError
             If the motion has no end, or events pile up.
         """
-        late = self._equations.measured_late
+        late = self._equations.reading_delay
         grid = dt * np.arange(n_samples, dtype=np.float64)
         n_states = initial_state.size
         wanted = [_Samples(grid, np.full((n_samples, n_states), np.nan))]

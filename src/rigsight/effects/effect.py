@@ -150,7 +150,7 @@ class Effect:
         Rate of the lateral displacement, of ``creepage``, ``creep_gain``, ``lateral_displacement`` and ``lateral_feedback``.
     measured
         What the sensor of the displacement shows, of ``reading`` and states.
-    measured_late
+    reading_delay
         Time by which that sensor is late [s].
     states
         States added, with their rates.
@@ -190,7 +190,7 @@ class Effect:
     delay: sp.Expr | None = None
     lateral: sp.Expr | None = None
     measured: sp.Expr | None = None
-    measured_late: sp.Expr | None = None
+    reading_delay: sp.Expr | None = None
     states: tuple[State, ...] = ()
     elastic_share: str | None = None
     pulsation: str | None = None
@@ -211,7 +211,7 @@ class Effect:
     @property
     def shifts_the_record(self) -> bool:
         """True for a reading whose time base stands off, either way: what is recorded, not what a control law reads."""
-        return self.measured_late is not None and any(p.lower < 0.0 for p in self.parameters)
+        return self.reading_delay is not None and any(p.lower < 0.0 for p in self.parameters)
 
     @property
     def holds_constant_force(self) -> bool:
@@ -233,7 +233,7 @@ class Effect:
             One of `rigsight.effects.symbols`.
         """
         equations = (
-            self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.measured_late,
+            self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.reading_delay,
             *(part for state in self.states for part in (state.rate, state.limit)),
         )  # fmt: skip
         return any(part is not None and signal in part.free_symbols for part in equations)

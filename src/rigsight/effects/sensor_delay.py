@@ -32,5 +32,5 @@ SENSOR_DELAY = Effect(
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
-    measured_late=T_s,
+    reading_delay=T_s,
 )

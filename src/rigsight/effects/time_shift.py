@@ -42,7 +42,7 @@ TIME_SHIFT = Effect(
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
-    measured_late=T_x,
+    reading_delay=T_x,
     # A fit finds from one wave of the record to the next one only.
     starts=tuple(Start({"T_x": share * time_size}) for share in (-0.6, -0.1, 0.1, 0.6)),
 )

@@ -110,7 +110,7 @@ def _compose(
     assert isinstance(effects, tuple)
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
-    late = {rig.acts_at(effect) for effect in effects if effect.measured_late is not None}
+    late = {rig.acts_at(effect) for effect in effects if effect.reading_delay is not None}
     of_observer = [*map(_bandwidth, observed), *(_ahead(sensor) for sensor in observed if sensor in late)]
     parameters = (*_parameters(rig, effects, unique, dict(fixed)), *of_observer)
     symbols = {p.name: sp.Symbol(f"parameter {p.name}", real=True) for p in parameters}

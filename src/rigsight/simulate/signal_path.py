@@ -372,9 +372,9 @@ class _Path:
                     Kind.READING, effect, self._binder.effect(effect, effect.measured, signals)
                 )
         delays = [
-            (effect, self._binder.effect(effect, effect.measured_late, {}))
+            (effect, self._binder.effect(effect, effect.reading_delay, {}))
             for effect in effects
-            if effect.measured_late is not None
+            if effect.reading_delay is not None
         ]
         if sensor.name in self._bandwidths:
             self._shown[sensor.name] = (reading, sp.Add(*(delay for _, delay in delays)))

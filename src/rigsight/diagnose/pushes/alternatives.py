@@ -47,7 +47,7 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
     place = answers.context.rig.acts_at(effect)
     if effect.place in (Place.SENSOR, Place.ACTUATOR):
         # What is limited or dead at once is no other form of what comes late, nor the other way round.
-        is_late = bool(effect.states) or effect.delay is not None or effect.measured_late is not None
+        is_late = bool(effect.states) or effect.delay is not None or effect.reading_delay is not None
         if effect.place is Place.SENSOR:
             return (_changes_of if is_late else _readings_of)(answers, place)
         return (_signal_changes_of if is_late else _signals_of)(answers, place)

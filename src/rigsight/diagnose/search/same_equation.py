@@ -89,7 +89,7 @@ def _without_late_shifts(models: Sequence[Scored]) -> list[Scored]:
 
 
 def _is_late(effect: Effect) -> bool:
-    return effect.measured_late is not None and not effect.shifts_the_record
+    return effect.reading_delay is not None and not effect.shifts_the_record
 
 
 def _but(model: Scored, effect: Effect) -> tuple[frozenset[str], str | None]:

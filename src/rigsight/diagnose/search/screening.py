@@ -263,4 +263,4 @@ def structures_of_lineup(
 
 
 def _is_late(effect: Effect) -> bool:
-    return effect.delay is not None or effect.measured_late is not None
+    return effect.delay is not None or effect.reading_delay is not None

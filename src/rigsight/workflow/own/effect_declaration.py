@@ -30,7 +30,7 @@ _MAY_READ: Mapping[str, tuple[str, ...]] = {
     "delay": (),
     "lateral": ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback"),
     "measured": ("reading", "t"),
-    "measured_late": (),
+    "reading_delay": (),
 }
 _STATES_MAY_READ: Mapping[str, tuple[str, ...]] = {
     **_MAY_READ,
@@ -43,7 +43,7 @@ _PLACES: Mapping[Place, tuple[str, ...]] = {
     Place.DYNAMICS: ("torque", "spring", "deflection"),
     Place.DISTURBANCE: ("torque",),
     Place.LATERAL_DYNAMICS: ("lateral",),
-    Place.SENSOR: ("measured", "measured_late"),
+    Place.SENSOR: ("measured", "reading_delay"),
 }
 _WITH_STATES = ("torque", "spring", "deflection", "drive", "measured")
 _KINKS = (sp.Abs, sp.sign, canonical.positive_part)

@@ -15,7 +15,7 @@ from rigsight.effects import Effect, Energy, Place, Signature, Start, State, Sum
 from rigsight.errors import shown
 from rigsight.parameters import Parameter
 
-EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "measured_late")
+EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "reading_delay")
 """Fields of an effect that change a part of the rig."""
 Check = tuple[Callable[[Any], bool], str]
 """Whether a value is right, and what to give instead."""
