@@ -96,8 +96,8 @@ def regressed_force(
         return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
 
     own_values = final.structure.values_of(law.effect, values)
-    assert law.effect.elastic_share is not None
-    without_memory = own_values[law.effect.elastic_share] * number(motion.stiffness)
+    assert law.effect.post_yield_stiffness_ratio is not None
+    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * number(motion.stiffness)
     shift = _rest_shift(bench, final)
     forces = []
     for own in motions:

@@ -99,12 +99,12 @@ class SupportStarts:
         own |= {name: share * coefficient for name, share in candidate.linear.items()}
         found: dict[str, float] = {}
         if is_loop(effect):
-            assert effect.elastic_share is not None
+            assert effect.post_yield_stiffness_ratio is not None
             stiffness = self.rig.motion.stiffness.name
             without = max(values[stiffness], _SMALL * coefficient)
             total = without + max(coefficient, _SMALL * without)
             found[stiffness] = total
-            own[effect.elastic_share] = without / total
+            own[effect.post_yield_stiffness_ratio] = without / total
         for parameter in effect.parameters:
             if parameter.name in candidate.linear and parameter.lower == 0.0:
                 # A resisting force that the regression turns round is one that is hardly there.

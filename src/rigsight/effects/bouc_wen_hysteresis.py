@@ -117,7 +117,7 @@ BOUC_WEN_HYSTERESIS = Effect(
         ),
     ),
     energy=Energy.DISSIPATIVE,
-    elastic_share="a",
+    post_yield_stiffness_ratio="a",
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque + (1 - a) * k * z,
     states=(

@@ -154,7 +154,7 @@ class Effect:
         Time by which that sensor is late [s].
     states
         States added, with their rates.
-    elastic_share
+    post_yield_stiffness_ratio
         Parameter that is the share of the spring's stiffness without memory; a fit moves that stiffness and the rest of it, with
         memory, because records determine those apart.
     pulsation
@@ -192,7 +192,7 @@ class Effect:
     measured: sp.Expr | None = None
     reading_delay: sp.Expr | None = None
     states: tuple[State, ...] = ()
-    elastic_share: str | None = None
+    post_yield_stiffness_ratio: str | None = None
     pulsation: str | None = None
     wave_number: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()

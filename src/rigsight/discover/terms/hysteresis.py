@@ -54,7 +54,7 @@ def is_loop(effect: Effect) -> bool:
     known |= {sp.Symbol(p.name, real=True) for p in effect.parameters} | {s.symbol for s in effect.states}
     return (
         effect.spring is not None
-        and effect.elastic_share is not None
+        and effect.post_yield_stiffness_ratio is not None
         and bool(effect.states)
         and all(state.rate.free_symbols <= known for state in effect.states)
     )
@@ -88,7 +88,11 @@ class LoopShape:
     def of(cls, effect: Effect) -> LoopShape:
         """Read the coordinates from a declaration."""
         paired = {name for pair in effect.searched_as for name in (pair.first, pair.second)}
-        inside = [p for p in effect.parameters if p.fitted and p.name not in {effect.elastic_share, *paired}]
+        inside = [
+            p
+            for p in effect.parameters
+            if p.fitted and p.name not in {effect.post_yield_stiffness_ratio, *paired}
+        ]
         return cls(
             pairs=effect.searched_as,
             single=tuple(p for p in inside if p.name not in effect.special_cases),
@@ -279,8 +283,8 @@ def _columns(
     motion_of_element = structure.rig.motion
     fixed = {p.name: 0.0 for p in structure.rig.parameters} | {motion_of_element.stiffness.name: 1.0}
     fixed |= {p.name: p.default for p in effect.parameters if p.default is not None}
-    assert effect.elastic_share is not None
-    values = [{**fixed, effect.elastic_share: 0.0, **inner} for inner in shapes]
+    assert effect.post_yield_stiffness_ratio is not None
+    values = [{**fixed, effect.post_yield_stiffness_ratio: 0.0, **inner} for inner in shapes]
     p = np.array([[v[name] for v in values] for name in structure.names])
 
     def block(index: int) -> NDArray[np.float64]:

@@ -111,7 +111,7 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
             yield f"ordered names {name}, which is no parameter.{nearest(name, names)}"
         if set(pair) <= set(names) and dimensions[pair[0]] != dimensions[pair[1]]:
             yield f"ordered compares {pair[0]} with {pair[1]}, whose dimension is another."
-    for field in ("elastic_share", "pulsation", "wave_number"):
+    for field in ("post_yield_stiffness_ratio", "pulsation", "wave_number"):
         name = getattr(effect, field)
         if name is not None and name not in names:
             yield f"{field} names {name}, which is no parameter.{nearest(str(name), names)}"

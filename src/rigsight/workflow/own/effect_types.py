@@ -113,7 +113,7 @@ _OTHERS: dict[str, Check] = {
         ),
         'a tuple of pairs of parameter names, such as (("T_s", "T_c"),)',
     ),
-    "elastic_share": _or_none(_TEXT),
+    "post_yield_stiffness_ratio": _or_none(_TEXT),
     "pulsation": _or_none(_TEXT),
     "wave_number": _or_none(_TEXT),
     "needs_inertia": _YES_OR_NO,
