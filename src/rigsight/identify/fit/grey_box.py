@@ -27,8 +27,8 @@ from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
-from rigsight.identify.fit.separate_states import SeparateStates
 from rigsight.identify.fit.settled_states import guessed_states
+from rigsight.identify.fit.variable_projection import VariableProjection
 from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
@@ -223,7 +223,7 @@ class GreyBoxFit:
         """
         begin = self._begin(start, free, None)
         coordinates, n_free = begin.coordinates, len(free)
-        problem = SeparateStates(self.data, coordinates, begin.places, begin.lower, begin.upper)
+        problem = VariableProjection(self.data, coordinates, begin.places, begin.lower, begin.upper)
         problem.choose_substeps(begin.theta)
         if not np.isfinite(problem.settle_anew(begin.theta[:n_free])):
             return self._failed(problem, begin.theta, "The start values cannot be simulated.")

@@ -34,7 +34,7 @@ _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 _DEPENDENT = 1e-9
 
 
-class SeparateStates(Problem):
+class VariableProjection(Problem):
     """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates.
 
     Parameters
