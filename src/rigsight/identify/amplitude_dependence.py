@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 
 _CHANCE = 1e-3
 """Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""

@@ -10,7 +10,7 @@ from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.conicity import ConicityEstimate
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Record
 

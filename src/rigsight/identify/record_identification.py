@@ -14,13 +14,13 @@ from rigsight.identify.identification import PathIdentification, RecordIdentific
 from rigsight.identify.transfer.axis_parameters import axis_parameters, springless_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
-from rigsight.identify.transfer.physical import (
+from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
+from rigsight.identify.transfer.running_gear_parameters import (
     PhysicalEstimates,
     lateral_parameters,
     static_lateral,
     yaw_parameters,
 )
-from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import fit_frequency_response

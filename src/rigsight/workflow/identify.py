@@ -15,8 +15,8 @@ from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
 from rigsight.identify.record_identification import Wishes, identify_record
-from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.identify.transfer.record_response import METHODS, Method
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigsight.identify.fit.covariance import propagated_covariance
-from rigsight.identify.transfer.physical import PhysicalEstimates, check_fit, motion_parameters
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates, check_fit, motion_parameters
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.rigs import AXIS
 

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from rigsight.errors import InputError
-from rigsight.identify.transfer.physical import LEVEL
+from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.rigs import ROLLING, evaluated
 from rigsight.rigs.conicity import conicity_slope, creep_factor
 

@@ -16,7 +16,7 @@ from scipy.stats import norm, t
 
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import SMOOTHED, colored_covariance
-from rigsight.identify.transfer.physical import LEVEL, PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Hold, Record
 

@@ -14,7 +14,7 @@ from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conici
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
 from rigsight.identify.joint import JointFit
 from rigsight.identify.record_identification import measured_amplitude
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
