@@ -147,9 +147,7 @@ def diagnose(
     return replace(
         diagnosis,
         where=diagnosis.where if pushed else traced_to(task.rig, forces) or diagnosis.where,
-        missing_force=force_of_one_motion(
-            found.context, found.reidentified, task.absent_spring is not None, rng
-        ),
+        missing_force=force_of_one_motion(found.context, found.reidentified, task.absent_spring is None, rng),
         joint_forces=forces,
     )
 

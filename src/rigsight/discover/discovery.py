@@ -103,7 +103,7 @@ def discover(
     )
     say("motion smoothed")
     rows = rows_of(motions, scales["time"], pointwise)
-    projected = own_regression(task.rig, task.no_spring, motions, rows)
+    projected = own_regression(task.rig, task.has_stiffness, motions, rows)
     library = _library(task, motions, rows, projected, scales, threads)
     library, same = _distinct(library, projected)
     say("library")
@@ -117,7 +117,7 @@ def discover(
         held=_held(task) | swallowed,
         candidates={candidate.name: candidate for candidate in library},
         projected=projected,
-        own_terms=own_terms(task.rig, task.no_spring, projected) if method == "full" else {},
+        own_terms=own_terms(task.rig, task.has_stiffness, projected) if method == "full" else {},
         threads=threads,
     )
     selection = select(bench, say)
@@ -140,7 +140,7 @@ def discover(
 
 
 def _linear_values(task: Task, estimation: Sequence[Record]) -> dict[str, float]:
-    known = {"k": 0.0} if task.no_spring else {}
+    known = {} if task.has_stiffness else {"k": 0.0}
     return {**task.constants, **linear_start(task.rig, estimation, task.constants, {**known, **task.held})}
 
 
@@ -151,8 +151,8 @@ def _held(task: Task) -> frozenset[str]:
     if task.rig.is_driven:
         # A linear spring cannot tell a constant force from a shifted rest position.
         rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
-        held |= {symbol.name for symbol in (rest if task.no_spring else bias)}
-    if task.no_spring:
+        held |= {symbol.name for symbol in (bias if task.has_stiffness else rest)}
+    if not task.has_stiffness:
         held.add(motion.stiffness.name)
     return frozenset(held)
 
@@ -190,7 +190,7 @@ def _library(
     scales: Mapping[str, float],
     threads: IdleThreads,
 ) -> list[Candidate]:
-    effects = offered_effects(task.rig, not task.no_spring)
+    effects = offered_effects(task.rig, task.has_stiffness)
     if all(is_constant(motion.u) for motion in motions):
         effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
     found = candidates(effects, motions, rows, projected, scales, task.rig.is_driven, threads)

@@ -54,8 +54,8 @@ def inclusion(
     if abs(shift) < _SAME_REST * bench.scales["x"]:
         shift = 0.0
     moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
-    projected = own_regression(task.rig, task.no_spring, moved, rows) if shift else bench.projected
-    own_columns = own_terms(task.rig, task.no_spring, projected) if bench.own_terms else {}
+    projected = own_regression(task.rig, task.has_stiffness, moved, rows) if shift else bench.projected
+    own_columns = own_terms(task.rig, task.has_stiffness, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
         # The loop does not know where rest is.

@@ -90,7 +90,7 @@ def missing_force(
     scales: Mapping[str, float],
     noise: float,
     rng: np.random.Generator,
-    no_spring: bool = False,
+    has_stiffness: bool = True,
 ) -> MissingForce:
     """Regress what the rig's own terms leave of the motion.
 
@@ -108,13 +108,13 @@ def missing_force(
         Noise floor of the first output.
     rng
         Source of the ensemble.
-    no_spring
-        True for an axis that has none.
+    has_stiffness
+        False for an axis without a spring.
     """
     motions = [motion_of(rig, record, values, noise) for record in records]
     rows = rows_of(motions, scales["time"])
-    projected = own_regression(rig, no_spring, motions, rows)
-    library = candidates(plain_terms(rig, not no_spring), motions, rows, projected, scales, rig.is_driven)
+    projected = own_regression(rig, has_stiffness, motions, rows)
+    library = candidates(plain_terms(rig, has_stiffness), motions, rows, projected, scales, rig.is_driven)
     library = [c for c in library if np.all(np.isfinite(c.column)) and np.any(c.column)]
     if not library:
         return MissingForce((), 0.0)

@@ -25,8 +25,8 @@ class Task:
         Estimation and validation records, cut into windows where the rig drifts.
     noise
         Noise floor of each output.
-    no_spring
-        True for an axis that has none.
+    has_stiffness
+        False for an axis without a spring.
     held
         Parameters that keep a value: of those that a free motion tells up to a common factor one.
     """
@@ -36,5 +36,5 @@ class Task:
     constants: Mapping[str, float]
     records: tuple[Record, ...]
     noise: Mapping[str, float]
-    no_spring: bool = False
+    has_stiffness: bool = True
     held: Mapping[str, float] = field(default_factory=dict)

@@ -64,7 +64,7 @@ class Wishes:
 
 
 def identify_record(
-    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, wishes: Wishes
+    record: Record, rig: Rig, constants: Mapping[str, float], has_stiffness: bool, wishes: Wishes
 ) -> RecordIdentification:
     """Identify what one record shows.
 
@@ -76,8 +76,8 @@ def identify_record(
         Its rig. The parameters of an element follow from its motion over time, so only its dynamic stiffness is found here.
     constants
         The rig's constants by name.
-    no_spring
-        True for an axis without a spring: it is identified from its velocity.
+    has_stiffness
+        False for an axis without a spring: it is identified from its velocity.
     wishes
         How to read it.
 
@@ -91,7 +91,7 @@ def identify_record(
         return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, wishes),))
     forward = _driven_forward(record, constants.get("gain", 1.0))
     instrument = instrument_of(record, [signal.name for signal in (*rig.inputs, *rig.outputs)])
-    motion, seen = _motion(forward, rig, constants, no_spring, wishes, instrument)
+    motion, seen = _motion(forward, rig, constants, has_stiffness, wishes, instrument)
     unused = "" if seen is None else seen.unused_instrument
     paths, warnings = [motion], _resolution_warning(motion, seen, record)
     warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
@@ -102,9 +102,9 @@ def identify_record(
         record=record,
         amplitude=amplitude,
         paths=tuple(paths),
-        offsets=None if no_spring else _offsets(forward, rig, paths),
+        offsets=_offsets(forward, rig, paths) if has_stiffness else None,
         conicity=_conicity(paths[1:], constants),
-        resonance=None if no_spring else _resonance(motion),
+        resonance=_resonance(motion) if has_stiffness else None,
         warnings=tuple(warnings),
     )
 
@@ -133,7 +133,7 @@ def _motion(
     record: Record,
     rig: Rig,
     constants: Mapping[str, float],
-    no_spring: bool,
+    has_stiffness: bool,
     wishes: Wishes,
     instrument: str | None,
 ) -> tuple[PathIdentification, RecordResponse | None]:
@@ -143,14 +143,14 @@ def _motion(
         if rig.downstream:
             return yaw_parameters(fit, constants)
         gain = abs(evaluated(rig.motion.drive_gain, constants))
-        return springless_parameters(fit, gain) if no_spring else axis_parameters(fit, gain)
+        return axis_parameters(fit, gain) if has_stiffness else springless_parameters(fit, gain)
 
-    order: Order = "pt1" if no_spring else "pt2"
+    order: Order = "pt2" if has_stiffness else "pt1"
     path = PathIdentification(source, response)
     seen = None
     try:
         if record.kind == "step":
-            fit = _step_fit(record, source, response, order, no_spring)
+            fit = _step_fit(record, source, response, order, has_stiffness)
         else:
             seen = record_response(
                 record,
@@ -163,7 +163,7 @@ def _motion(
                 instrument=instrument,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(_velocity(seen.response) if no_spring else seen.response, order, seen, wishes)
+            fit = _fit(seen.response if has_stiffness else _velocity(seen.response), order, seen, wishes)
         return _judged(path, fit, physical), seen
     except InputError as error:
         if wishes.resolution is not None and "too short for a resolution" in str(error):
@@ -264,8 +264,8 @@ def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float
     return {**fit.values, "gain": -fit.values["gain"]} if is_turned else fit.values
 
 
-def _step_fit(record: Record, source: str, response: str, order: Order, no_spring: bool) -> TransferFit:
-    if not no_spring:
+def _step_fit(record: Record, source: str, response: str, order: Order, has_stiffness: bool) -> TransferFit:
+    if has_stiffness:
         return fit_step(record, source, response, order)
     moved = record.with_signals(**{response: np.gradient(record[response], record.dt)})
     moved = replace(moved, units={**moved.units, response: f"{moved.units.get(response, '1')}/s"})

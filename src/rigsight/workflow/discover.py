@@ -153,7 +153,7 @@ def discovery_task(campaign: Campaign) -> Task:
         constants=campaign.constants,
         records=cut(campaign.records, length),
         noise=noise,
-        no_spring=no_spring,
+        has_stiffness=not no_spring,
         held={} if factor is None else {factor.held: factor.value},
     )
 

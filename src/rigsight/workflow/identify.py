@@ -134,7 +134,7 @@ def identify_campaign(
     with threadpool_limits(limits=1, user_api="blas"):
         parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
         for record in parallel(
-            delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, wishes)
+            delayed(identify_record)(record, campaign.rig, campaign.constants, not no_spring, wishes)
             for record in campaign.estimation
         ):
             found.append(record)

@@ -14,7 +14,7 @@ from rigsight.rigs import Rig, joint_of
 
 
 def known_constant_forces(
-    rig: Rig, effect: Effect, given: Mapping[str, float], has_spring: bool
+    rig: Rig, effect: Effect, given: Mapping[str, float], has_stiffness: bool
 ) -> dict[str, float] | None:
     """Return the values at which the constant forces beside an effect are held.
 
@@ -26,8 +26,8 @@ def known_constant_forces(
         At its place, or of no place.
     given
         Numbers of the rig that the simulation in question came with.
-    has_spring
-        Whether the spring of a rig of one motion is there: without it a rest position pushes nothing.
+    has_stiffness
+        False for a rig of one motion without a spring: there a rest position exerts no force.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def known_constant_forces(
     resting = {symbol.name for symbol in joint.rest.free_symbols}
     defaults = {p.name: p.default for p in rig.parameters if p.name not in resting and p.default is not None}
     known = {**defaults, **given}
-    needed = [name for name in names if has_spring or name not in resting]
+    needed = [name for name in names if has_stiffness or name not in resting]
     if any(name not in known for name in needed):
         return None
     return {name: known[name] for name in names if name in known}

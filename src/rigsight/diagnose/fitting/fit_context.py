@@ -181,8 +181,8 @@ class FitContext:
         return held
 
     def _known_constant_forces(self, effect: Effect) -> dict[str, float] | None:
-        has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
-        return known_constant_forces(self.rig, effect, self.given, has_spring)
+        has_stiffness = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
+        return known_constant_forces(self.rig, effect, self.given, has_stiffness)
 
     def leaves_numbers_open(self, fit: FitResult) -> bool:
         """Return True if a fit leaves a mass, a stiffness or a damping undetermined: a missing effect may have bent it."""

@@ -15,7 +15,7 @@ from rigsight.rigs import Rig
 
 
 def force_of_one_motion(
-    context: FitContext, reidentified: Scored, no_spring: bool, rng: np.random.Generator
+    context: FitContext, reidentified: Scored, has_stiffness: bool, rng: np.random.Generator
 ) -> MissingForce | None:
     """Return the shape of the force that a rig with one motion lacks; None for any other rig.
 
@@ -25,8 +25,8 @@ def force_of_one_motion(
     ----------
     context, reidentified
         Records, and the re-identified equations on them.
-    no_spring
-        True for an axis that has none.
+    has_stiffness
+        False for an axis without a spring.
     rng
         Source of the ensemble.
     """
@@ -34,7 +34,7 @@ def force_of_one_motion(
         return None
     noise = context.noise[context.rig.outputs[0].name]
     return missing_force(
-        context.rig, context.estimation, reidentified.fit.values, context.scales, noise, rng, no_spring
+        context.rig, context.estimation, reidentified.fit.values, context.scales, noise, rng, has_stiffness
     )
 
 

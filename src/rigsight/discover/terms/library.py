@@ -64,7 +64,7 @@ class Candidate:
         return self.effect.name
 
 
-def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
+def offered_effects(rig: Rig, has_stiffness: bool) -> list[Effect]:
     """Return the effects that a regression can hold as terms on this rig.
 
     A state has no signal of its own along a measured motion; loops, and what filters the drive, are the exceptions, because
@@ -76,14 +76,14 @@ def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
         effect
         for effect in (*CATALOGUE, *MONOMIALS)
         if rig.offers(effect)
-        and (has_spring or effect not in changes_spring)
+        and (has_stiffness or effect not in changes_spring)
         and (is_loop(effect) or _filters_drive(effect) or _is_static(effect))
     ]
 
 
-def plain_terms(rig: Rig, has_spring: bool) -> list[Effect]:
+def plain_terms(rig: Rig, has_stiffness: bool) -> list[Effect]:
     """Return those of the offered effects that are a torque with one coefficient and nothing inside."""
-    return [effect for effect in offered_effects(rig, has_spring) if _is_plain(effect)]
+    return [effect for effect in offered_effects(rig, has_stiffness) if _is_plain(effect)]
 
 
 def _is_static(effect: Effect) -> bool:
