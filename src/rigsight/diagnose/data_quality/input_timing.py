@@ -52,7 +52,7 @@ class InputTiming:
     dt: float
 
     def explained(self, error_over_noise: float) -> float:
-        """Return the share of the gap above the floor, as power, that goes where only `excess` is left."""
+        """Return the share of the gap above the floor, as power, that goes where only `error_over_noise` is left."""
         gap = self.as_given**2 - 1.0
         return 0.0 if gap <= 0.0 else float(np.clip((self.as_given**2 - error_over_noise**2) / gap, 0.0, 1.0))
 
@@ -137,7 +137,7 @@ def input_timing(
     if not context.rig.is_driven or not context.driven or len(given) != 1:
         return None
     (declared,) = given
-    as_given = _excess(context, base, context.look)
+    as_given = _error_over_noise(context, base, context.look)
     if not np.isfinite(as_given):
         return None
     others: tuple[Hold, ...] = tuple(hold for hold in get_args(Hold) if hold != declared)
@@ -146,7 +146,7 @@ def input_timing(
         given=declared,
         as_given=as_given,
         with_hold={
-            hold: _excess(context, base, [replace(record, hold=hold) for record in context.look])
+            hold: _error_over_noise(context, base, [replace(record, hold=hold) for record in context.look])
             for hold in others
         },
         with_shift=shifted,
@@ -155,7 +155,7 @@ def input_timing(
     )
 
 
-def _excess(context: FitContext, base: FitResult, records: Sequence[Record]) -> float:
+def _error_over_noise(context: FitContext, base: FitResult, records: Sequence[Record]) -> float:
     return _refitted(context, base, base.values, base.free, records).weighted_rms
 
 

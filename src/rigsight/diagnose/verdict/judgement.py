@@ -39,7 +39,7 @@ def judge(
 
     Parameters
     ----------
-    before_excess
+    error_before
         RMS that the given simulation leaves.
     reidentified
         The re-identified equations.
