@@ -41,8 +41,8 @@ from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
 _REFERENCE_USED = (
-    "It serves as instrument where the frequency responses of two amplitudes are compared, if the input answers it in both; the "
-    "responses in the report do not use it."
+    "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "
+    "the responses in the report do not use it."
 )
 
 
@@ -90,7 +90,7 @@ def diagnose(
     scored_on = "validation" if task.validation else "estimation"
     if not task.validation:
         notes.append(
-            "There is no validation record: errors are those of the records that were fitted, and too good."
+            "There is no validation record: errors are those of the fitted records and therefore optimistic."
         )
     if task.open_factor is not None:
         notes.append(task.open_factor.sentence)
@@ -98,34 +98,35 @@ def diagnose(
     found = examine(task, effects, rng, n_jobs, say, prepare, memory)
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         notes.append(
-            f"A model's error is {_least_left(found):.2g} of what the sensors show while the input rests. The rig moved there, "
-            "in its play or driven by a disturbance, and the noise floor is taken from the top of the spectrum instead."
+            f"A model's error is {_least_left(found):.2g} of the noise floor measured at rest. So the rig was moving at rest, "
+            f"within its play or driven by a disturbance; the noise floor is taken from the top of the spectrum instead."
         )
         found = examine(task, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
     if found.windowing.bandwidth is not None:
         notes.append(
-            "Nothing brings the rig back, so that every model drifts in free run. Models are compared as observers: each follows "
-            f"the measured motion up to {found.windowing.bandwidth:.3g} rad/s, and its errors are those that build up within "
+            f"The rig has no restoring force, so every model drifts in free run. Models are compared as observers: each tracks "
+            f"the measured motion up to {found.windowing.bandwidth:.3g} rad/s, so the errors are those that build up within "
             f"{1.0 / found.windowing.bandwidth:.2g} s."
         )
     if found.windowing.cycles is not None:
         notes.append(
-            "In free run a disturbance no larger than the noise would change the motion much more than the noise does: the "
-            f"records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own initial state."
+            "In free run the motion is sensitive to small disturbances: one as small as the noise would change it by much more "
+            "than the noise. The records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own "
+            "initial state."
         )
     elif found.judgement.verdict == "unknown":
         growth = growth_of_disturbances(found.context, found.reidentified, found.judgement.model, rng)
         if growth > VERDICT.sensitive:
             notes.append(
-                f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
-                "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
+                f"The motion of the best model is sensitive to small disturbances: one as small as the noise changes it by "
+                f"{growth:.2g} times the noise, so its error may be chance. Record more motion or shorter records to find out."
             )
     notes += [*found.quality.notes, found.judgement.reason, *found.doubts]
     if found.judgement.verdict == "unknown" and found.imitations:
         nearest = min(found.imitations, key=lambda pair: pair.error_over_noise)
         notes.append(
-            f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act "
-            "as one law, and other laws of its kind fit equally well: they are not named."
+            f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act as "
+            f"a single law, and other laws of this kind fit equally well, so they are not named."
         )
     diagnosis = _assembled(task, found, notes, scored_on, rng)
     diagnosis = replace(diagnosis, data_quality=found.quality)

@@ -339,8 +339,8 @@ def _why_not_run(context: FitContext, structure: Structure, values: Mapping[str,
     told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
     where = f" in {told}" if told else ""
     return (
-        f"The given simulation cannot be run: with the given parameters the motion{where} leaves the range of numbers, or is too "
-        "fast for the sample time. Check the units of time and input, and the given parameters."
+        f"The given simulation cannot be run: with the given parameters the motion{where} diverges or is too fast for the sample "
+        f"time. Check the units of time and input, and the given parameters."
     )
 
 

@@ -153,7 +153,7 @@ def _time_chart(
     detail = (
         Detail(begin, end, "Step", "Show the step")
         if is_step
-        else Detail(begin, end, "Largest error", f"Show where it errs most, {first}")
+        else Detail(begin, end, "Largest error", f"Show where the error is largest, {first}")
     )
     title = f"Measured and simulated {output_label(diagnosis, output)}, record {trace.record}"
     data = chart_data(
@@ -166,7 +166,7 @@ def _time_chart(
     thinned = ""
     if measured.size > most_points:
         thinned = (
-            f" Drawn are the lowest and highest of every {-(-measured.size // (most_points // 2))} samples."
+            f" Shown are the minimum and maximum of every {-(-measured.size // (most_points // 2))} samples."
         )
     caption = (
         f"{output_label(diagnosis, output)} over time; below, simulated minus measured, with a band of twice the noise "

@@ -82,13 +82,13 @@ class InputTiming:
         told = " or ".join(f'"{hold}"' for hold in holds)
         rival = ""
         if self.shift is not None and shifted <= VERDICT.worthwhile * least:
-            rival = f" So would a shift of the time base by {1e3 * self.shift:.3g} ms"
+            rival = f" So would a time offset of {1e3 * self.shift:.3g} ms"
             rival += ", or a delay in the rig." if self.shift > 0.0 else "."
         return Finding(
             "hold",
-            f'Between its samples the input runs as hold = {told} rather than "{self.given}": that alone explains '
+            f'Between samples the input follows hold = {told} rather than "{self.given}": this alone explains '
             f"{self.explained(least):.0%} of the gap ({self.as_given:.3g} -> {least:.3g} times the noise floor).{rival}",
-            f"Set hold = {told} for the records in campaign.toml, if that is how the drive works.",
+            f"Set hold = {told} for the records in campaign.toml, if the drive works like this.",
             serious=not (rival and self.shift is not None and self.shift > 0.0),
             explained=self.explained(least),
         )
@@ -97,16 +97,16 @@ class InputTiming:
         if shift < 0.0:
             return Finding(
                 "time_shift",
-                f"The outputs come {-1e3 * shift:.3g} ms before the input that causes them: a shift of the time base explains "
+                f"The outputs come {-1e3 * shift:.3g} ms before the input that causes them: a time offset explains "
                 f"{by_shift:.0%} of the gap ({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor).",
-                "Align the channels: no rig answers before it is asked.",
+                "Align the channels: the output precedes the input.",
                 explained=by_shift,
             )
         return Finding(
             "time_shift",
-            f"The outputs come {1e3 * shift:.3g} ms late: a shift of the time base would explain {by_shift:.0%} of the gap "
+            f"The outputs come {1e3 * shift:.3g} ms late: a time offset would explain {by_shift:.0%} of the gap "
             f"({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor). So would a delay or a short lag in the rig.",
-            "Make sure that input and outputs share one clock before an effect is blamed.",
+            "Check that input and outputs share one clock before you look for an effect.",
             serious=False,
             explained=by_shift,
         )

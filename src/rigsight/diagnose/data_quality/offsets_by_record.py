@@ -23,7 +23,7 @@ from rigsight.records.record import Record
 from rigsight.rigs import Rig
 
 _TOLERANCE = 1e-5
-_KEPT = 'Write offsets = "per_record" at the top of campaign.toml to have it so in every command.'
+_KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in every command.'
 
 
 def asked_offsets(
@@ -60,9 +60,9 @@ def asked_offsets(
             unit = next(signal.unit for signal in context.rig.outputs if signal.name == worst.output)
             return Finding(
                 "offset",
-                f"{worst.sentence(unit)} With an offset of each sensor in each record the nearest model leaves "
-                f"{freed.error_over_noise:.3g} times the noise floor instead of {model.error_over_noise:.3g}: "
-                "such offsets are estimated here, and no part of the model.",
+                f"{worst.sentence(unit)} With a free offset for each sensor in each record, the best model leaves "
+                f"{freed.error_over_noise:.3g} times the noise floor instead of {model.error_over_noise:.3g}. These offsets are "
+                f"estimated here but are not part of the model.",
                 _KEPT,
                 signal=worst.output,
             )
@@ -95,7 +95,8 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
             found.append(
                 Finding(
                     "offset",
-                    f"{signal.name} lies {moves:.3g} times as far apart in '{lowest}' and '{highest}' as it moves in any record.",
+                    f"{signal.name} has means in '{lowest}' and '{highest}' that differ by {moves:.3g} times its motion in any "
+                    f"record.",
                     OFFSETS_MEND,
                     signal=signal.name,
                 )

@@ -59,7 +59,7 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
     first = parts[0]
     motion = f"{first.path} leaves {_times(first.reidentified, first)}"
     if len(parts) == 1:
-        return f"The path has one leg that can be checked: {motion} after re-identification."
+        return f"One section of the signal path can be checked: {motion} after re-identification."
     lateral = parts[1]
     clean = lateral.reidentified <= VERDICT.at_floor * lateral.noise_floor
     said = (
@@ -71,19 +71,19 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
     )
     if clean and first.reidentified > VERDICT.at_floor * first.noise_floor:
         return (
-            f"The gap lies before {lateral.source} is measured: {motion}, but {said}. Drive or {_words(rig)}, not the lateral "
-            f"part and not a delay of the {lateral.source} sensor."
+            f"The gap arises before {lateral.source} is measured: {motion}, but {said}. So the cause is the drive or "
+            f"{_words(rig)}, not the lateral part and not a delay of the {lateral.source} sensor."
         )
     if clean:
-        return f"No leg of the path has a gap worth the name: {motion}, {said}."
+        return f"No section of the signal path has a noticeable gap: {motion}, {said}."
     shifted = _times(lateral.shifted, lateral)
     if moved and lateral.shifted <= VERDICT.at_floor * lateral.noise_floor:
         late, early = (
             (lateral.source, lateral.output) if lateral.shift > 0.0 else (lateral.output, lateral.source)
         )
         return (
-            f"The sensors disagree: {said}, and {shifted} if {late} were measured {1e3 * abs(lateral.shift):.3g} ms too late "
-            f"against {early}; {motion}."
+            f"The sensors are not synchronous: {said}, but only {shifted} if {late} is assumed to be measured "
+            f"{1e3 * abs(lateral.shift):.3g} ms later than {early}; {motion}."
         )
     better = f" ({shifted} with {lateral.source} shifted by {1e3 * lateral.shift:.3g} ms)" if moved else ""
     return f"The lateral part or a sensor has a gap of its own: {said}{better}; {motion}."

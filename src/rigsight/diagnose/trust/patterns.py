@@ -69,7 +69,7 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
         "damping depends on the motion: dry friction is missing, or has another form", _LADDER
     ),
     (Pattern.AMPLITUDE, Role.DAMPING, 1): Meaning(
-        "damping depends on the motion: one that grows with speed or displacement is missing, or has another form",
+        "damping depends on the motion: damping that grows with speed or displacement is missing, or has another form",
         _LADDER,
     ),
     # Within the sliding range a spring of hysteresis or presliding lets go.
@@ -83,27 +83,28 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
         _LADDER,
     ),
     (Pattern.AMPLITUDE, Role.DRIVE, -1): Meaning(
-        "the drive gives less than in proportion: a saturation is missing, or has another form",
+        "the output of the drive grows less than its input: a saturation is missing, or has another form",
         "Record steps of the input up to its largest value.",
     ),
     (Pattern.AMPLITUDE, Role.DRIVE, 1): Meaning(
-        "the drive gives more than in proportion: a dead zone or dry friction is missing, or has another form",
-        "Record slow steps of the input from its smallest value on.",
+        "the output of the drive grows more than its input: a dead zone or dry friction is missing, or has another form",
+        "Record slow steps of the input, starting from its smallest value.",
     ),
     (Pattern.AMPLITUDE, Role.EFFECT, None): Meaning(
-        "the effect has not quite the form of the rig's: its equation answers otherwise to amplitude", _LADDER
+        "the equation of the effect does not quite fit the rig: it depends on amplitude in another way",
+        _LADDER,
     ),
     # No mass depends on the amplitude: it makes up for a law that does.
     (Pattern.AMPLITUDE, None, None): Meaning(
-        "it makes up for something that depends on the motion and is missing or has another form", _LADDER
+        "it compensates for an effect that depends on the motion and is missing or has another form", _LADDER
     ),
     # What a load presses on rubs: the constant stands in a place where the equations do not have it.
     (Pattern.CONSTANT, Role.DAMPING, None): Meaning(
-        "friction depends on it, as that of a loaded joint does, and the equations do not say so",
+        "friction depends on it, like the friction of a loaded joint, which the equations do not include",
         "Record three values of it with the same input.",
     ),
     (Pattern.CONSTANT, Role.EFFECT, None): Meaning(
-        "the effect depends on it, as the friction of a loaded joint does, and its equation does not say so",
+        "the effect depends on it, like the friction of a loaded joint, which its equation does not include",
         "Record three values of it with the same input.",
     ),
     (Pattern.CONSTANT, None, None): Meaning(
@@ -112,25 +113,25 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
     ),
     (Pattern.TIME, Role.OFFSET, None): Meaning("a zero drifts from record to record", _REPEAT),
     (Pattern.TIME, None, None): Meaning(
-        "something changes slowly that is not recorded, such as temperature or wear", _REPEAT
+        "something unrecorded changes slowly, such as temperature or wear", _REPEAT
     ),
     (Pattern.RECORD, Role.OFFSET, None): Meaning(
         "the zero of a sensor or a constant load differs from record to record",
         'Write offsets = "per_record" in campaign.toml, or record a rest before each run.',
     ),
     (Pattern.RECORD, None, None): Meaning(
-        "something changes that is not recorded, such as temperature, load or mounting",
-        "Record one input several times without touching the rig, then again after mounting it anew.",
+        "something unrecorded changes, such as temperature, load or mounting",
+        "Record one input several times without touching the rig, then again after remounting it.",
     ),
     # Along a sweep frequency changes with time, along a decay amplitude does.
     (Pattern.PORTION, None, None): Meaning(
         "it depends on what changes along a record: the frequency of a sweep, the amplitude of a decay, or warming up",
-        "Record the same input backwards: what goes with time stays, what goes with frequency turns round.",
+        "Record the same input reversed in time: a dependence on time stays, a dependence on frequency reverses.",
     ),
     # A window's own initial state takes up what is slow.
     (Pattern.WINDOW, None, None): Meaning(
-        "slow errors of the model are absorbed in it where records are long: a drift, a disturbance or a slow effect is missing",
-        "Trust the short windows for this number, and record the slow part alone: very slow motion, or rest after a step.",
+        "in long records it absorbs slow errors of the model: a drift, a disturbance or a slow effect is missing",
+        "Trust the value from short windows, and record the slow part separately: very slow motion, or rest after a step.",
     ),
 }
 

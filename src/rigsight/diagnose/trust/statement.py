@@ -12,7 +12,7 @@ from rigsight.diagnose.trust.patterns import Pattern
 from rigsight.diagnose.trust.result import Entangled, GroupValue, ParameterTrust
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 
-_ONE_RECORD = "One record cannot tell whether they hold at another amplitude."
+_ONE_RECORD = "A single record cannot show whether they hold at another amplitude."
 
 
 def statement(
@@ -41,7 +41,7 @@ def statement(
     sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
     if len(_alike(differing)) > TRUST.told:
         rest = [number.name for alike in _alike(differing)[TRUST.told :] for number in alike]
-        sentences.append(f"{_listed(rest)} {'differs' if len(rest) == 1 else 'differ'} too.")
+        sentences.append(f"{_listed(rest)} also {'differs' if len(rest) == 1 else 'differ'}.")
     compared = [number for number in numbers if number.pattern is Pattern.STABLE]
     if compared:
         sentences.append(_same(compared, bool(differing), len(compared) == len(numbers), asked))
@@ -81,9 +81,7 @@ def _differs(alike: Sequence[ParameterTrust]) -> str:
     text = f"{'; '.join(told)}: {cause}." if cause else f"{'; '.join(told)}."
     first, *others = alike[0].goes_with or ("",)
     if others:
-        text += (
-            f" In these records {first} and {_listed(others)} go together, so that they cannot be told apart."
-        )
+        text += f" In these records {first} and {_listed(others)} change together, so their influences cannot be separated."
     return text
 
 
@@ -97,10 +95,10 @@ def _course(number: ParameterTrust) -> str:
     if number.pattern is Pattern.TIME:
         return f"{number.name} {moves} from record to record{_ends(number, number.groups[RECORD], 'in')}"
     if number.pattern is Pattern.RECORD:
-        return f"{number.name} differs from record to record without order{_extremes(number)}"
+        return f"{number.name} differs from record to record without a trend{_extremes(number)}"
     what = number.goes_with[0]
     if not number.direction:
-        return f"{number.name} differs with {what}, in no order{_extremes(number, what)}"
+        return f"{number.name} differs with {what}, without a trend{_extremes(number, what)}"
     return f"{number.name} {moves} with {what}{_ends(number, number.groups[what], 'at')}"
 
 
@@ -162,7 +160,7 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked
             if len(vague) > 1
             else ""
         )
-        text += f" But single groups know {name} only to {_percent(vague[name])}{more}: smaller differences do not show."
+        text += f" But single groups determine {name} only to {_percent(vague[name])}{more}: smaller differences would not show."
     return text
 
 

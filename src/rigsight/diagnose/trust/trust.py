@@ -26,8 +26,8 @@ from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, 
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Record
 
-_NOT_SIMULATED = "Whether the numbers hold in each record could not be asked: the model cannot be simulated in one of them."
-_NOTHING_FITTED = "No number was fitted, so none can differ from record to record."
+_NOT_SIMULATED = "Whether the parameters hold in each record could not be tested: the model cannot be simulated in one of them."
+_NOTHING_FITTED = "No parameter was fitted, so none can differ from record to record."
 
 
 @dataclass(frozen=True)

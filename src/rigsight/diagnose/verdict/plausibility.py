@@ -39,7 +39,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
     own = {fit.structure.parameter_name(e, p.name) for e in model.effects for p in e.parameters}
     found = []
     if not fit.success:
-        found.append(Doubt("Its fit did not come to an end.", True))
+        found.append(Doubt("Its fit did not converge.", True))
     unknown = [name for name in fit.free if name in own and not np.isfinite(fit.standard_errors[name])]
     if unknown:
         found.append(Doubt(f"The records do not determine {', '.join(unknown)}.", True))
@@ -52,7 +52,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
                 and np.isfinite(bound)
                 and (zero or abs(value - bound) < _AT_BOUND * abs(bound))
             ):
-                found.append(Doubt(f"{name} = {value:.3g} stands at the bound of its search.", False))
+                found.append(Doubt(f"{name} = {value:.3g} is at the bound of its search range.", False))
         before = reidentified.fit.values.get(name, 0.0)
         if name not in own and declared.lower >= 0.0 and before > 0.0 and value > 0.0:
             ratio = value / before

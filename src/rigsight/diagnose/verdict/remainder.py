@@ -40,26 +40,24 @@ class Remainder:
         """The same in one sentence."""
         if not self.goes_with:
             return (
-                "What is left goes with no motion, drive, reading, time or record that was looked at "
-                f"(p = {self.p_value:.2g}): it counts as noise and disturbance."
+                f"The remaining error correlates with no motion, drive, reading, time or record that was tested (p = "
+                f"{self.p_value:.2g}): it counts as noise and disturbance."
             )
         if self.share == 0.0:
             return (
-                f"What is left is no more than the noise floor, but it still goes with {_in_words(self.goes_with)} "
-                f"(p = {self.p_value:.2g}): numbers may be off by more than their standard errors."
+                f"The remaining error is within the noise floor, but it still correlates with {_in_words(self.goes_with)} (p = "
+                f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
             )
         percent = float(f"{100.0 * self.share:.2g}")
         left = (
-            f"What is left, {percent:g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
-            f"(p = {self.p_value:.2g})"
+            f"The remaining error, {percent:g} % of the squared gap, still correlates with {_in_words(self.goes_with)} (p = "
+            f"{self.p_value:.2g})"
         )
         if self.share > VERDICT.larger_part:
-            return f"{left}: the larger part of the gap is not explained."
+            return f"{left}: more than half of the gap is not explained."
         if not self.beside_a_cause:
             return f"{left}."
-        return (
-            f"{left}: something smaller is missing too, or the equation has not quite the form of the rig's."
-        )
+        return f"{left}: a smaller effect is missing too, or the equation does not quite fit the rig."
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry ``remainder`` of ``diagnosis.json``."""
@@ -75,7 +73,7 @@ class Remainder:
 def _in_words(goes_with: str) -> str:
     """Return with what a remainder goes as a part of a sentence."""
     kind, _, what = goes_with.partition(BY_RECORD)
-    return goes_with if kind else f"the record: {what} differs from one to another"
+    return goes_with if kind else f"the record: {what} differs from record to record"
 
 
 def remainder_of(
