@@ -129,48 +129,48 @@ class Effect:
     place
         Where in the signal path it acts.
     summary
-        One plain sentence for people.
+        One sentence that describes the effect.
     parameters
         Its parameters; setting all those with a null value to it removes the effect exactly.
     energy
         What it does to mechanical energy over a closed cycle.
     signature
-        How it shows itself in sine tests.
+        How it shows in sine tests.
     torque
         Torque (force) that resists the motion, subtracted from the drive, of x, v, t.
     spring
         The spring torque in terms of ``spring_torque``, ``k``, ``deflection`` and states.
     deflection
-        What the spring sees of the displacement, of ``x`` and states.
+        Deflection of the spring as a function of ``x`` and states.
     drive
-        What leaves the actuator in terms of ``u`` and states.
+        Output of the actuator in terms of ``u`` and states.
     delay
         Time by which the input arrives late [s].
     lateral
         Rate of the lateral displacement, of ``creepage``, ``creep_gain``, ``lateral_displacement`` and ``lateral_feedback``.
     measured
-        What the sensor of the displacement shows, of ``reading`` and states.
+        Reading of the sensor as a function of ``reading`` and states.
     reading_delay
-        Time by which that sensor is late [s].
+        Delay of the sensor reading [s].
     states
         States added, with their rates.
     post_yield_stiffness_ratio
-        Parameter that is the share of the spring's stiffness without memory; a fit moves that stiffness and the rest of it, with
-        memory, because records determine those apart.
+        Parameter that is the ratio of the post-yield stiffness to the initial stiffness. A fit varies the post-yield stiffness
+        and the hysteretic remainder, because records determine these two independently.
     pulsation
-        Parameter that is the angular frequency of what pulsates by itself; a fit starts at the line that the records show.
+        Parameter that is the angular frequency of a periodic disturbance; a fit starts at a spectral line of the records.
     wave_number
-        Parameter that is the wave number of what comes back with the position; a fit starts at the line over the position that
-        the records show.
+        Parameter that is the wave number of an effect periodic in the position; a fit starts at a line of the spectrum over
+        position.
     searched_as
         Parameters that a fit moves as sum and difference.
     ordered
-        Pairs of parameters of the same dimension of which the first is never smaller; a fit moves by how much it is larger.
+        Pairs of parameters of the same dimension of which the first is never smaller; a fit varies the difference.
     starts
         Start values worth trying; default are the combinations of the parameters' own starts. A parent named there is a
         special or limiting case of this effect, and wins a tie.
     special_cases
-        Parameter values that simplify the equations (an exponent of 1): tried first, released later.
+        Parameter values that simplify the equations (such as an exponent of 1): held first, released later.
     needs_inertia
         True if it makes no sense where the motion is prescribed.
     at
