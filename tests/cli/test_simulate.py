@@ -28,7 +28,7 @@ BROKEN_MODELS: dict[str, tuple[Callable[[dict[str, Any]], object] | str, tuple[s
     "effect twice": (lambda m: m["effects"].append("cubic_stiffness"), ("twice",)),
     "effect of another rig": (
         lambda m: m.update(rig="element", effects=["input_delay"]),
-        ("input_delay", "makes no sense"),
+        ("input_delay", "does not apply"),
     ),
     "missing parameters": (
         lambda m: (m["parameters"].pop("m"), m["effect_parameters"].clear()),

@@ -84,6 +84,6 @@ def free_run(
         if signal.name in record:
             measured, simulated = (np.concatenate([r[signal.name] for r in part]) for part in (windows, runs))
             if not np.all(np.isfinite(simulated)):
-                raise SimulationError(f"The simulated {signal.name} leaves the range of numbers.")
+                raise SimulationError(f"The simulated {signal.name} diverges.")
             errors[signal.name] = nrmse(measured - simulated, measured)
     return FreeRun(whole, bool(np.isfinite(found.cost)), errors)

@@ -214,7 +214,7 @@ def _among_others(
     """Return the response to one of several inputs that move at once, of a local model that holds all of them."""
     if method not in _POLES:
         raise InputError(
-            f"'{method}' knows one input at a time, and {' and '.join(moving)} move at once; use local_rational."
+            f"'{method}' handles one input at a time, but {' and '.join(moving)} move at once; use local_rational."
         )
     smooth = () if path.is_commanded else (path.source,)
     told = responses_of_inputs([record], moving, [path.response], poles=_POLES[method], smooth=smooth)

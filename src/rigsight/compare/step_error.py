@@ -76,7 +76,7 @@ def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -
     if start - first < _LEAST_BEFORE:
         raise InputError(
             f"Record '{record.name}': the step comes {start * record.dt:.3g} s after the first sample, so the offset before it "
-            "is not known. Record some time at rest before the step."
+            f"is unknown. Record some time at rest before the step."
         )
     stop = min(record.n_samples, start + round(seconds / record.dt) + 1)
     return StepWindow(slice(first, start), slice(start, stop))

@@ -83,8 +83,8 @@ def discover(
     if not task.rig.has_one_motion:
         if method != "discrepancy" or pointwise:
             raise InputError(
-                f"The rig '{task.rig.name}' has several joints: its missing forces are regressed through its responses, in the "
-                "discrepancy form. Leave the form and the point-wise rows to rigs of one motion."
+                f"The rig '{task.rig.name}' has several joints: missing forces are found by regression on its responses, in the "
+                f"discrepancy form. The full form and point-wise rows are available only for rigs with one motion."
             )
         return discover_at_joints(task, seed, progress, n_jobs)
     say = progress or (lambda _: None)
@@ -130,7 +130,7 @@ def discover(
     # A record that was set aside is fitted by the polish as well: only the equation before it has not seen it.
     judged = chosen if how else bench.scored(chosen.support, final)
     if not math.isfinite(judged.error_over_noise):
-        raise SimulationError("The polished equations cannot be simulated on the held-out records.")
+        raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
     included = inclusion(task, bench, selection, final, motions, rows, rng)
     force = regressed_force(bench, final, motions, rows, rng)
@@ -277,4 +277,7 @@ def _polished(task: Task, bench: Bench, chosen: Trial) -> tuple[FitResult, str]:
         return fit, ""
     told = ", ".join(f"{name} = {value:.4g} +/- {error:.2g}" for name, (value, error) in known.items())
     kept = ", ".join(f"{name} = {value:g}" for name, value in special.items())
-    return held, f"{kept} is held; released, the fit says {told}, and the other coefficients move with it."
+    return (
+        held,
+        f"{kept} is held; if released, the fit gives {told}, and the other coefficients change with it.",
+    )

@@ -44,11 +44,11 @@ def split(task: Task) -> tuple[tuple[Record, ...], tuple[Record, ...], str]:
         return (
             rest,
             (middle,),
-            f"No record is for validation; '{middle.name}' was set aside to choose the terms.",
+            f"There is no validation record; '{middle.name}' was set aside to select the terms.",
         )
     cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
     return (
         (estimation[0].slice(0, cut),),
         (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
-        "There is a single record; its last part was set aside to choose the terms, which judges no other amplitude.",
+        "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
     )

@@ -70,8 +70,8 @@ class MissingForce:
             return "No product of displacement x and velocity v describes the missing force."
         told = " and ".join(f"{t.coefficient:.3g} {t.term} ({t.unit})" for t in self.terms)
         return (
-            f"Along these records the missing force is about {told}, with the displacement x and the velocity v: "
-            f"that explains {self.share:.0%} of what the equations leave."
+            f"In these records the missing force is about {told}, with displacement x and velocity v; this explains "
+            f"{self.share:.0%} of the error of the equations."
         )
 
     def to_json(self) -> dict[str, Any]:

@@ -49,7 +49,10 @@ def equation_lines(exported: Exported) -> list[str]:
     for state, equation in zip(exported.states, structure.equations, strict=True):
         line = f"{state.name}' = {text(equation.rate, names)}"
         if equation.limit is not None:
-            line += f", abs({state.name}) <= {text(equation.limit, names)}: it rests at the end it is driven against"
+            line += (
+                f", abs({state.name}) <= {text(equation.limit, names)}: it stays at the end of its range while driven "
+                f"against it"
+            )
         lines.append(line)
     for i, (output, expression) in enumerate(zip(exported.outputs, structure.outputs, strict=True)):
         line = f"output {output.name} [{output.unit}] = {text(expression, names)}"

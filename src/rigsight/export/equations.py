@@ -162,8 +162,8 @@ def _check_delays(structure: Structure) -> None:
     ]
     if late:
         raise InputError(
-            f"A delay at {', '.join(late)} cannot be exported: that of the only input and that of the first sensor can. "
-            "Simulate the model here, or leave the delay out."
+            f"A delay at {', '.join(late)} cannot be exported: only delays of a single input and of the first sensor can. "
+            f"Simulate the model here, or leave the delay out."
         )
 
 

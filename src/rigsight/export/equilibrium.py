@@ -11,7 +11,7 @@ from rigsight.simulate.compiled.linear_forms import slope
 from rigsight.simulate.kinks import freeze, is_zero
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
-NO_START = "with friction or hysteresis the start is known for inputs of zero alone: begin with these, or give initial_state"
+NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"
 """What a file says that is asked for another one."""
 
 

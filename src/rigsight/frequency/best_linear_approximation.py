@@ -214,8 +214,8 @@ def fast_best_linear_approximation(
     odd, even = silent[silent % 2 == 0], silent[silent % 2 == 1]
     if odd.size == 0:
         raise InputError(
-            f"Record '{record.name}': '{source}' leaves out no odd line in the band, so odd distortion cannot be told from "
-            "the response: use an odd multisine with random detection lines."
+            f"Record '{record.name}': '{source}' leaves out no odd line in the band, so odd distortion cannot be distinguished "
+            f"from the response: use an odd multisine with random detection lines."
         )
     omega = periods.omega
     sampled = periods.Y[lines] / periods.U[lines]

@@ -160,7 +160,7 @@ def _crossings(record: Record, source: str) -> NDArray[np.float64]:
     if ratio > _JUMP:
         raise InputError(
             f"Record '{record.name}': half periods of '{source}' change by a factor of {ratio:.3g} from one to the next: it is "
-            "no sweep, has an offset, or is noisy around zero. Cut the record to the sweep, or use the commanded input."
+            f"not a sweep, has an offset, or is noisy around zero. Cut the record to the sweep, or use the commanded input."
         )
     return np.asarray(crossings)
 

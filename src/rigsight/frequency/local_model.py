@@ -91,7 +91,8 @@ def local_polynomial_response(
     Raises
     ------
     InputError
-        If the record is too short for `bandwidth`, or does not excite the band, or the source does not answer the instrument.
+        If the record is too short for `bandwidth`, or does not excite the band, or the source is not correlated with the
+        instrument.
 
     Notes
     -----
@@ -164,7 +165,8 @@ def local_rational_response(
     Raises
     ------
     InputError
-        If the record is too short for `bandwidth`, or does not excite the band, or the source does not answer the instrument.
+        If the record is too short for `bandwidth`, or does not excite the band, or the source is not correlated with the
+        instrument.
 
     Notes
     -----
@@ -244,9 +246,7 @@ def _local_response(
     if wanted is not None:
         lines = lines[among(omega[lines], wanted)]
         if not lines.size:
-            raise InputError(
-                f"{what} does not excite any of the frequencies at which its response is wanted."
-            )
+            raise InputError(f"{what} does not excite any of the requested frequencies.")
     chunks = [lines[start : start + _CHUNK] for start in range(0, lines.size, _CHUNK)]
     if instrument is None:
         parts = [_solve(U, Y, chunk, model) for chunk in chunks]
@@ -255,7 +255,9 @@ def _local_response(
         answers = np.concatenate([clearness for *_, clearness in ratios]) >= _ANSWERS
         power = np.abs(R[lines]) ** 2
         if power @ answers < 0.5 * np.sum(power):
-            raise InputError(f"{what}: the source '{source}' does not answer the instrument '{instrument}'.")
+            raise InputError(
+                f"{what}: the source '{source}' is not correlated with the instrument '{instrument}'."
+            )
         parts = [(values, shares, near) for values, shares, near, _ in ratios]
         method = f"{method} by {instrument}"
     values, shares, near = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

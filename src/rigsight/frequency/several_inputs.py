@@ -147,25 +147,25 @@ def responses_of_inputs(
                 problems[source, response] = _inseparable(source, rivals)
             else:
                 problems[source, response] = (
-                    f"the response of '{response}' to '{source}' does not stand out of its noise. Drive '{source}' more "
-                    "strongly, or for longer."
+                    f"the response of '{response}' to '{source}' does not exceed its noise. Excite '{source}' more strongly, or "
+                    f"for longer."
                 )
     return ResponsesOfInputs(found, problems, tuple(together))
 
 
 def _unmoved(source: str, response: str, records: Sequence[Record]) -> str:
     if not any(response in record for record in records):
-        return f"no record holds '{response}'."
+        return f"no record contains '{response}'."
     if any(r.kind == "step" and response in r and _moves(r, source) for r in records):
-        return f"'{source}' moves in steps alone, which give no frequency response. Record a sweep or a multisine of it."
-    return f"'{source}' does not move in any record that holds '{response}'. Record one in which it does."
+        return f"'{source}' only has steps, which give no frequency response. Record a sweep or a multisine of it."
+    return f"'{source}' does not change in any record with '{response}'. Record one in which it does."
 
 
 def _inseparable(source: str, rivals: Sequence[str]) -> str:
     others = " and ".join(f"'{rival}'" for rival in rivals)
     return (
-        f"'{source}' moves together with {others}: their responses cannot be told apart. Record one in which '{source}' moves "
-        "alone, or with phases of its own."
+        f"'{source}' changes together with {others}, so their responses cannot be separated. Record one in which '{source}' "
+        f"changes alone, or with different phases."
     )
 
 

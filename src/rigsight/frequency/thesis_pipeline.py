@@ -70,7 +70,7 @@ def thesis_response(
     if fallen <= 0.0:
         raise InputError(
             f"Record '{record.name}': the unwrapped phase of '{source}' -> '{response}' rises by {-fallen:.3g} rad between "
-            "the cuts, so the thesis's rescaling would turn it over: cut lower, or use another estimator."
+            "the cuts, so the rescaling of the thesis would invert it: reduce the upper cut, or use another estimator."
         )
     phase = phase * (phase_drop / fallen)
     phase -= phase[0]

@@ -53,11 +53,11 @@ class OpenFactor:
     @property
     def sentence(self) -> str:
         """What it means, for people."""
-        source = "as given" if self.is_given else "for want of a given one"
+        source = "as given" if self.is_given else "because no value was given"
         return (
-            f"No input moves in the records that are fitted: they tell {listed(self.names)}, and every force of an effect, only "
-            f"up to a common factor. {self.held} = {self.value:g} {self.unit} is held, {source}; what it really is multiplies "
-            "all the others."
+            f"No input moves in the records that are fitted: they determine {listed(self.names)}, and every force of an effect, "
+            f"only up to a common factor. {self.held} = {self.value:g} {self.unit} is held, {source}; all others are "
+            f"proportional to its true value."
         )
 
 

@@ -59,5 +59,5 @@ def helpful_sensors(
         left = free_directions(information(fit, result))
         if left < before:
             much = "all parameters" if left == 0 else "more of them"
-            told.append(f"With '{name}' recorded as well these inputs would determine {much}.")
+            told.append(f"If '{name}' were also recorded, these inputs would determine {much}.")
     return tuple(told)

@@ -51,7 +51,7 @@ class OneStep:
         self._rows, self._followed = [], []
         for _, derivative in central_sensitivities(problem, theta):
             if not np.all(np.isfinite(derivative)):
-                raise SimulationError("The derivatives of the fit leave the range of numbers.")
+                raise SimulationError("The derivatives of the fit overflow.")
             basis = _basis(derivative[:, n_free:])
             own = derivative[:, :n_free]
             self._followed.append(basis)

@@ -247,10 +247,10 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
         )
         if fit.misfit <= 1.0:
             break
-    read = " The fit reads magnitudes only." if order == "pt2" else ""
+    read = " The fit uses magnitudes only." if order == "pt2" else ""
     note = (
-        f"The residuals are {misfit:.0f} times what the noise explains: this form is not the whole of the rig.{read} An error of "
-        f"{100.0 * share:.0f} % of the magnitude was allowed for at every line."
+        f"The residuals are {misfit:.0f} times larger than the noise explains: the model order is too low.{read} An error of "
+        f"{100.0 * share:.0f} % of the magnitude was assumed at every line."
     )
     return replace(fit, values=_with_sign(fit, response), misfit=misfit, message=f"{fit.message} {note}")
 
@@ -317,8 +317,8 @@ def _judged(
 
 def _undetermined(names: list[str]) -> str:
     return (
-        f"the record does not determine {', '.join(names)}: it is too short, or its input leaves out the frequencies around the "
-        "break. Record for longer, over a wider band, or at a larger amplitude."
+        f"the record does not determine {', '.join(names)}: it is too short, or its input does not excite the frequencies around "
+        f"the break. Record for longer, over a wider band, or at a larger amplitude."
     )
 
 
@@ -331,8 +331,9 @@ def _resolution_warning(motion: PathIdentification, seen: RecordResponse | None,
         return []
     longer = record.n_samples * record.dt * seen.narrowest / width
     return [
-        f"{motion.source} -> {motion.response}: the peak at {omega_0:.3g} rad/s is {width:.2g} rad/s wide (half power), and this "
-        f"record follows peaks from {seen.narrowest:.2g} rad/s on. Damping and height of the peak are doubtful; record at least "
+        f"{motion.source} -> {motion.response}: the peak at {omega_0:.3g} rad/s is {width:.2g} rad/s wide (half power), but this "
+        f"record resolves only peaks of at least {seen.narrowest:.2g} rad/s. Damping and height of the peak are unreliable; "
+        f"record at least "
         f"{longer:.3g} s."
     ]
 

@@ -58,15 +58,15 @@ class DifferingMeans:
         lowest, highest = (choose(self.means, key=self.means.__getitem__) for choose in (min, max))
         chance = f"{self.probability:.1g}" if self.probability > _LEAST_TOLD else f"below {_LEAST_TOLD:g}"
         return (
-            f"What the model leaves of {self.output} lies at another mean in each record, from {self.means[lowest]:.3g} {unit} "
-            f"in '{lowest}' to {self.means[highest]:.3g} {unit} in '{highest}': {self.share:.0%} of all that it leaves, and "
-            f"further apart than chance makes them (probability {chance}), as if the offset of the sensor, or a constant force, "
+            f"The mean residual of {self.output} differs between records, from {self.means[lowest]:.3g} {unit} "
+            f"in '{lowest}' to {self.means[highest]:.3g} {unit} in '{highest}': {self.share:.0%} of the whole residual, and more "
+            f"than by chance (probability {chance}), as if the offset of the sensor, or a constant force, "
             "differed from record to record."
         )
 
 
 OFFSETS_MEND = (
-    'If the sensor was zeroed anew in between, write offsets = "per_record" at the top of campaign.toml.'
+    'If the sensor was zeroed between records, write offsets = "per_record" at the top of campaign.toml.'
 )
 
 

@@ -62,7 +62,7 @@ def _caches_at_home() -> Path:
     except RuntimeError:
         # A container that runs under a number without a name.
         raise InputError(
-            f"There is no home folder to keep compiled kernels in. Set {CACHE_VARIABLE} to a folder that can be written."
+            f"There is no home folder for the cache of compiled kernels. Set {CACHE_VARIABLE} to a writable folder."
         ) from None
 
 
@@ -161,6 +161,5 @@ def _write(path: Path, content: bytes) -> None:
         if _sound(path):
             return
         raise MachineError(
-            f"Cannot keep compiled kernels in {path.parent} ({error.strerror}). "
-            f"Set {CACHE_VARIABLE} to a folder that can be written."
+            f"Cannot write compiled kernels to {path.parent} ({error.strerror}). Set {CACHE_VARIABLE} to a writable folder."
         ) from error

@@ -159,7 +159,8 @@ def si_mapping(
         if named is None or taken is None or named == taken or not is_a(named, taken):
             return mapping, ()
         return mapping, (
-            f"{where}: taken in {taken} as it stands, though its name ends with {named}. If it is in {named}, write "
+            f"{where}: values taken as {taken} without conversion, although the name ends with {named}. If it is in {named}, "
+            f"write "
             f'{signal} = {{ name = "{label}", unit = "{named}" }} (on a command line --unit {signal}={named}); if not, '
             "scale = 1.0.",
         )
@@ -168,20 +169,21 @@ def si_mapping(
             found = in_drive_unit(mapping.unit)
             if found is None:
                 raise InputError(
-                    f'{where}: unit = "{unit}" cannot be converted: {signal} has no unit of its own on this rig, and this is '
-                    f"no unit of a drive ({', '.join(DRIVES)}). Give scale and offset instead."
+                    f'{where}: unit = "{unit}" cannot be converted: {signal} has no fixed unit on this rig, and this is '
+                    f"not a unit of a drive ({', '.join(DRIVES)}). Give scale and offset instead."
                 )
             return ColumnMapping(mapping.name, scale=found[0]), ()
         return mapping, (
-            f"{where}: {signal} has no unit of its own on this rig; values were taken as they stand, in {unit}.",
+            f"{where}: {signal} has no fixed unit on this rig; values were taken without conversion, in {unit}.",
         )
     try:
         scale = factor(unit, si)
     except UnknownUnitError as error:
-        by = "" if mapping.unit is not None else ", which the file states,"
+        by = "" if mapping.unit is not None else ", stated in the file,"
         raise InputError(
             f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write "
-            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 for the values as they stand.'
+            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 to take the '
+            "values without conversion."
         ) from None
     converted = ColumnMapping(mapping.name, scale=scale)
     if mapping.unit is not None:
@@ -189,7 +191,7 @@ def si_mapping(
         if said is None or not is_a(said, si) or factor(said, si) == scale:
             return converted, ()
         by = "its name ends with" if stated is None else "the file states"
-        return converted, (f"{where}: taken in {unit}, as the campaign says, though {by} {said}.",)
+        return converted, (f"{where}: taken in {unit}, as stated in the campaign, although {by} {said}.",)
     if scale == 1.0:
         return converted, ()
-    return converted, (f"{where}: converted from {unit}, the unit that the file states, to {si}.",)
+    return converted, (f"{where}: converted from {unit}, the unit stated in the file, to {si}.",)

@@ -47,8 +47,8 @@ class ColumnMapping:
             raise InputError(f"Column '{self.name}': offset must be a finite number, got {self.offset}.")
         if self.unit is not None and self.is_converted:
             raise InputError(
-                f"Column '{self.name}': unit = \"{self.unit}\" stands beside scale or offset, which convert as well; "
-                "give one of the two."
+                f"Column '{self.name}': unit = \"{self.unit}\" is combined with scale or offset, which also convert; give one of "
+                "the two."
             )
 
     @property

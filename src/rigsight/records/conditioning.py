@@ -105,7 +105,7 @@ def time_base(
     span = abs(stamps[-1] - stamps[0])
     if not (span == 0.0 or span >= SHORTEST_TIME) or not np.max(np.abs(stamps)) <= LARGEST_NUMBER:
         raise InputError(
-            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}; no clock does. Check the column "
+            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}, which is implausible. Check the column "
             "that time is read from, and its type."
         )
     index = np.arange(stamps.size, dtype=np.float64)
@@ -136,7 +136,7 @@ def time_base(
             f"{steps[worst]:.4g}, the mean step {dt:.4g} (jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
             f"{mend}"
         )
-    note = f"{file}: stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
+    note = f"{file}: time stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
     return TimeBase(float(stamps[0]), dt, stamps, (note,))
 
 

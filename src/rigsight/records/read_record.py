@@ -151,7 +151,9 @@ def read_stretches(
     if time.scale is not None and time.scale < 0.0:
         raise InputError(f"{path.name}: the scale of time must be positive, got {time.scale:g}.")
     if dt is not None and TIME in columns:
-        raise InputError(f"{path.name}: dt = {dt:g} stands beside a column for time; give one of the two.")
+        raise InputError(
+            f"{path.name}: dt = {dt:g} is given together with a column for time; give one of the two."
+        )
     constant_inputs = constant_inputs or {}
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
     names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
@@ -204,7 +206,7 @@ def read_stretches(
     found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     if absent:
         found.append(
-            f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, as nothing drives the rig."
+            f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, because nothing drives the rig."
         )
     # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
     kept = [*raw] or [TIME]
@@ -284,9 +286,7 @@ def _refuse_time_as_signal(file: str, table: Columns) -> None:
 def _refuse_dialect(path: Path, dialect: _Dialect) -> None:
     for key, value in vars(dialect).items():
         if value is not None:
-            raise InputError(
-                f"{path.name} is no delimited text, so {key} means nothing for it; remove {key}."
-            )
+            raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
 
 
 def _bases(path: Path, table: Columns) -> dict[str, TimeBase]:

@@ -87,8 +87,8 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
     )
     left = f" {dropped} samples in {why} were left out." if dropped else ""
     note = (
-        f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with "
-        f"initial states of its own; nothing was put between.{left}"
+        f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with its "
+        f"own initial state; nothing was interpolated.{left}"
     )
     return Stretches(tuple(_part(table, start, stop) for start, stop in spans), (note,))
 
@@ -115,7 +115,7 @@ def one_stretch(file: str, found: Stretches) -> Columns:
         return found.parts[0]
     told = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]
     raise InputError(
-        f"{file}: {told}. Split it there into files of their own; a campaign reads each stretch as a record by itself."
+        f"{file}: {told}. Split it there into separate files; a campaign reads each stretch as a separate record."
     )
 
 

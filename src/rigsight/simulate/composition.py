@@ -132,13 +132,13 @@ def _check_effects(rig: Rig, effects: tuple[Effect, ...]) -> None:
         joint = joint_of(rig, effect)
         if effect.reads_inertia and joint.inertia is None and not rig.mechanism.has_short_inverse:
             raise InputError(
-                f"Effect '{effect.name}' reads the inertia that moves with a joint, and the formula for it is too long on the "
-                f"rig '{rig.name}'. Give joints.{joint.name} an inertia in the rig file."
+                f"Effect '{effect.name}' reads the inertia that moves with a joint, and its formula is too long on the rig "
+                f"'{rig.name}'. Set inertia in joints.{joint.name} of the rig file."
             )
         if not rig.offers(effect):
-            raise InputError(f"Effect '{effect.name}' makes no sense on the rig '{rig.name}'.")
+            raise InputError(f"Effect '{effect.name}' does not apply to the rig '{rig.name}'.")
     if len(set(names)) < len(names):
-        raise InputError(f"An effect is named twice: {', '.join(names)}.")
+        raise InputError(f"An effect is given twice: {', '.join(names)}.")
 
 
 def _parameters(
@@ -163,9 +163,7 @@ def _bandwidth(sensor: str) -> Parameter:
 
 
 def _ahead(sensor: str) -> Parameter:
-    return Parameter(
-        ahead_name(sensor), f"time by which the motion of {sensor} is read ahead", unit="s", default=0.0
-    )
+    return Parameter(ahead_name(sensor), f"lead time of the reading of {sensor}", unit="s", default=0.0)
 
 
 def structure_named(

@@ -181,7 +181,7 @@ def _assembled(
     rig, held_out = task.rig, polisher.held_out
     finest = min(found, key=lambda one: one.error_over_noise)
     if not math.isfinite(finest.error_over_noise):
-        raise SimulationError("The polished equations cannot be simulated on the held-out records.")
+        raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     independent = _independent(rig, finest)
 
     def criterion(one: _Polished) -> float:
@@ -251,7 +251,7 @@ def _terms(
         names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
         own = {name: coefficients[name] for name in names if name in coefficients}
         vague = [n for n, c in own.items() if not c.std < abs(c.value) / _VAGUE]
-        doubt = f"{' and '.join(vague)} cannot be told from zero" if vague else ""
+        doubt = f"{' and '.join(vague)} cannot be distinguished from zero" if vague else ""
         found.append(
             Term(
                 kind_of(effect.name),
@@ -326,8 +326,8 @@ def _warnings(
     ruled_out = [force.joint for force in joints if force not in agreeing]
     if ruled_out:
         found.append(
-            f"No force at {' or '.join(ruled_out)} alone explains what all sensors show; at {first.joint} one does, "
-            f"but for {first.error_over_noise:.2g} noise floors."
+            f"No force at {' or '.join(ruled_out)} alone explains the readings of all sensors; a force at {first.joint} explains "
+            f"them up to {first.error_over_noise:.2g} noise floors."
         )
     rivals = [
         one
@@ -336,11 +336,13 @@ def _warnings(
     ]
     if rivals:
         listed = "; ".join(", ".join(term.effect.name for term in one.terms) for one in rivals)
-        found.append(f"With {listed} the held-out error is no larger, but not smaller by more than chance.")
+        found.append(
+            f"{listed} does not increase the held-out error, but does not lower it significantly either."
+        )
     if chosen.error_over_noise > _FLOOR:
         found.append(
             f"The equations leave {chosen.error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-            "something is still missing, or disturbances are larger than the floor says."
+            "an effect is still missing, or disturbances are larger than the noise floor."
         )
     unknown = [name for name, c in coefficients.items() if not math.isfinite(c.std)]
     if unknown:

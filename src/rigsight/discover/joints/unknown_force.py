@@ -17,7 +17,7 @@ _RATE = sp.Symbol("missing_force_rate", real=True)
 UNKNOWN_FORCE = Effect(
     name="missing_force",
     place=Place.DYNAMICS,
-    summary="A force of unknown course resists the motion.",
+    summary="A force of unknown shape over time resists the motion.",
     parameters=(),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -187,7 +187,7 @@ class GreyBoxFit:
             if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
                 settled = off_kinks(problem, theta, (lower, upper), self.n_samples)
                 if settled is not None:
-                    return settled, True, "Steps made of long differences have vanished."
+                    return settled, True, "Steps from coarse finite differences have become zero."
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))
@@ -229,7 +229,7 @@ class GreyBoxFit:
             return self._failed(problem, begin.theta, "The start values cannot be simulated.")
 
         def search() -> _Outcome:
-            own, success, message = begin.theta[:n_free], True, "Nothing to fit but initial states."
+            own, success, message = begin.theta[:n_free], True, "Only initial states to fit."
             bounds, cost = (coordinates.lower, coordinates.upper), float("inf")
             for _ in range(most_rounds if free else 0):
                 solution = searched(problem, own, bounds, tolerance, max_evaluations)

@@ -106,8 +106,7 @@ class Found:
         usable = self.coordinates[self.costs < _UNUSABLE]
         if usable.size == 0:
             raise InputError(
-                "No parameter set of the searched range can be simulated. Give start values nearer to the rig, or a smaller "
-                "spread."
+                "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
             )
         return usable
 

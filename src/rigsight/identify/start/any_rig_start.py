@@ -254,6 +254,6 @@ def _check_moves(rig: Rig, records: Sequence[Record]) -> None:
     held = [record[s.name] for record in records for s in rig.outputs if s.name in record]
     if not held:
         listed = ", ".join(signal.name for signal in rig.outputs)
-        raise InputError(f"No estimation record holds a sensor of the rig '{rig.name}'. It has: {listed}.")
+        raise InputError(f"No estimation record contains a sensor of the rig '{rig.name}'. It has: {listed}.")
     if all(np.ptp(signal) <= 1e-12 * np.max(np.abs(signal)) for signal in held):
         raise InputError("No sensor moves in any estimation record; nothing can be identified.")

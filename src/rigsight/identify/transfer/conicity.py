@@ -107,7 +107,7 @@ def estimate_conicity(
             level,
             False,
             f"c_y = {c_y:.4g} lies above 1 with its whole {percent} interval ({low_c:.4g} to {high_c:.4g}): no positive conicity "
-            "gives this. Speed, sensor scales, or a lag between the sensors are off by more than the noise; delta_0 is not "
+            "gives this. Speed, sensor scales, or a lag between the sensors are wrong by more than the noise; delta_0 is not "
             "determined.",
         )
     interval = (_bounded(high_c, largest, r_0, b), _bounded(low_c, largest, r_0, b))
@@ -122,7 +122,7 @@ def estimate_conicity(
             level,
             False,
             f"The records do not determine delta_0: its {text} covers every plausible conicity (up to {plausible:g} rad). "
-            f"It would take c_y to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %.",
+            f"c_y would have to be known to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %.",
         )
     if interval[0] <= 0.0:
         statement = f"The records give an upper limit only: delta_0 is below {interval[1]:.3g} rad ({percent}); zero is possible."

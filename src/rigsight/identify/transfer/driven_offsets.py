@@ -56,7 +56,8 @@ def driven_offsets(
     """
     if record.n_samples < _LEAST_SAMPLES:
         raise InputError(
-            f"Record '{record.name}': {record.n_samples} samples show no offset; at least {_LEAST_SAMPLES} are needed."
+            f"Record '{record.name}': {record.n_samples} samples are too few to find an offset; at least {_LEAST_SAMPLES} are "
+            f"needed."
         )
     # psi is measured: it is smooth between its samples, whatever the current does.
     parts: list[tuple[str, TransferFit, Hold]] = [(name, motion, record.hold)]
@@ -83,7 +84,7 @@ def driven_offsets(
         tuple(values),
         values,
         covariance,
-        f"(2.26), (2.27) from what the fits leave of record '{record.name}'",
+        f"(2.26), (2.27) from the residuals of the fits in record '{record.name}'",
     )
 
 

@@ -121,7 +121,7 @@ def record_response(
     check_option("The method", method, METHODS)
     unused = ""
     if instrument is not None and method not in _BAND_LINES:
-        unused, instrument = f"The method '{method}' has no use for it; local_rational has.", None
+        unused, instrument = f"The method '{method}' does not use it; local_rational does.", None
     coherence = _coherence(record, source, response, hold) if with_coherence else None
     if method == "thesis":
         periodic, note = _mean_period(record, None)

@@ -221,8 +221,8 @@ def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:
         )
     if not fit.values["gain"] > 0.0:
         raise InputError(
-            f"The {which} parameters need a positive gain of {ratio}, got {fit.values['gain']:.4g} {fit.unit}: a sensor "
-            "or the current counts the other way round. Change the sign of that signal."
+            f"The {which} parameters need a positive gain of {ratio}, got {fit.values['gain']:.4g} {fit.unit}: a sensor or the "
+            f"current has the opposite sign. Change the sign of that signal."
         )
 
 
@@ -278,7 +278,8 @@ def offsets(
     what = f"Record '{record.name}', {begin:g} to {end:g} s"
     if np.count_nonzero(inside) < _LEAST_SAMPLES:
         raise InputError(
-            f"{what}: {np.count_nonzero(inside)} samples are no stationary stretch; at least {_LEAST_SAMPLES} are needed."
+            f"{what}: {np.count_nonzero(inside)} samples are too few for a stationary stretch; at least {_LEAST_SAMPLES} are "
+            f"needed."
         )
     u_mean = float(np.mean(record["u"][inside]))
     size = float(np.max(np.abs(record["u"])))

@@ -160,8 +160,9 @@ def find_head(
     names = _names_in(dialect, lines, block, wanted)
     if first - names > 2:
         raise UnclearHeadError(
-            f"lines {number_of(names)} to {number_of(first - 1)} all stand above the first row of numbers; one line may hold "
-            f"names and the next one units. If the names stand in line {number_of(names)}, delete the lines between units and "
+            f"lines {number_of(names)} to {number_of(first - 1)} are all above the first row of numbers; only one line may "
+            f"contain names and the next one units. If the names are in line {number_of(names)}, delete the lines between units "
+            f"and "
             "numbers, else write header = LINE."
         )
     return Head(names, names + 1 if names + 1 < first else None, first)
@@ -199,7 +200,7 @@ def _without_words(
     count = len(above)
     raise UnclearHeadError(
         f"line {number_of(first - 1)} has {count} column{'s' if count > 1 else ''}, the rows of numbers below it have "
-        f"{shape.width}, so it holds no names for them. Give each column a name there, or write header = false to count the "
+        f"{shape.width}, so it cannot contain their names. Give each column a name there, or write header = false to count the "
         "columns."
     )
 
@@ -228,8 +229,8 @@ def _first_of(
             return found[0]
     places = " and ".join(str(number_of(i)) for i in rows[:3])
     raise UnclearHeadError(
-        f"rows of numbers begin in lines {places}, with words between them. Cut the record where the logger began anew; if what "
-        "stands above is no part of it, write header = LINE with the line that holds the names."
+        f"rows of numbers begin in lines {places}, with text between them. Cut the record where the logger restarted; if the "
+        f"text above is not part of the table, write header = LINE with the line of the names."
     )
 
 

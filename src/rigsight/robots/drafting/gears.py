@@ -52,8 +52,8 @@ def split_joints(
             raise InputError(f"--gear: the stiffness of '{name}' is positive, got {stiffness:g}.")
         if model.dof_armature[joints[name].dof] == 0.0:
             raise InputError(
-                f"--gear: joint '{name}' has no armature. Its rotor turns by itself then, and needs an inertia: give the "
-                "joint an armature in the model."
+                f"--gear: joint '{name}' has no armature. With a gear its rotor turns separately and needs an inertia: give the "
+                f"joint an armature in the model."
             )
     added: dict[int, TreeJoint] = {}
     found = []
