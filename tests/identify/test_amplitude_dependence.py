@@ -69,7 +69,7 @@ def test_a_resonance_that_moves_is_told_where_intervals_are_too_wide() -> None:
     ]
     statement, changing = amplitude_dependence(records, UNITS, "A")
     assert changing == ()
-    assert "lies between 30 and 37 rad/s" in statement
+    assert "is between 30 and 37 rad/s" in statement
     steady, _ = amplitude_dependence([replace(r, resonance=30.0) for r in records], UNITS, "A")
     assert "resonance" not in steady
 

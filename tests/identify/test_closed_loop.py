@@ -88,7 +88,7 @@ def test_a_reference_that_drives_nothing_is_not_used_and_that_is_told() -> None:
 
 
 def test_a_method_without_use_for_an_instrument_says_so() -> None:
-    assert "'h1' has no use for it" in read(loop(), method="h1").unused_instrument
+    assert "'h1' does not use it" in read(loop(), method="h1").unused_instrument
 
 
 def test_identify_tells_what_the_reference_was_used_for() -> None:
