@@ -14,23 +14,24 @@ class BootstrapNumbers:
     replicates: int = number(
         60,
         "budget",
-        "Draws of a bootstrap: standard errors scatter by 1 / sqrt(2 n), 9 percent.",
+        "Draws of a bootstrap: the relative error of the standard errors is 1 / sqrt(2 n), 9 percent.",
     )
     fewest_replicates: int = number(
         24,
         "budget",
-        "Draws along long records: standard errors scatter by 14 percent.",
+        "Draws for long records: the relative error of the standard errors is 14 percent.",
     )
     replicate_steps: int = number(
         3_500_000,
         "budget",
         (
-            "Steps of integration in which more draws than these are simulated: 2 to 3 s. A number of "
-            "steps: draws depend on no clock."
+            "Integration steps spent on additional draws, 2 to 3 s. A number of steps instead of a time, so that results do not "
+            "depend on the computer."
         ),
     )
     most_replicate_steps: int = number(
         2_000_000,
         "budget",
-        "Steps of one draw from which the formula has to do: a stiff model takes thousands in a sample.",
+        "Integration steps of one draw above which the covariance of the fit is used instead: a stiff model takes thousands per "
+        "sample.",
     )
