@@ -1,4 +1,4 @@
-"""Which experiment would tell the rivals of an ambiguous verdict apart? Both are simulated on a small menu of drives.
+"""Which experiment would distinguish the rivals of an ambiguous verdict? Both are simulated for a small set of candidate inputs.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What does every model leave of the same records, and what is judged from that?"""
+"""Errors of all models on the same records, and the judgement that follows from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as data: verdict, ranking, gap budget, traces; no pictures and no files."""
+"""Result of a diagnosis as data: verdict, ranking, gap budget, traces; no pictures and no files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does the frequency response change with the amplitude? No leaves linear causes, yes asks for a nonlinear one."""
+"""Does the frequency response change with the amplitude? If not, the cause is linear; if so, nonlinear."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a look at the records themselves found, before any effect is tried."""
+"""Findings in the records themselves, before any effect is tried."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Would another hold of the input, or a constant shift of the time base, explain what a model leaves?
+"""Would another hold of the input, or a constant time offset, explain the residual of a model?
 
-The model is fitted again to the liveliest stretches of the records under each hypothesis. A shift is a delay whose zero is moved:
-the outputs are paired with inputs some samples earlier, so that a fitted delay shorter than that is a lead.
+The model is refitted to the most excited stretches of the records under each hypothesis. A time offset is fitted as a delay: the
+outputs are paired with inputs some samples earlier, so that a fitted delay shorter than that is a lead.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Do the records ask for an offset of each sensor in each record? Asked before any second effect is believed.
+"""Does each sensor need its own offset in each record? This is tested before a second effect is accepted.
 
-A sensor that was zeroed anew shifts a whole record. A memory that begins each record where it likes does nearly the same, and a
-second effect with a memory takes the credit. So models without a memory are asked first.
+A sensor that was zeroed again shifts a whole record. An effect with memory and a free initial state does nearly the same, so that
+it could be named as a second effect by mistake. Therefore models without memory are tested first.
 """
 
 from __future__ import annotations

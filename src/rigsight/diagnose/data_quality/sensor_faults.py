@@ -1,4 +1,4 @@
-"""Is a recorded channel cut off at its extremes, stuck, coarsely quantized, or does it jump?"""
+"""Is a recorded channel clipped, stuck or coarsely quantized, or does it jump?"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What is known of the constant forces at a joint, where an effect has a mean force of its own?
+"""Are the constant forces at a joint known, if an effect has a mean force of its own?
 
-Friction that differs each way and a constant force beside even friction obey the same equation. Such an effect is fitted with the
-constant forces of its joint held where the simulation in question has them, and competes only where even friction would have to
-move them: then it is the one cause in the place of a cause and a wrong number.
+Friction that differs between the two directions obeys the same equation as symmetric friction plus a constant force. Such an
+effect is therefore fitted with the constant forces of its joint held at the values of the given simulation. It competes only if
+symmetric friction would require other values: then it is a single cause instead of a cause and a wrong parameter.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Does something bring a rig back wherever it is put, or does it drift?"""
+"""Does a restoring force bring the rig back to rest, or does it drift?"""
 
 from __future__ import annotations
 

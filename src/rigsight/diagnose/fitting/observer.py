@@ -1,8 +1,8 @@
-"""How are models of a rig that drifts compared with records? By an observer: each softly follows the measured motion.
+"""Models of a drifting rig are compared with records as observers: each model is weakly coupled to the measured motion.
 
-Without a spring of its own a rig integrates every error of force twice: a free run soon shows where it has drifted to, and no
-more. An observer is pulled towards the measured motion. What a model lacks still shows within a time of the order of the
-reciprocal of its bandwidth; what it drifts in longer times does not. Memories of effects go on as they would.
+A rig without a spring integrates every force error twice, so that a free run soon shows only the drift. An observer is pulled
+towards the measured motion. A missing effect still shows within about the reciprocal of the observer bandwidth, while slower
+drift is removed. Internal states of effects are not corrected.
 
 References
 ----------

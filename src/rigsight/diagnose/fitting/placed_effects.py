@@ -1,4 +1,4 @@
-"""Which effects, and where, are candidates? Each at every place of a rig at which it makes sense."""
+"""Candidates: every effect at every place of the rig to which it applies."""
 
 from __future__ import annotations
 

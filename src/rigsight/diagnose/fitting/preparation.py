@@ -1,4 +1,4 @@
-"""What are the candidates of a task fitted with: which records, scales, start values, and which numbers are held?"""
+"""Preparation of the fits of a task: records, scales, start values, and which parameters are held."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Cutting records into windows with their own initial states, for rigs that drift in free run or forget where they began."""
+"""Cutting records into windows with their own initial states, for rigs that drift or whose motion is too sensitive.
+"""
 
 from __future__ import annotations
 

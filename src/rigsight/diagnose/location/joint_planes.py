@@ -1,6 +1,7 @@
-"""How does each joint of a rig with several move, and which force would act there if all that the equations lack did?
+"""Motion of each joint of a rig, and the force that would act there if everything missing acted at this joint.
 
-Along the motion that follows the sensors, with a force of any course at the joint. The rig's numbers are the re-identified ones.
+The motion follows the sensors, with a force of any shape over time at the joint. The parameters of the rig are the re-identified
+ones.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Does the lateral part follow from the motion as it was measured? Its linear equation fitted with that as input.
+"""Does the lateral part follow from the measured motion? Its linear equation is fitted with the measured motion as input.
 
 ``y' = b (c + g x(t + shift) - y)`` with x joined by straight lines. For each rate b and shift, gain g, offset c and initial
-values follow by linear least squares, so that the search has two dimensions at most. Errors of what moves x do not enter.
+values follow by linear least squares, so that the search has two dimensions at most. Errors of the model of x do not matter.
 """
 
 from __future__ import annotations

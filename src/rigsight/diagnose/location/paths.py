@@ -1,6 +1,6 @@
-"""On which leg of the signal path does the gap lie? Each leg with its own input as measured, and what they say together.
+"""In which section of the signal path does the gap arise? Each section is driven by its measured input.
 
-A delay before the motion leaves the lateral leg alone. A delay of the motion's sensor shifts it the other way: the motion is
+A delay before the motion does not affect the lateral section. A delay of the motion sensor shifts it the other way: the motion is
 measured late, so y seems early.
 """
 

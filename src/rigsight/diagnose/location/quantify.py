@@ -1,7 +1,7 @@
-"""How far does the gap shrink, how surely, and how much of that is owed to each of several effects?
+"""How far the gap shrinks, with confidence intervals, and the share of each of several effects.
 
-The intervals are those of a block bootstrap over the scored records: how much the figures would move with other stretches of
-the same experiments. They do not cover what another amplitude or another waveform would bring.
+The intervals are those of a block bootstrap over the scored records: how much the figures vary between stretches of the same
+experiments. They do not cover other amplitudes or waveforms.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
-"""Is what a model leaves noise and disturbance, or does it still go with motion, drive, reading, time or record?
+"""Is the residual of a model noise and disturbance, or is it correlated with motion, drive, reading, time or record?
 
-What is left is compared with the answers of the model's own readings to small pushes that go with one of these: a force that
-depends on a joint's velocity or position, a drive that is another function of its signal, a number that changes with time or
-from record to record. Noise and disturbance agree with such an answer in one stretch of a record as often as they contradict it
-in the next, so that the signs of what is left may be turned stretch by stretch: how often chance agrees as well is the p-value.
-What is compared is what is new at each sample (`innovations.py`), as a disturbance hangs together for as long as a rig swings,
-and pushes go with the motion that the equations have, as the measured one goes with the disturbance itself. No floor of the
-noise is needed, and noise may be colored and of changing size. Whether that size goes with the motion can be asked beside it: an
-effect that no push resembles, such as a pulsating stiffness, leaves more where there is more motion; a sensor's noise does not.
+The residual is correlated with the responses of the outputs to small perturbations that depend on one of these: a force as a
+function of a joint's velocity or position, a drive as another function of its signal, a parameter that changes with time or from
+record to record. For noise and disturbance the sign of this correlation is random in every stretch, so the signs of the residual
+may be flipped stretch by stretch: the p-value is the share of flips that correlate as well (randomization test). The innovations
+(`innovations.py`) are used instead of the residuals, because a disturbance remains correlated for as long as the rig rings. The
+perturbations follow the simulated motion, because the measured one is correlated with the disturbance itself. No noise floor is
+needed, and the noise may be colored and vary in size. A second test asks whether the size of the residual depends on the motion:
+an effect that no perturbation resembles, such as a varying stiffness, leaves more where there is more motion; sensor noise does
+not.
 
 References
 ----------

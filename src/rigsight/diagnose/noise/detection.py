@@ -1,11 +1,12 @@
 """Is there a gap? The noise floor of each output, from the records themselves.
 
-Three ways, the first that the records allow wins: repeated periods of one input (noise and disturbance alike), stretches in
+Three methods, of which the first possible one is used: repeated periods of one input (noise and disturbance alike), stretches in
 which the input rests (sensor noise and the disturbance that passes through the rig), and the top of the spectrum, where no rig
 responds (white sensor noise only: a lower bound).
 
-An element's input is itself measured, and its noise reaches the force only while the element moves: what a force shows at rest is
-a lower bound as well: an assumption that the dampers on a bench suggested, whose forces no effect explains to that floor.
+The input of an element is itself measured, and its noise affects the force only while the element moves. So the noise of a force
+at rest is also taken as a lower bound. This assumption is based on dampers on a test bench, whose forces no effect explains down
+to that floor.
 """
 
 from __future__ import annotations

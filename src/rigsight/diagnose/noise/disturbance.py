@@ -1,7 +1,7 @@
-"""How large is the force that disturbs a rig, judged by what the completed model leaves?
+"""Size of the disturbance force, estimated from the residual of the completed model.
 
-A force w beside the drive moves one mass by ``H w`` with ``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0 being the
-bandwidth of an observer and 0 in a free run. What is left above the sensor's noise, divided by H, is its spectrum.
+A force w in addition to the drive moves one mass by ``H w`` with ``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0
+being the bandwidth of an observer and 0 in a free run. The residual above the sensor noise, divided by H, is the spectrum of w.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""How well does a model explain the records, beside a force from outside and noise of any spectrum?
+"""Evidence of a model with a disturbance force and noise of any spectrum.
 
-A force from outside swings a rig at its resonances, and the error is large there whatever the model: what merely follows that
-swing gains little, what explains the records gains over all of the spectrum. So what a model leaves is taken for noise of the
-spectrum that it shows, a smooth one once the resonances of the linearized rig are divided out (prewhitening). No floor is needed.
+A disturbance force excites the resonances of a rig, where the error is then large for every model: a model that only follows
+these resonances gains little, one that explains the records gains over the whole spectrum. So the residual of a model is treated
+as noise with the spectrum of the residual, which is smooth once the resonances of the linearized rig are divided out
+(prewhitening). No noise floor is needed.
 
 References
 ----------

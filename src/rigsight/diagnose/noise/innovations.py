@@ -1,7 +1,7 @@
-"""What is new at each sample of a remainder, beside what follows from the samples before?
+"""Innovations of a residual: the part of each sample that cannot be predicted from the previous samples.
 
-A disturbing force that moves a rig leaves errors that hang together over many samples, at its resonance most. Errors and answers
-through the filter that takes this away are compared as if the errors were white.
+A disturbance force causes errors that are correlated over many samples, most at the resonance. After a whitening filter, errors
+and responses are compared as if the errors were white.
 
 References
 ----------

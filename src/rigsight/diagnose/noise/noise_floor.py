@@ -1,4 +1,4 @@
-"""The noise floor of an output: what no model can explain, and how that was found."""
+"""The noise floor of an output: the error that no model can explain, and how it was found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many draws does a standard error rest on?"""
+"""Number of bootstrap draws for standard errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigsight.diagnose.policy.number import number
 
 @dataclass(frozen=True)
 class BootstrapNumbers:
-    """How many draws does a standard error rest on? Each field carries its reason."""
+    """Number of bootstrap draws for standard errors. Each field carries its reason."""
 
     replicates: int = number(
         60,
@@ -25,8 +25,8 @@ class BootstrapNumbers:
         3_500_000,
         "budget",
         (
-            "Integration steps spent on additional draws, 2 to 3 s. A number of steps instead of a time, so that results do not "
-            "depend on the computer."
+            "Budget of integration steps for all draws, 2 to 3 s: slow models get fewer draws. A number of steps instead of a "
+            "time, so that results do not depend on the computer."
         ),
     )
     most_replicate_steps: int = number(

@@ -1,4 +1,4 @@
-"""What is told about records and numbers beside the verdict?"""
+"""Thresholds of the notes on records and parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigsight.diagnose.policy.number import number
 
 @dataclass(frozen=True)
 class NoteNumbers:
-    """What is told about records and numbers beside the verdict? Each field carries its reason."""
+    """Thresholds of the notes on records and parameters. Each field carries its reason."""
 
     quiet_input: float = number(
         1e-3,
@@ -98,7 +98,7 @@ class NoteNumbers:
         0.5,
         "convention",
         (
-            "If a channel is constant for longer than this elsewhere too, the rig is at rest and the sensor is not stuck."
+            "If a channel is constant in more than this share of its samples, the rig is at rest and the sensor is not stuck."
         ),
     )
     abrupt: float = number(

@@ -1,4 +1,4 @@
-"""How far is searched? Budgets and the order of work; a right model that they lose is lost, a wrong one does not gain."""
+"""Budgets and order of the search. If they are too small, a right model may be missed, but a wrong one gains nothing."""
 
 from __future__ import annotations
 

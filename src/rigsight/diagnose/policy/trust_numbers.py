@@ -1,4 +1,4 @@
-"""What is a number of a model asked before it is called the same everywhere?"""
+"""Thresholds of the tests whether a parameter is the same everywhere."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How do the readings of fitted equations answer to a small push at a place?"""
+"""Responses of the outputs of fitted equations to a small perturbation at a place."""

@@ -1,13 +1,13 @@
-"""What else could make what a model leaves? The answers of its readings to small pushes that go with one thing each.
+"""Alternatives that could cause the residual of a model: responses of its outputs to small perturbations, each of a single kind.
 
-A force that is another function of a joint's velocity or position, a drive that is another function of its signal or its change,
-another reading of a sensor, a sensor that drifts, something else that changes with time, or a number that differs from record to
-record. Functions are piecewise linear. These are the alternatives of a score test: nothing is fitted for them.
+A force as a function of a joint's velocity or position, a drive as another function of its signal or its rate, another sensor
+characteristic, a sensor that drifts, another change over time, or a parameter that differs from record to record. The functions
+are piecewise linear. These are the alternatives of a score test, so nothing needs to be fitted for them.
 
 References
 ----------
 C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50, for score tests. L. Ljung, *System Identification* (Prentice Hall 1999), section
-16.4, for judging extensions of a model by what goes with its residual.
+16.4, for judging extensions of a model by their correlation with its residual.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""How do the readings of fitted equations answer to a small push at a place, beyond what numbers and start states could follow?
+"""Responses of fitted equations to a small perturbation, less what parameters and initial states could compensate.
 
 References
 ----------
-L. Ljung, *System Identification* (Prentice Hall 1999), section 16.4, for judging extensions of a model by what goes with its
-residual.
+L. Ljung, *System Identification* (Prentice Hall 1999), section 16.4, for judging extensions of a model by their correlation with
+its residual.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How did the joints move in a record? As the equations say, corrected by what the sensors show beside them."""
+"""Motion of the joints in a record: that of the equations, corrected by the residuals of the sensors."""
 
 from __future__ import annotations
 

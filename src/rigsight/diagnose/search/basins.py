@@ -1,7 +1,7 @@
-"""Does a candidate's fit end in the lowest of its basins? Fits from numbers of its effects that are some way off tell.
+"""Has the fit of a candidate reached its lowest minimum? This is checked by fits from other start values of its effects.
 
-Where a mass sticks, or play is crossed, one set of numbers explains one part of the records and another one another part: the
-cost has several minima, and the one next to the declared starts need not be the lowest. Two minima are compared by chi square.
+If a mass sticks or play is crossed, one set of parameters may fit one part of the records and another set another part: the cost
+has several minima, and the one nearest to the declared starts need not be the lowest. Two minima are compared by chi square.
 
 References
 ----------

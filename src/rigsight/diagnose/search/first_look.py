@@ -1,14 +1,14 @@
-"""From where is a candidate worth fitting to all records with care? First looks from all its starts.
+"""From which starts is a candidate worth a careful fit to all records? Decided by short first fits from all its starts.
 
-From every start a candidate is fitted to the liveliest stretches of the records: in short pieces with initial states of their
-own, which keeps a model that is far off in step with the motion, then in one piece. Only there starts are compared: in pieces
-the right one may be the worst, as sliders that let go at a wrong sample hold a fit at a place that the next rounding moves.
-From where the best of these ended the candidate is fitted roughly to the whole records.
+From every start a candidate is fitted to the most excited stretches of the records: first in short pieces with their own initial
+states, which keeps an inaccurate model in phase with the motion, then in one piece. Starts are compared only after the second
+fit: in pieces the right one may be the worst, because sliders that slip one sample too early or late trap the fit in a local
+minimum that depends on rounding. From the best of these the candidate is fitted roughly to the whole records.
 
 References
 ----------
 H. G. Bock, in *Modelling of Chemical Reaction Systems* (Springer 1981) 102, for fits in pieces (multiple shooting, here without
-the condition that pieces join).
+continuity between the pieces).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""For how long must a model predict before it is compared with records? As long as the gap needs to show, where a rig drifts."""
+"""Prediction horizon for rigs that drift: as long as the gap needs to become visible."""
 
 from __future__ import annotations
 

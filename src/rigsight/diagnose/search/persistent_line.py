@@ -1,4 +1,4 @@
-"""At which frequency does every record leave something, whatever drives it? A line in the spectra of what a model leaves."""
+"""Periodic disturbances: a line at the same frequency in the residual spectra of all records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which places of a rig, and which effects, are worth the fits? Those whose push takes nearly as much away as the best one."""
+"""Which places of a rig and which effects are fitted? Those that explain nearly as much in the screening as the best one."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
-"""At which wave number does what a model leaves come back with the position? A line in its spectrum over the position.
+"""Position-periodic effects: a line in the residual spectrum over position.
 
-A force that repeats along the way has, at changing speed, no line in any spectrum over time. What a force
-``a sin(kappa s) + b cos(kappa s)`` along the measured way s does to an output is its answer by the linear equations: for each
-wave number a regression with coefficients that all records share. The lines of the highest share are where a fit is worth
-starting.
+At changing speed a force that is periodic in position has no line in a spectrum over time. The response of an output to a force
+``a sin(kappa s) + b cos(kappa s)`` along the measured position s follows from the linear equations: for each wave number, a
+regression with coefficients common to all records. Fits start from the wave numbers that explain the largest share.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which models obey the equations of a plainer one? They are left out, wherever other effects stand beside them."""
+"""Models that are equivalent to a simpler one are left out, also in combination with other effects."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Where, before which: how much of what the equations leave would each effect at each place take away?
+"""Screening: how much of the residual of the equations would each effect at each place explain?
 
-Each effect is simulated by itself, from each of its declared starts, along the motion that the records show. The force, the drive
-or the reading that comes out is a known push on the re-identified equations at its place. Of these pushes those that go best with
-what the equations leave, to first order, are fitted: their size, the rig's parameters and the initial states move, no more. One
-kernel serves all of them, and nothing of a candidate but its law alone is compiled.
+Each effect is simulated alone, from each of its declared starts, along the measured motion. The resulting force, drive or reading
+is applied to the re-identified equations at its place as a known perturbation. Those that correlate best with the residual, to
+first order, are fitted; only their size, the parameters of the rig and the initial states are free. A single kernel serves all
+candidates; only the law of each effect itself is compiled.
 
 References
 ----------

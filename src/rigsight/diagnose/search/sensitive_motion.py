@@ -1,7 +1,7 @@
-"""Which effect explains a motion in which chance has a part, looked at a few cycles at a time?
+"""Which effect explains a motion that is sensitive to small disturbances? Decided in windows of a few cycles.
 
-Where a disturbance no larger than the noise makes another motion in the end, not even the true model follows a whole record.
-In windows of a few cycles, each with its own initial state, it does, and a wrong one does not.
+If a disturbance as small as the noise eventually leads to a different motion, not even the true model follows a whole record. In
+windows of a few cycles, each with its own initial state, the true model does and a wrong one does not.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
 
-Each candidate gets a first look. Those that come near the best there are fitted with care, the best of them to full precision.
+Each candidate gets a first fit. Those near the best are fitted carefully, the best of them to full precision.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From which wave numbers is an effect that comes back with the position worth fitting? From the lines that the records show."""
+"""Start values of the wave number of position-periodic effects, from lines in the residual spectra."""
 
 from __future__ import annotations
 

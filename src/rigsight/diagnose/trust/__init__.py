@@ -1,1 +1,2 @@
-"""Can the numbers of the verdict's model be trusted? Estimated again by record, amplitude, constant and window, and compared."""
+"""Trust in the parameters of the diagnosed model: estimated again by record, amplitude, constant and window.
+"""

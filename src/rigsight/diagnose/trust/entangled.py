@@ -1,4 +1,4 @@
-"""Which numbers does the fit move together, so that one makes up for the other?"""
+"""Which parameters are strongly correlated, so that one compensates for the other?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which numbers do some records or windows alone speak for, and how sure is that? One Gauss-Newton step from the common fit.
+"""Estimates from some records or windows alone, with their uncertainty: one Gauss-Newton step from the common fit.
 
 References
 ----------

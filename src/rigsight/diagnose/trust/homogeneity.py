@@ -1,11 +1,11 @@
-"""Is a number the same in every group, and if not, does it grow or fall in an order of the groups?
+"""Is a parameter the same in every group, and if not, does it rise or fall with an ordering of the groups?
 
 References
 ----------
 W. G. Cochran, J. R. Stat. Soc. Suppl. 4 (1937) 102, for the test of homogeneity by weighted squares. B. L. Welch, Biometrika 38
 (1951) 330, for the same where the variances are estimated, each with its degrees of freedom. S. Holm, Scand. J. Stat. 6 (1979)
 65, for several tests. R. E. Barlow, D. J. Bartholomew, J. M. Bremner and H. D. Brunk, *Statistical Inference under Order
-Restrictions* (Wiley 1972), for the best monotonic course.
+Restrictions* (Wiley 1972), for the best monotonic trend.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Along what may a number change from record to record? Amplitude, constants of the records, and the order of the records."""
+"""Quantities with which a parameter may change between records: amplitude, constants of the records, order in time.
+"""
 
 from __future__ import annotations
 

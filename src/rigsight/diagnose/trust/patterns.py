@@ -1,12 +1,13 @@
-"""What does it point to where a number is not the same everywhere? Pattern -> likely cause -> next experiment.
+"""What does it mean if a parameter is not the same everywhere? Pattern -> likely cause -> next experiment.
 
-Causes are likely ones, not proven: the table says what most often makes a number of a wrong or incomplete model differ like that.
+Causes are likely, not proven: the table gives the most frequent reason why a parameter of a wrong or incomplete model differs in
+this way.
 
 References
 ----------
-A. Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions and Nonlinear System Design* (McGraw-Hill 1968): stiffness
-and damping that a linear model needs where a law bends, as functions of the amplitude. Coulomb friction acts as a damping
-4 T_c / (pi omega A), quadratic damping as one that grows with omega A, a clearance g as a spring that is absent below g.
+A. Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions and Nonlinear System Design* (McGraw-Hill 1968): equivalent
+stiffness and damping of nonlinear laws as functions of the amplitude. Coulomb friction acts as a damping 4 T_c / (pi omega A),
+quadratic damping as one that grows with omega A, a clearance g as a spring that is absent below g.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""What does each record, and each window of it, say of the fitted numbers? One linearization at the common fit.
+"""Information of each record, and of each window of it, on the fitted parameters, linearized at the common fit.
 
-With the initial state of a window free, what its residual says of the numbers is what is left of residual and derivatives when
-that state has followed both (Frisch and Waugh): normal equations of a piece then add up to those of any group of pieces.
+The free initial state of a window is projected out of residual and derivatives (Frisch and Waugh); the normal equations of pieces
+then add up to those of any group of pieces.
 
 References
 ----------
-R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for free numbers of a piece's own. L. Ljung, *System Identification*
-(Prentice Hall 1999), chapter 9, for the covariance beside colored residuals.
+R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for projecting out free parameters of a piece. L. Ljung, *System
+Identification* (Prentice Hall 1999), chapter 9, for the covariance beside colored residuals.
 """
 
 from __future__ import annotations

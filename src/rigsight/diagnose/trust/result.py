@@ -1,4 +1,4 @@
-"""What is known of the trust that each number deserves, as data: values by group, p-value, pattern and what it points to."""
+"""Result of the trust analysis as data: for each parameter values by group, p-value, pattern and likely cause."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What spectrum has the noise of each record? That of an autoregression, which is as sharp as a resonance.
+"""Noise spectrum of each record from an autoregressive model, which can resolve a resonance.
 
-An average over neighboring lines of a short record is wider than the resonance at which a disturbance shows most, and so calls
-what is read there surer than it is.
+An average over neighboring lines of a short record is wider than the resonance, where a disturbance is strongest, and so
+underestimates the uncertainty there.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""How is the trust in numbers said in a few sentences?"""
+"""The statement on the trust in parameters, in a few sentences."""
 
 from __future__ import annotations
 

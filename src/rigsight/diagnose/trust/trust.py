@@ -1,6 +1,6 @@
-"""Are the numbers of the verdict's model the same in every record, at every amplitude, in shorter windows? And if not, why?
+"""Are the parameters of the diagnosed model the same in every record, at every amplitude and in shorter windows? If not, why?
 
-Nothing is fitted anew: estimates by group follow from one Gauss-Newton step out of the common fit.
+Nothing is refitted: estimates by group follow from one Gauss-Newton step from the common fit.
 """
 
 from __future__ import annotations

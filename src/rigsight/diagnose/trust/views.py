@@ -1,4 +1,5 @@
-"""By what is a number estimated again? By record, by level of what was set, by portion of a record, in shorter windows."""
+"""Groupings for repeated estimates: by record, by amplitude or constant, by portion of a record, and in shorter windows.
+"""
 
 from __future__ import annotations
 

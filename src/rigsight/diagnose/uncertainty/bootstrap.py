@@ -1,15 +1,15 @@
-"""Standard errors by a parametric bootstrap: the fitted model is simulated with forces from outside and noise of its sensors.
+"""Standard errors by a parametric bootstrap: the fitted model is simulated with disturbance forces and sensor noise.
 
-The formula takes what is left for noise of a certain spectrum beside the readings. A force from outside is more than that where
-it decides when friction lets a mass go, when play is crossed or a stop is met: it moves the very events from which the numbers
-were read. So many draws of what disturbs the rig are put through the model with its effects, and each is what one Gauss-Newton
-step of the fit makes of it.
+The covariance formula treats the residual as noise of a certain spectrum added to the outputs. This is not sufficient if a
+disturbance force decides when friction slips, play is crossed or a stop is hit: it shifts the events that determine the
+parameters. So many draws of the disturbance are simulated with the model and its effects, and one Gauss-Newton step of the fit
+gives the parameters of each draw.
 
 References
 ----------
 B. Efron and R. J. Tibshirani, *An Introduction to the Bootstrap* (Chapman and Hall 1993), sections 6.5 and 19.3, for the
 parametric bootstrap and the number of draws. A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application*
-(Cambridge 1997), section 2.7, for one step in the place of a new fit.
+(Cambridge 1997), section 2.7, for one step instead of a new fit.
 """
 
 from __future__ import annotations

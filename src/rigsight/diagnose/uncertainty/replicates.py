@@ -1,8 +1,8 @@
-"""What would a fitted model have shown under another force from outside and other noise of its sensors?
+"""Simulated outputs of a fitted model under another disturbance force and other sensor noise.
 
-A force acts at the joints and moves the model with all its effects: where friction holds a mass it does nothing, where a mass is
-about to let go it does much. Its response is the difference to the same simulation without it. An observer follows the readings
-that were measured, and of another noise only what it hands on: an error dies away in it as one of the rig's own motion would.
+The force acts at the joints on the model with all its effects: while friction holds a mass it has no effect, when a mass is about
+to slip a large one. The response is the difference to the same simulation without the force. An observer follows the measured
+outputs, so other sensor noise also enters through its correction, and decays in it like an error of the motion.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""Which forces from outside and which sensor noise leave what a model leaves?
+"""Which disturbance forces and sensor noise explain the residual of a model?
 
-What is left is taken for white noise of each sensor and a force at each joint, which is a sum of white noise and of slower forces
-whose spectra fall above a corner. How each of them shows in each sensor is simulated, initial states and numbers following as
-they do in a fit; their sizes are those under which the spectra are likeliest. Friction that holds a mass hides a force, so sizes
-are set right once by simulating what was found.
+The residual is modelled as white noise of each sensor and a force at each joint, the sum of white noise and of low-pass noise
+with several corner frequencies. The response of each sensor to each of them is simulated, less what initial states and parameters
+compensate in a fit; the sizes follow by maximum likelihood of the spectra. Sticking friction hides a force, so the sizes are
+corrected once by simulating the result.
 
 References
 ----------
 P. Whittle, Ark. Mat. 2 (1953) 423, for the likelihood of a spectrum. C. Fevotte, N. Bertin and J.-L. Durrieu, Neural Comput. 21
 (2009) 793, for its maximum over sums of given spectra. C. Gourieroux, A. Monfort and E. Renault, J. Appl. Econometrics 8 (1993)
-S85, for sizes that are set right by simulation.
+S85, for sizes that are corrected by simulation.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""How probable is what a diagnosis names? Two small logistic models, trained on drawn rigs whose cause is known.
+"""Probability of the named cause: two small logistic models, trained on simulated random rigs whose cause is known.
 
-The first says how probable it is that the cause is among the models tried at all, the second how probable it is that it is the
-first of them. Both read a handful of figures of the diagnosis, see `Situation`. Coefficients stand in ``calibration.json``,
-which ``make calibrate`` makes anew from the table of training trials in ``experiments/calibration``.
+The first gives the probability that the cause is among the models tried, the second the probability that it is the first of them.
+Both use a few figures of the diagnosis, see `Situation`. The coefficients are in ``calibration.json``, which ``make calibrate``
+regenerates from the table of training trials in ``experiments/calibration``.
 
 References
 ----------

@@ -1,7 +1,7 @@
-"""Does one model surely take the larger part of the gap, and does no other that is as good take another part of it?
+"""Main cause: does one model certainly explain more than half of the gap, and no equally good model another part?
 
-Models that act elsewhere contradict each other where they explain different parts of the gap. Where they explain the same part,
-such as a late drive and a late sensor, the cause is known but for its place.
+Models at different places contradict each other if they explain different parts of the gap. If they explain the same part, such
+as a delayed drive and a delayed sensor, only the place of the cause is open.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Are the numbers of a fitted model ones that a rig can have, and do the records determine them?"""
+"""Are the parameters of a fitted model physically possible, and do the records determine them?"""
 
 from __future__ import annotations
 

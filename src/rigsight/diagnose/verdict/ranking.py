@@ -1,4 +1,4 @@
-"""How sure the ranking is: paired block bootstrap of the held-out errors, parsimony, tempered evidence, ambiguity."""
+"""Certainty of the ranking: paired block bootstrap of the held-out errors, parsimony, tempered evidence, ambiguity."""
 
 from __future__ import annotations
 

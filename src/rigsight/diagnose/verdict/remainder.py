@@ -1,4 +1,4 @@
-"""What does a named cause leave, how much of the gap is that, and with what does it still go?"""
+"""The error that a named cause does not explain: its share of the gap and the signal with which it correlates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which force is missing, and at which joint, where no effect explains the gap?"""
+"""Which force is missing, and at which joint, if no effect explains the gap?"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Has one more effect evidence of its own, or does it only soak up what the inexact form of those before it leaves?
+"""Is there independent evidence for one more effect, or does it only compensate for the inexact form of the previous ones?
 
-No form is exact on a measured rig: a sign is rounded, a spring bends a little. What that leaves goes with the same signal as the
-effect itself, and many a second effect takes it up as well as a truer form of the first would. So what a pair gains is held
-against what any other law of the first effect's own signal, at the first effect's place, would gain.
+No law is exact on a measured rig: friction may change sign smoothly, a spring may be slightly nonlinear. The resulting residual
+depends on the same signal as the effect itself, and a second effect may explain it as well as a better form of the first. So the
+gain of a pair is compared with the gain of any other law of the same signal at the place of the first effect.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Does a relative of the best pair explain more, if both effects start from their declared numbers?
+"""Does a pair similar to the best one explain more if both effects start from their declared values?
 
-Pairs are grown from a single effect that was fitted alone, and so took over part of what a second one does. The second then
-starts in the wrong place, and another effect that is like it wins. Here both start beside the equations without an effect.
+Pairs are built from a single effect that was fitted alone and therefore compensates for part of the second one. The second effect
+then starts from wrong values, and a similar effect may win. Here both effects start together from the equations without an
+effect.
 """
 
 from __future__ import annotations

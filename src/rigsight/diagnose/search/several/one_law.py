@@ -1,8 +1,8 @@
-"""Are two effects one law together, of which another form would look much the same?
+"""Do two effects act together as a single law, which other laws would fit equally well?
 
-Two effects of the spring, two dampings, two linear effects between drive and motion: their sum bends like many a law that is in
-no catalogue. Of 14 such pairs that were named on blind rigs ten imitated a cause from outside and two a single effect whose own
-fit had stopped short (seeds 3 to 8, `experiments/blind_small`).
+Two effects of the spring, two damping effects, two linear effects between drive and motion: their sum resembles many laws outside
+the catalogue. Of 14 such pairs named on blind rigs, ten imitated a cause outside the catalogue, and two imitated a single effect
+whose own fit had stopped too early (seeds 3 to 8, `experiments/blind_small`).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which effects, added to a model, explain what it leaves? Every effect gets a first look, the promising are fitted.
+"""Which effects, added to a model, explain its residual? Every effect gets a first fit; the promising ones are fitted carefully.
 
-A look goes two ways: from the model with the new effect added, and from the new effect alone with those of the model added. A
-strong memory hides behind the effect that was found first.
+The first fit is tried in both orders: from the model with the new effect added, and from the new effect alone with those of the
+model added. Otherwise the effect found first could hide a strong effect with memory.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Do several effects explain what the best one leaves? Greedy growth from the best, judged by held-out records.
+"""Do several effects explain the residual of the best one? Greedy forward selection, judged by held-out records.
 
-Each part of the best pairs is fitted alone from there. What the growth cannot do without is found by the ranking: a model
-competes with its own parts.
+Each effect of the best pairs is then also fitted alone from there, so that a pair competes with its own parts in the ranking.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Are several effects looked for, and in which ways? Only where what the best single effect leaves is no noise."""
+"""Search for several effects: only if the residual of the best single effect is not noise."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Does a third effect explain what the best two leave?
+"""Does a third effect explain the residual of the best two?
 
-Only where some push takes the larger part of that away, and more than another form of one of the two would.
+Only tried if some candidate explains more than half of it in the screening, and more than another form of one of the two would.
 """
 
 from __future__ import annotations
