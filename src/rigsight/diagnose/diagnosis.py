@@ -244,7 +244,7 @@ def _assembled(
 
 
 def _situation(found: Examination) -> Situation:
-    """Return what the probability of the verdict is told from."""
+    """Return the figures from which the probability of the verdict is computed."""
     ranking, judgement = found.ranking, found.judgement
     first = ranking.order[0] if ranking.order else None
     return Situation(
@@ -260,7 +260,7 @@ def _situation(found: Examination) -> Situation:
 
 
 def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
-    """Return the causes that are at least so probable; the likeliest always."""
+    """Return the causes with at least the required probability, and always the most probable one."""
     outside = max(0.0, 1.0 - math.fsum(candidate.probability for candidate in candidates))
     most = max(outside, *(candidate.probability for candidate in candidates))
     enough = min(least, most)
@@ -297,9 +297,10 @@ def _up_to(floor: NoiseFloor, left: NDArray[np.float64]) -> NoiseFloor:
 
 
 def _evidence(found: Examination) -> tuple[str, ...]:
-    """Return the places to which a gap without a cause is traced.
+    """Return the places to which the evidence points if the cause is unknown.
 
-    Where a push takes most of it away; on a rig with one motion that with whose signals it goes, else the best effect's.
+    The place of the push that explains most; on a rig with one motion the place whose signals correlate with the residual, else
+    the place of the best effect.
     """
     if found.places:
         return tuple(place.name for place in found.places if place.looked_at and place.share > 0.0)

@@ -61,23 +61,23 @@ class Examination:
     windowing
         How records were cut.
     before, linear
-        The simulation in question, and its equations with the numbers that fit best.
+        The given simulation, and its equations with refitted parameters.
     ranking
         The candidates.
     judgement
         The verdict.
     quality
-        What the data are good for.
+        Quality of the data.
     imitations
-        Pairs that came near and do not compete, as many another law would come as near.
+        Pairs with a low error that do not compete, because other laws fit equally well.
     places
-        Where a push takes away how much of the gap; empty on a rig with one motion.
+        Share of the gap that a push explains, by place; empty on a rig with one motion.
     adequacy
-        Whether what the model of the verdict leaves goes with anything; None where that model could not be scored.
+        Whether the residual of the diagnosed model is correlated with anything; None where that model could not be scored.
     doubts
-        What is implausible about the numbers of the model of the verdict.
+        Implausible parameters of the diagnosed model.
     gap_at
-        For an unknown cause the joint, drive or sensor with whose signals the gap goes most; empty where none is known.
+        For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where none is known.
     """
 
     floors: tuple[NoiseFloor, ...]
@@ -105,7 +105,7 @@ def examine(
     memory: FitMemory | None,
     at_rest: bool = True,
 ) -> Examination:
-    """Fit the simulation in question, its equations and every candidate; rank and judge them.
+    """Fit the given simulation, its equations and every candidate; rank and judge them.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def examine(
     Raises
     ------
     InputError
-        If the simulation in question cannot be run.
+        If the given simulation cannot be run.
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
@@ -250,7 +250,7 @@ def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class _Singly:
-    """What every effect explains by itself."""
+    """Results of every effect by itself."""
 
     windowing: Windowing
     context: FitContext

@@ -1,4 +1,4 @@
-"""What does a support of terms explain? It is polished by output error and scored by free runs of records it has not seen."""
+"""Fit and score of a set of terms (a support): output-error fit, then free runs on held-out records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole discovery: records and a rig -> library, sparse regression, held-out selection, polished equations."""
+"""The whole discovery: records and a rig -> library, sparse regression, held-out selection, refitted equations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What should a user know before using the equations? Doubts about a term, and about the records, in words."""
+"""Warnings before the equations are used: doubts about terms and about the records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How surely does each term belong? Regressions of resampled rows about the rest position of the polished equation."""
+"""Inclusion probability of each term: regressions of resampled rows about the rest position of the refitted equation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which records choose between equations, and which are they fitted to?"""
+"""Split of the records into those that are fitted and those that select the equations."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What does the force look like that an equation lacks? A quick sparse regression on products of displacement and velocity.
+"""Shape of the force missing in an equation: a quick sparse regression on products of displacement and velocity.
 
-No cause is named and nothing is simulated: the terms describe what any cause must look like along these records.
+No cause is named and nothing is simulated: the terms describe the missing force in these records, whatever causes it.
 """
 
 from __future__ import annotations

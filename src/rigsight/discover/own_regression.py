@@ -1,4 +1,4 @@
-"""What do the rig's own terms explain? The regression that every further term is added to."""
+"""Regression on the rig's own terms, to which every further term is added."""
 
 from __future__ import annotations
 

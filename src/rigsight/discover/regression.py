@@ -1,8 +1,7 @@
-"""Which terms does sparse regression take, in which order, and how surely? pysindy's optimizers on columns without units.
+"""Which terms sparse regression selects, in which order, and how often: pysindy's optimizers on dimensionless columns.
 
-What the rig has anyway (its drive, its rest position, and in the discrepancy form its damper and spring too) is projected out
-first, so that it never competes. Rows are kept as a triangular factor, which has the same normal equations as all rows and a
-few hundred times fewer of them.
+The rig's own terms (its drive, its rest position and, in the discrepancy form, its damper and spring) are projected out first, so
+that they never compete. Rows are stored as a triangular factor with the same normal equations and a few hundred times fewer rows.
 
 References
 ----------

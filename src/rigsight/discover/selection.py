@@ -1,7 +1,7 @@
-"""Which terms stay? Every support is polished by output error and judged by free-run simulation of records it has not seen.
+"""Selection of terms: every support is fitted by output error and judged by free-run simulation of held-out records.
 
-Regression proposes and this decides. A term must earn its place on the held-out records by more than the Bayesian information
-criterion of their independent samples; of two models that those cannot tell apart the one with fewer terms is kept.
+Regression proposes terms, this selects. A term must improve the fit to the held-out records by more than the penalty of the
+Bayesian information criterion for their independent samples; of two indistinguishable models the one with fewer terms is kept.
 """
 
 from __future__ import annotations

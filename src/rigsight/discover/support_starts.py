@@ -1,4 +1,4 @@
-"""Where does the fit of a support start? At the values of the regression, or where the fit of a shorter support ended."""
+"""Start values of the fit of a support: those of the regression, or the result of a shorter support."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is to be discovered: records and a rig."""
+"""Task of a discovery: records and a rig."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the parameters that records show by themselves change with the amplitude, beyond their intervals?"""
+"""Do the parameters of single records change with the amplitude, beyond their intervals?"""
 
 from __future__ import annotations
 

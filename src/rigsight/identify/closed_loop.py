@@ -1,4 +1,4 @@
-"""What is a user told of records that hold the reference of a closed loop?"""
+"""Notes on records that contain the reference of a closed loop."""
 
 from __future__ import annotations
 

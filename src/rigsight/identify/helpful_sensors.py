@@ -1,4 +1,4 @@
-"""Which sensors of the rig that nobody recorded would tell parameters apart? Asked of the fitted model itself."""
+"""Unrecorded sensors of the rig that would make more parameters identifiable, computed with the fitted model."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Which parameters do the records determine, and which only in combinations with others? Said in words.
+"""Which parameters do the records determine, and which only in combination with others? In words.
 
-Directions of the information matrix along which nothing moves are parameters that follow each other. A combination is named when
-a finite step along it leaves the outputs as they are: derivatives at one place cannot tell a ratio from a difference.
+Null directions of the information matrix are parameters that compensate each other. A combination is named if a finite step along
+it does not change the outputs, because derivatives at one point cannot distinguish a ratio from a difference.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What an identification of a campaign holds: each record alone, all of them together, and what the user must know."""
+"""Result of the identification of a campaign: each record alone, all of them together, and warnings."""
 
 from __future__ import annotations
 

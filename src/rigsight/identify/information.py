@@ -1,4 +1,4 @@
-"""What do fitted records say of each parameter, and of their combinations? The information matrix in relative units."""
+"""Information of fitted records on each parameter and their combinations: the information matrix in relative units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What are the poles and frequency responses of a fitted rig close to its rest, how sure are they, and what was measured?"""
+"""Poles and frequency responses of a fitted rig linearized at equilibrium, with uncertainty, and the measured responses."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""By how much would a fit have ended elsewhere, had its records been a little different? One Gauss-Newton step tells.
+"""Change of a fit for slightly different records, by one Gauss-Newton step.
 
 References
 ----------
 A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application* (Cambridge 1997), section 2.7 and chapter 7, for steps
-from the estimate instead of new fits. R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for columns without what the initial
-states can follow.
+from the estimate instead of new fits. R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for projecting out the initial
+states.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What does one estimation record show by itself: transfer functions, physical parameters, offsets, and what it cannot tell?"""
+"""Results of a single estimation record: transfer functions, physical parameters, offsets, and what it does not determine."""
 
 from __future__ import annotations
 

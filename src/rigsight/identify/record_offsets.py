@@ -1,4 +1,4 @@
-"""Does an offset differ from record to record, and which numbers of a rig say the same as offsets that do?"""
+"""Offsets that differ from record to record, and the parameters of a rig that are equivalent to such offsets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What do a rig's equations, without effects, say in numbers? Its rates, its readings and its forces as functions of arrays."""
+"""The equations of a rig without effects in numbers: rates, readings and forces as functions of arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which directions of the coordinates do records not determine? From a square root of their information matrix."""
+"""Directions of the coordinates that records do not determine, from a square root of their information matrix."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def amplitude_dependences(
 ) -> tuple[AmplitudeDependence, ...]:
     """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path.
 
-    Of a rig with one motion the path from its input to its motion is asked, of any other those from each input to each sensor.
+    On a rig with one motion the path from its input to its motion is compared, on any other those from each input to each sensor.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def amplitude_dependences(
     records
         All records of a campaign; steps do not take part.
     faulty
-        Record and sensor of each reading at fault: it distorts as an effect would.
+        Record and sensor of each faulty reading, which would distort like an effect.
     """
     if not rig.is_driven:
         return (

@@ -26,7 +26,7 @@ _DELAYS = ("input_delay", "sensor_delay")
 
 @dataclass(frozen=True)
 class InputTiming:
-    """What a model leaves on the liveliest stretches under each hypothesis.
+    """Error of a model on the most excited stretches under each hypothesis.
 
     Attributes
     ----------
@@ -52,12 +52,12 @@ class InputTiming:
     dt: float
 
     def explained(self, error_over_noise: float) -> float:
-        """Return the share of the gap above the floor, as power, that goes where only `error_over_noise` is left."""
+        """Return the explained share of the gap above the floor, as power, if the error falls to `error_over_noise`."""
         gap = self.as_given**2 - 1.0
         return 0.0 if gap <= 0.0 else float(np.clip((self.as_given**2 - error_over_noise**2) / gap, 0.0, 1.0))
 
     def findings(self) -> list[Finding]:
-        """Return the hypotheses that explain a good part of what the model leaves."""
+        """Return the hypotheses that explain a large part of the residual."""
         if not self.as_given > VERDICT.at_floor:
             return []
         least = min(self.with_hold.values())
@@ -115,7 +115,7 @@ class InputTiming:
 def input_timing(
     context: FitContext, effects: tuple[Effect, ...], base: FitResult, with_shift: bool = True
 ) -> InputTiming | None:
-    """Fit a model to the liveliest stretches with every hold, and with a shift of the time base.
+    """Fit a model to the most excited stretches with every hold, and with a time offset.
 
     Parameters
     ----------

@@ -29,10 +29,10 @@ _KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in 
 def asked_offsets(
     context: FitContext, reidentified: Scored, singles: Sequence[Scored], allowed: float
 ) -> Finding | None:
-    """Return what speaks for an offset in each record, None where nothing does.
+    """Return the evidence for an offset in each record, None where there is none.
 
-    With offsets free a model must explain the records: an effect that pulls to one side, the more the larger the motion, shifts
-    records as well, and leaves more than shifts.
+    The model must explain the records once offsets are free: an asymmetric effect, whose mean grows with the motion, also shifts
+    records but leaves more than offsets do.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ def asked_offsets(
 
 
 def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding]:
-    """Return the sensors whose level differs between records by more than they move in any: no fit begins well from there.
+    """Return the sensors whose mean differs between records by more than they move in any: fits start badly from there.
 
-    Springs bring a rig back to one place where its inputs and constants are the same; nothing is said where they are not, or of a
-    rig that can rest anywhere.
+    Springs return a rig to the same place if its inputs and constants are the same; nothing is reported otherwise, or for a rig
+    that can rest anywhere.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
 
 
 def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
-    """Return the outputs of which a model leaves other means in each record.
+    """Return the outputs whose mean residual differs between records.
 
     Parameters
     ----------

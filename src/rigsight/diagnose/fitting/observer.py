@@ -23,14 +23,14 @@ from rigsight.simulate import Structure, compose, structure_of_fit
 
 @dataclass(frozen=True)
 class Observer:
-    """What a model follows while it is compared with records.
+    """Sensors that a model tracks while it is compared with records, and the bandwidth.
 
     Attributes
     ----------
     sensors
-        Names of those that show nothing but the motion.
+        Names of sensors that read only the motion.
     bandwidth
-        Angular frequency up to which the motion is followed [rad/s].
+        Angular frequency up to which the motion is tracked [rad/s].
     """
 
     sensors: tuple[str, ...]
@@ -50,7 +50,7 @@ def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
 
 
 def followed_sensors(task: Task) -> tuple[str, ...]:
-    """Return the sensors that models of a task can follow: those that show nothing but the motion.
+    """Return the sensors that models of a task can track: those that read only the motion.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def structures_to_fit(task: Task, structures: Iterable[Structure]) -> list[Struc
 
 
 def sensors_of_motion(rig: Rig) -> tuple[str, ...]:
-    """Return the sensors of a rig that show nothing but its motion: coordinates and their rates."""
+    """Return the sensors of a rig that read only its motion: coordinates and their rates."""
     structure = compose(rig)
     motion = structure.tree.motion
     moving = {*motion.coordinates, *motion.velocities}

@@ -27,7 +27,7 @@ def fit_context_of(
     memory: FitMemory | None,
     threads: IdleThreads,
 ) -> FitContext:
-    """Return what candidates of a task are fitted and scored with.
+    """Return the context in which candidates of a task are fitted and scored.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def start_values_of(task: Task) -> dict[str, float]:
 
 
 def _held(task: Task) -> frozenset[str]:
-    """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
+    """Return rig parameters that these records do not determine, and the stiffness of an absent spring."""
     held = set() if task.absent_spring is None else {task.absent_spring}
     if task.open_factor is not None:
         held.add(task.open_factor.held)

@@ -26,7 +26,7 @@ class Task:
     constants
         Every constant of the rig.
     given
-        Parameters of the simulation whose gap is in question; what is missing of the rig's is identified.
+        Parameters of the given simulation; missing ones of the rig are identified.
     records
         Estimation and validation records.
     modelled
@@ -61,12 +61,12 @@ class Task:
 
     @cached_property
     def open_factor(self) -> OpenFactor | None:
-        """What the records that are fitted tell up to a common factor only: those of a free motion."""
+        """Parameters that the fitted records determine only up to a common factor (free motion)."""
         return open_factor(self.rig, self.estimation, self.constants, self.given)
 
     @cached_property
     def drifts(self) -> bool:
-        """True where nothing brings the rig back, so that in free run each error of a force is integrated twice."""
+        """True if the rig has no restoring force, so that in free run each force error is integrated twice."""
         if self.rig.has_one_motion:
             return self.absent_spring is not None
         return can_drift(self.rig, {**self.constants, **self.given})

@@ -29,8 +29,8 @@ Signals = Mapping[str, NDArray[np.float64]]
 def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
     """Return the gap of each output over the plane of each joint's motion.
 
-    The joint first at which a force agrees best with the sensors. Where much is missing, the re-identified numbers are far
-    off, and so is that agreement: it orders, and rules nothing out.
+    First the joint at which a force agrees best with the sensors. If a large effect is missing, the re-identified parameters are
+    inaccurate and so is this agreement: it only sorts and excludes nothing.
 
     None beside effects that are modelled already, as the motion is followed with the rig's own equations, of a rig that nothing
     but prescribed motions move, and where a sensor's level is not known.

@@ -24,7 +24,7 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class LateralLeg:
-    """The leg from the measured motion to y.
+    """The section from the measured motion to y.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class LateralLeg:
     shift, shift_std
         How much earlier the motion must have come for the best fit [s], and its standard error from a white residual.
     noise_gain
-        Share of the motion's noise that reaches y, [unit of y per unit of x].
+        Gain from the noise of the motion to y, [unit of y per unit of x].
     """
 
     given: tuple[NDArray[np.float64], ...]

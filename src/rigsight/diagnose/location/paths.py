@@ -25,7 +25,7 @@ from rigsight.rigs import Rig
 def path_parts(
     context: FitContext, before: Scored, reidentified: Scored, after: Scored
 ) -> tuple[PathPart, ...]:
-    """Return every leg of the signal path with what it leaves of its output when its input is taken as measured.
+    """Return the error of every section of the signal path when it is driven by its measured input.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def path_parts(
 
 
 def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
-    """Return what the legs of the path say together, in plain words; empty where there is no leg."""
+    """Return a sentence on the sections of the signal path; empty where there is none."""
     if not parts:
         return ""
     first = parts[0]
@@ -98,7 +98,7 @@ def _words(rig: Rig) -> str:
 
 
 def _motion_alone(context: FitContext, reidentified: Scored) -> Scored:
-    """Re-identify the motion without regard to what it drives: a gap there must not bend the numbers here."""
+    """Re-identify the motion without what it drives, so that a gap there does not distort these parameters."""
     downstream = context.rig.downstream_parameters
     if not downstream or downstream <= context.held:
         return reidentified

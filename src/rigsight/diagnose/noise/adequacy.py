@@ -49,7 +49,7 @@ _TOO_FAST = "motion that is too fast for the sample time"
 
 @dataclass(frozen=True)
 class Agreement:
-    """How what a model leaves goes with one thing.
+    """Correlation of the residual of a model with one signal or cause.
 
     Attributes
     ----------
@@ -58,9 +58,9 @@ class Agreement:
     place
         Joint, drive or sensor; empty for what has no place.
     p_value
-        Probability of such an agreement by chance, this one thing looked at alone.
+        Probability of such a correlation by chance, tested alone.
     share
-        Share of the squared remainder that goes with it beyond chance.
+        Share of the squared residual that it explains beyond chance.
     """
 
     what: str
@@ -71,16 +71,16 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Adequacy:
-    """Is what a model leaves noise and disturbance?
+    """Is the residual of a model noise and disturbance?
 
     Attributes
     ----------
     p_value
-        Probability that noise and disturbance alone agree as well with anything that was looked at.
+        Probability that noise and disturbance alone correlate this well with anything that was tested.
     agreements
-        With what it goes: what chance hardly makes first, of that the largest share.
+        Signals with which it correlates, significant ones first and by decreasing share.
     is_spread
-        False where it stands in a few stretches of the records, as noise does not.
+        False if it is concentrated in a few stretches of the records, unlike noise.
     significance
         p-value below which it is not adequate.
     """
@@ -92,12 +92,12 @@ class Adequacy:
 
     @property
     def adequate(self) -> bool:
-        """True where nothing contradicts that noise and disturbance are all that is left."""
+        """True if nothing contradicts that the residual is only noise and disturbance."""
         return self.is_spread and self.p_value >= self.significance
 
     @property
     def goes_with(self) -> str:
-        """With what the largest part of it goes; empty where it is adequate."""
+        """What the largest part of it correlates with; empty where it is adequate."""
         if self.adequate:
             return ""
         if self.p_value >= self.significance:
@@ -106,7 +106,7 @@ class Adequacy:
 
     @property
     def place(self) -> str:
-        """Joint, drive or sensor of what it goes with; empty where that has none."""
+        """Joint, drive or sensor of that signal; empty where it has none."""
         return "" if self.p_value >= self.significance else self.agreements[0].place
 
 
@@ -117,10 +117,10 @@ def adequacy(
     significance: float = VERDICT.significance,
     of_steady_size: bool = False,
 ) -> Adequacy:
-    """Say whether what a model leaves of all records goes with anything.
+    """Test whether the residual of a model on all records is correlated with anything.
 
-    Those that were fitted too: their other amplitudes show a law that has not quite the right form. Numbers that the fit bent to
-    hide it move with the answers, so that they hide nothing here.
+    Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
+    distorted to compensate are free in the test, so that they do not hide it.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def adequacy(
     significance
         p-value below which it is not adequate.
     of_steady_size
-        Whether noise and disturbance are to be as large where nothing moves.
+        Whether noise and disturbance must also be equally large where nothing moves.
     """
     records = context.records
     answers = Answers(context, records, context.on_all_records(model), model.effects, model.fit.free)
@@ -164,7 +164,7 @@ def adequacy(
 
 
 class Checks:
-    """Whether what each model leaves is noise and disturbance, asked once of each.
+    """Whether the residual of each model is noise and disturbance, tested once for each.
 
     Parameters
     ----------
@@ -173,9 +173,10 @@ class Checks:
     rng
         Source of the turned signs.
     at_floor
-        What counts as the floor itself, in units of it: equations without an effect that leave more are asked for growth.
+        Error, in units of the floor, that counts as the floor itself: if the equations without an effect leave more, the
+        dependence of the residual's size on the motion is tested.
     allowed
-        What a model may leave before the floor speaks against it, in the same units.
+        Error that a model may leave before the floor is evidence against it, in the same units.
     """
 
     def __init__(
@@ -188,7 +189,7 @@ class Checks:
         self._known: dict[tuple[tuple[str, ...], float], Adequacy] = {}
 
     def of(self, model: Scored) -> Adequacy:
-        """Return what a model's remainder goes with."""
+        """Return the adequacy of a model."""
         # A model may be fitted on, and then leaves something else.
         own = model.names, model.fit.cost
         if own not in self._known:
@@ -201,7 +202,7 @@ class Checks:
         return self._known[own]
 
     def is_adequate(self, model: Scored) -> bool:
-        """Return True where nothing contradicts that it is noise and disturbance."""
+        """Return True if nothing contradicts that its residual is noise and disturbance."""
         return self.of(model).adequate
 
 

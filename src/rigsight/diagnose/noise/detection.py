@@ -42,9 +42,9 @@ def noise_floors(
     records
         All records of a campaign: they share their sensors.
     drifts
-        True for an axis without a spring: where it has drifted to from one period to the next is not noise.
+        True for an axis without a spring: drift from one period to the next is not noise.
     at_rest
-        False for a rig whose motion while the input rests is known to be no noise.
+        False for a rig that is known to move while the input is constant.
     """
     floors = []
     for signal in rig.outputs:

@@ -25,7 +25,7 @@ _SMOOTHED = 9
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A force that acts beside the drive.
+    """A disturbance force in addition to the drive.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ def disturbance(
     noise: float,
     bandwidth: float | None,
 ) -> Disturbance | None:
-    """Return the force that would leave what a model leaves; None of other rigs than one driven mass, and where noise covers it.
+    """Return the force that would cause the residual of a model; None except for one driven mass, and where noise hides it.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ _FAINT, _STRONG = 1e-12, 1e3
 
 
 class Evidence:
-    """Schwarz's criterion of models of the same records, to be compared with each other.
+    """Bayesian information criterion (Schwarz) of models of the same records.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Evidence:
     reidentified
         The re-identified equations: their resonances are divided out.
     reference
-        The model whose remainder tells how large the forces from outside are and how large the sensors' noise.
+        The model whose residual gives the size of disturbance forces and sensor noise.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Evidence:
         self.powers = self._fitted_powers(self._remainders(reference))
 
     def criterion(self, model: Scored) -> float:
-        """Return minus twice the log-likelihood with the price of all numbers and initial states: the lower, the better."""
+        """Return minus twice the log-likelihood plus the penalty for all parameters and initial states: the lower, the better."""
         if id(model) not in self._criteria:
             self._criteria[id(model)] = (model, self._criterion(model))
         return self._criteria[id(model)][1]
@@ -95,10 +95,10 @@ class Evidence:
         return told + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
 
     def gain(self, model: Scored, simpler: Scored) -> float:
-        """Return by how much a model raises the log-likelihood where noise has the spectrum that a simpler one leaves.
+        """Return the gain in log-likelihood of a model if the noise has the residual spectrum of a simpler one.
 
-        What is missing of the simpler model swells that spectrum. A model that has it leaves no more than that anywhere; one that
-        trades a slow error for a fast one loses.
+        An effect missing in the simpler model raises that spectrum. A model with this effect stays below it everywhere; a model
+        that replaces a slow error by a fast one loses.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Evidence:
 
         Returns
         -------
-        In nats; no number is paid for.
+        In nats, without a penalty for parameters.
         """
         gained = 0.0
         for (left, dt), (least, _) in zip(self._remainders(simpler), self._remainders(model), strict=True):

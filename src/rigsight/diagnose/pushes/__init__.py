@@ -1,1 +1,1 @@
-"""Responses of the outputs of fitted equations to a small perturbation at a place."""
+"""Responses of fitted equations to a push: a small perturbation of a joint's force, a drive or a sensor's reading."""

@@ -1,5 +1,4 @@
-"""Auxiliary rigs for the screening: an effect alone along a known motion, and a rig with a perturbation at each place.
-"""
+"""Auxiliary rigs for the screening: an effect alone along a known motion, a rig with a push at each place."""
 
 from __future__ import annotations
 

@@ -1,2 +1,1 @@
-"""Trust in the parameters of the diagnosed model: estimated again by record, amplitude, constant and window.
-"""
+"""Trust in parameters: estimated again by record, amplitude, constant and window."""

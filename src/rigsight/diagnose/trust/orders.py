@@ -1,5 +1,4 @@
-"""Quantities with which a parameter may change between records: amplitude, constants of the records, order in time.
-"""
+"""Quantities with which a parameter may change between records: amplitude, constants, order in time."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Groupings for repeated estimates: by record, by amplitude or constant, by portion of a record, and in shorter windows.
-"""
+"""Groupings for repeated estimates: by record, amplitude or constant, portion of a record, and window length."""
 
 from __future__ import annotations
 

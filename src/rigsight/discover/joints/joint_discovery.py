@@ -1,7 +1,7 @@
-"""The whole discovery on a rig of several joints: records and a rig -> missing force per joint, its law, polished equations.
+"""The whole discovery on a rig of several joints: records and a rig -> missing force per joint, its law, refitted equations.
 
-Linearized responses propose joint and law; output error polishes the rig with the law at its place, and free runs of records it
-has not seen decide.
+Linearized responses propose joint and law; the rig with this law is refitted by output error, and free runs on held-out records
+decide.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which force is missing at each joint of a rig, how much of what the sensors contradict would it explain, and which law has it?
+"""The force missing at each joint of a rig, how much of the sensor errors it would explain, and its law.
 
-For rigs of several joints, degrees of freedom, inputs or sensors. Each joint in turn carries all that is missing. Law and
-parameters of the rig are estimated together, and the likelihood of what all sensors showed ranks the joints.
+For rigs of several joints, degrees of freedom, inputs or sensors. For each joint in turn, everything missing is assumed to act
+there. Law and parameters of the rig are estimated together, and the joints are ranked by the likelihood of all sensor readings.
 """
 
 from __future__ import annotations

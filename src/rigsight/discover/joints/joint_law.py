@@ -1,7 +1,7 @@
-"""Which law does the missing force at a joint obey? Sparse regression in the sensors' own noise, on terms of that joint's motion.
+"""Law of the missing force at a joint: sparse regression on terms of the motion of the joint, weighted by the sensor noise.
 
-Whatever part of the force no term explains stays an unknown force, whose intensity competes with the terms: the likelihood
-decides, and it is the same quantity for all joints, so that it also says at which of them the law acts.
+The part of the force that no term explains remains an unknown force, whose intensity competes with the terms. The likelihood
+decides; it is comparable between joints and so also shows at which joint the law acts.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which force at one joint alone would make a rig follow its sensors, and how does that joint move?
+"""The force at one joint alone that would make a rig follow its sensors, and the motion of that joint.
 
-First all joints carry an unknown force, so that the motion follows the sensors wherever the missing force acts. From there each
-joint carries it alone: what the sensors still contradict then speaks against the joint.
+First all joints have an unknown force, so that the motion follows the sensors wherever the missing force acts. Then each joint
+has it alone: the remaining sensor errors are evidence against this joint.
 """
 
 from __future__ import annotations

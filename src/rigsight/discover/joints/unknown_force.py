@@ -1,4 +1,4 @@
-"""What is a force of which nothing is known? An effect like any other: it resists a joint, and its course is a state."""
+"""An unknown force, declared as an effect: it resists a joint, and its time history is a state."""
 
 from __future__ import annotations
 

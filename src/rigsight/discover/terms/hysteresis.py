@@ -1,7 +1,7 @@
-"""Is there a hidden force with memory? The states of a loop follow from the measured motion alone, so it is a column.
+"""Hidden forces with memory: the states of a loop follow from the measured motion, so it is a regression column.
 
-Any effect that puts states in the place of the spring's deflection is such a loop. What stands inside it is read from its
-declaration and found by variable projection: a grid outside, linear regression inside, and a descent from the best point.
+Any effect that replaces the deflection of the spring by states is such a loop. Its nonlinear parameters are taken from its
+declaration and found by variable projection: a grid over them, linear regression for the rest, and a descent from the best point.
 """
 
 from __future__ import annotations

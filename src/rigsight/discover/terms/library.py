@@ -1,8 +1,8 @@
-"""Which terms may the equation hold, and what is each along the measured motion?
+"""Library of terms that the equation may contain, evaluated along the measured motion.
 
-Every candidate comes from an effect's own declaration. Where its torque is linear in its parameters, those become
-coefficients; what stands inside (a clearance, a dead time, the shape of a loop) is found by variable projection: a grid
-outside, linear regression inside. Each effect then brings one column to the library, at its best inner values.
+Every candidate comes from an effect's own declaration. Parameters in which the torque is linear become coefficients; nonlinear
+ones (a clearance, a dead time, the shape of a loop) are found by variable projection: a grid over them, linear regression for the
+rest. Each effect then contributes one column to the library, at its best nonlinear parameters.
 """
 
 from __future__ import annotations

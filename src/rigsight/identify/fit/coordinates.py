@@ -1,7 +1,7 @@
-"""Search coordinates: parameters in characteristic units, logarithms of positive ones, and what records tell apart.
+"""Search coordinates: parameters in characteristic units, logarithms of positive ones, and well-determined combinations.
 
-Those are sum and difference of a pair, by how much one parameter is larger than another that it never falls below, and of a
-spring with memory the stiffness without memory and the one with it: where the latter is large, the product of the spring's
+Such combinations are the sum and difference of a pair, the excess of one parameter over another that it never falls below, and
+for a hysteretic spring the post-yield stiffness and the hysteretic remainder: if the latter is large, the product of the
 stiffness and its post-yield ratio is known far better than either.
 """
 

@@ -1,4 +1,4 @@
-"""How do the residuals of each record answer to the fitted numbers and to its initial state? At the end of a fit."""
+"""Derivatives of the residuals of each record by the fitted parameters and its initial state, at the end of a fit."""
 
 from __future__ import annotations
 

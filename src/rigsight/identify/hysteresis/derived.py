@@ -1,6 +1,6 @@
-"""What do hysteresis parameters mean? Saturation, the pair that shapes the loop, and energy per cycle, with intervals.
+"""Quantities derived from hysteresis parameters: saturation, the pair that shapes the loop, and energy per cycle, with intervals.
 
-Intervals come from draws of the parameters' covariance: saturation and pair are anything but linear in the parameters.
+Intervals come from draws of the parameters' covariance: saturation and pair are strongly nonlinear in the parameters.
 """
 
 from __future__ import annotations

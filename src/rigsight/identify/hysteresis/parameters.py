@@ -1,4 +1,4 @@
-"""Which parameters does a calibration of hysteresis move, and which special cases does it begin with?"""
+"""Free parameters of a calibration of hysteresis, and the special cases from which it starts."""
 
 from __future__ import annotations
 

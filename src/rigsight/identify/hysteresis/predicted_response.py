@@ -1,4 +1,4 @@
-"""Which frequency response does a structure have at one amplitude? From the sweep that was measured, or from steady sines.
+"""Frequency response of a structure at one amplitude: from the measured sweep, or from steady sines.
 
 The steady response is that of harmonic balance with all harmonics: each sine is simulated until it repeats, and the first
 harmonic of the response is taken.

@@ -1,4 +1,4 @@
-"""Where in the whole range of its parameters does a model fit? Differential evolution with all sets side by side."""
+"""Global search over the whole range of the parameters: differential evolution with all sets side by side."""
 
 from __future__ import annotations
 

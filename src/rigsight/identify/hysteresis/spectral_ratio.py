@@ -1,4 +1,4 @@
-"""What frequency response does a sweep give at chosen frequencies? An estimator that is linear in the response."""
+"""Frequency response of a sweep at chosen frequencies, by an estimator that is linear in the response."""
 
 from __future__ import annotations
 

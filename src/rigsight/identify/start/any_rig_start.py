@@ -1,8 +1,8 @@
 """Parameters of a rig of any shape straight from its records, as start values of a grey-box fit.
 
-Where sensors show all states, the error of the equations of motion is made small (`weak_equations`); in any case that of the
-linearization against the spectra (`linearized_responses`). Both search over decades and cost no simulation. The best few of their
-minima are fitted roughly by simulation, and the one that leaves least is the start.
+If sensors show all states, the error of the equations of motion is minimized (`weak_equations`); in any case also that of the
+linearization relative to the spectra (`linearized_responses`). Both search over decades and need no simulation. The best few
+minima are fitted roughly by simulation, and the one with the lowest error is the start.
 """
 
 from __future__ import annotations

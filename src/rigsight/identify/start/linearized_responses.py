@@ -1,8 +1,8 @@
-"""How far is a rig's linearization from the spectra of its records? Frequency responses to all inputs, and what the ends add.
+"""Error of the linearization of a rig relative to the spectra of its records: frequency responses to all inputs, with transients.
 
 ``j omega X = A X + B U + (x(0) - x(T))`` holds for the Fourier integrals over a record whatever its states do at its ends; the
-difference is solved for in each record by linear least squares. That needs no periodicity, no stability and no input: a free
-decay is nothing but its ends.
+difference is solved for in each record by linear least squares. This needs no periodicity, no stability and no input: a free
+decay consists of these end terms alone.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""How large each base quantity is in a campaign, so that searches start and step in characteristic units."""
+"""Characteristic size of each base quantity in a campaign, as units of searches."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""What is left of a rig's equations in measured motion? Their error in the weak form, weighted by what noise makes of it.
+"""Error of the equations of a rig along the measured motion, in the weak form and weighted by its noise.
 
 ``d/dt P = R`` for each coordinate (P its momentum, R all forces) and each own state, multiplied by ``w(t) e^{-j omega t}`` on
 overlapping stretches and integrated by parts, so that no second derivative of a measured signal is taken. Nothing is simulated:
-the error costs a sum, and large motion is as good as small. Its covariance follows from the noise of the sensors through the
-linearized equations, so that the minimum is that of errors in variables: a stiff shaft whose twist is below the noise is not
-taken for a soft one.
+the error is a cheap sum and valid for large motion. Its covariance follows from the sensor noise through the linearized
+equations, so that this is an errors-in-variables estimate: a stiff shaft whose twist is below the noise is not estimated as soft.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Which mass, damping and stiffness a PT2 of an axis stands for, or a PT1 of its velocity where it has no spring."""
+"""Mass, damping and stiffness of an axis from a PT2, or from a PT1 of its velocity if it has no spring."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What records tell about the equivalent conicity delta_0, and what they cannot.
+"""What records can and cannot determine about the equivalent conicity delta_0.
 
 delta_0 enters the equations of the rig only inside the product v c_y, with ``c_y = cos^2 d - (2 r_0 / b) sin d cos d`` (thesis,
-2.12). So in every record, whatever drives it, the sensitivity to delta_0 is the sensitivity to ln c_y times
-``(dc_y/dd) / c_y``, and the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 %
-of c_y, of the speed v, or of the ratio of the two sensors' scales is one of 0.014 rad. No record or static relation evades
-this; what can be chosen is how well c_y is known, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
+2.12). So in every record, whatever drives it, the sensitivity to delta_0 is the sensitivity to ln c_y times ``(dc_y/dd) / c_y``,
+and the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 % of c_y, of the speed
+v, or of the ratio of the two sensors' scales is one of 0.014 rad. No record or static relation avoids this; only the accuracy of
+c_y can be improved, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Where would a driven rig rest? Offsets of a sweep from what its fitted transfer functions leave.
+"""Rest positions of a driven rig: offsets from the residuals of the fitted transfer functions of a sweep.
 
-A sweep is no noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis hold for what
-remains when the motion is taken away.
+A sweep is not noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis apply to the
+record after the motion is subtracted.
 """
 
 from __future__ import annotations

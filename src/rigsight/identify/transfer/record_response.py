@@ -1,4 +1,4 @@
-"""Which frequency response does a record show, by which method, and how fine is it?"""
+"""Frequency response of a record: method and resolution."""
 
 from __future__ import annotations
 

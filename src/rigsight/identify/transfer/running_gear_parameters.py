@@ -1,4 +1,4 @@
-"""Which physical parameters of the running gear a PT2 and a PT1 stand for, with their uncertainty.
+"""Physical parameters of the running gear from a PT2 and a PT1, with their uncertainty.
 
 Thesis, equations (2.21), (2.24), (2.26) and (2.27). The factor v is where (2.12) and the lateral equation put it,
 ``c_y = 2 l_0 omega_b / v``; (2.25) prints it on the wrong side, which v = 1 m/s hides.

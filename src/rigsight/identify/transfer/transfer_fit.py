@@ -1,4 +1,4 @@
-"""What a fit of a PT1 or PT2 found."""
+"""Result of a fit of a PT1 or PT2."""
 
 from __future__ import annotations
 

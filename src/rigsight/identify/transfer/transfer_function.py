@@ -1,4 +1,4 @@
-"""Which PT1 or PT2 a measured frequency response shows: bounded grid search, then weighted least squares.
+"""PT1 or PT2 from a measured frequency response: bounded grid search, then weighted least squares.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Which PT1 or PT2 a recorded step shows: output fit over a time window, from rest.
+"""PT1 or PT2 from a recorded step: output-error fit over a time window, from rest.
 
 References
 ----------

@@ -1,2 +1,1 @@
-"""Several effects together: they are added one by one, then pairs are also fitted from joint starts.
-"""
+"""Several effects: they are added one by one, then pairs are also fitted from joint starts."""
