@@ -1,4 +1,4 @@
-"""How well do models do on records? The errors of a comparison, with pictures, a table and files."""
+"""Result of a comparison: errors of models on records, with pictures, a table and files."""
 
 from __future__ import annotations
 

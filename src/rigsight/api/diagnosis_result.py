@@ -1,4 +1,4 @@
-"""What did a diagnosis find? Its verdict and numbers, with pictures, tables and files."""
+"""Result of a diagnosis: verdict and parameters, with pictures, tables and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What did a discovery find? Equations and terms, with a picture, tables and files."""
+"""Result of a discovery: equations and terms, with a picture, tables and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which equation do the records propose by themselves? The discovery as an estimator."""
+"""The discovery of equations as an estimator."""
 
 from __future__ import annotations
 

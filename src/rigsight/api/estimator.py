@@ -1,4 +1,4 @@
-"""What do all estimators share? Settings in the constructor, `fit` on a campaign, a model that predicts."""
+"""Base of all estimators: settings in the constructor, `fit` on a campaign, a model that predicts."""
 
 from __future__ import annotations
 

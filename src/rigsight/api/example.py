@@ -1,4 +1,4 @@
-"""On what can everything be tried at once, without files? A small campaign whose truth is known."""
+"""A small example campaign with known truth, without files."""
 
 from __future__ import annotations
 

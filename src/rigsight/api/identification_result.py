@@ -1,4 +1,4 @@
-"""What did an identification find? The parameters of the linear rig, with pictures, tables and files."""
+"""Result of an identification: the parameters of the linear rig, with pictures, tables and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which numbers has the linear rig behind the records? The identification as an estimator."""
+"""The identification of the linear rig as an estimator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How is a single measured file read from Python? With the signals of a rig that is named."""
+"""Reading a single measured file from Python, with the signals of a given rig."""
 
 from __future__ import annotations
 

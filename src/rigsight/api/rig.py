@@ -1,4 +1,4 @@
-"""How is a rig of one's own declared from Python? With the words of a rig file."""
+"""Declaring a rig from Python, with the keys of a rig file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Which numbers does a drawn rig of any shape have? Such that it vibrates as a rig does; its equations alone say which those are.
+"""Random parameters of a rig of any shape, such that its natural frequencies and damping are plausible.
 
-All but offsets are drawn about one SI unit (a declared default) and then moved together until the linearization has natural
-frequencies and damping ratios within bands and no two inertias are nearly one.
+All but offsets are drawn around one SI unit (or a declared default) and then adjusted together until the natural frequencies and
+damping ratios of the linearization lie within bands and no two inertias are nearly indistinguishable.
 """
 
 from __future__ import annotations

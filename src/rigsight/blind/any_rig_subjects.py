@@ -1,4 +1,4 @@
-"""What is hidden in which trial of design ``rigs``? Every rig with effects at every kind of its places."""
+"""Hidden effects of the trials of design ``rigs``: every rig with effects at every kind of its places."""
 
 from __future__ import annotations
 

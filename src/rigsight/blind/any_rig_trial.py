@@ -1,7 +1,7 @@
-"""What does one trial of design ``rigs`` measure, and what does its key hold? Everything follows from seed and number.
+"""Records and key of one trial of design ``rigs``; everything follows from seed and number.
 
-Unlike the trials of one mass, whose plant has an integrator of its own, a rig of any shape is moved by the accurate integrator of
-`rigsight.simulate`, at a sample time of its own and with disturbed inputs that no record holds.
+Unlike the trials of one mass, which have a separate integrator, a rig of any shape is simulated by the accurate integrator of
+`rigsight.simulate`, at a different sample time and with disturbed inputs that are not recorded.
 """
 
 from __future__ import annotations

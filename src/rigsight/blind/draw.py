@@ -1,4 +1,4 @@
-"""What does one trial measure, and what does its key hold? Everything follows from seed, design and the trial's number."""
+"""Records and key of one trial; everything follows from seed, design and the number of the trial."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""How does a drawn rig move? By an integrator of its own, which shares neither code nor input samples with the simulation.
+"""Motion of a random rig, by a separate integrator that shares neither code nor input samples with the simulation.
 
-The eighth-order method of Dormand and Prince (scipy) with error control, restarted at every kink, at every end that a memory
-reaches, wherever friction catches or lets go the mass, and where the input jumps. Each such moment is found as a root along the
-method's interpolant.
+The eighth-order method of Dormand and Prince (scipy) with error control, restarted at every kink, when an internal state reaches
+its limit, when friction sticks or slips, and when the input jumps. Each such moment is found as a root along the method's
+interpolant.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""How well do many models do on many records, and which does best?"""
+"""Comparison of many models on many records."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""How far is a simulated frequency response from a measured one, and how far would noise alone move it?
+"""Error of a simulated frequency response, and the error that noise alone would cause.
 
 The error is the thesis's (5.1), ``sqrt(mean(|measured - simulated|^2))`` over the lines, of the magnitude [unit of the response]
-and of the phase [rad]. Lines are equally spaced in frequency, so the upper decades weigh most; the error in dB counts a
-small magnitude as much as a large one.
+and of the phase [rad]. Lines are equally spaced in frequency, so the upper decades dominate; the error in dB weights small and
+large magnitudes equally.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is one number of a comparison, and which kinds of numbers are there?"""
+"""A score of a comparison, and the kinds of scores."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far is a simulated step from a measured one in the seconds in which it matters?
+"""Error of a simulated step in the seconds after the step.
 
 The thesis (section 5.2.2) compares 180 to 184 s of a step of 0.6 A at 180 s, offsets before the step removed. Here: the first
 four seconds from the step (or another length), each signal less its mean over up to five seconds before it.

@@ -1,4 +1,4 @@
-"""Which inputs change their frequency or level in time: sweeps, stepped sines and steps, as samples over given times."""
+"""Inputs whose frequency or level changes over time: sweeps, stepped sines and steps, as samples at given times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does an exported file say of itself: source, equations, numbers with units, and how to feed it?"""
+"""Header of an exported file: source, equations, parameters with units, and how to supply inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which equations, numbers and names does every export write down, whatever its language?"""
+"""Equations, parameters and names that every export contains, independent of its language."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where does a rig of several motions rest? The equations that an export solves for it, as the engine does."""
+"""Equilibrium of a rig with several motions: the equations that an export solves for it, like the engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Into which languages can a model be written, and what can each of them not say?"""
+"""Target languages of an export, and what each cannot represent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What part of a periodic response is linear, what is noise, and what is nonlinear distortion.
+"""Linear part, noise and nonlinear distortion of a periodic response.
 
 The best linear approximation of a nonlinear system depends on the power spectrum of the excitation, not on its phases. What
 changes between periods is noise; what changes only between realisations of the random phases is distortion.

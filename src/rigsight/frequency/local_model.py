@@ -1,8 +1,8 @@
 """How one record without periods gives a frequency response: local polynomial and local rational models.
 
-In a narrow band the response and the transient (the difference of begin and end state of the record, which a window can
-only smear) are both smooth functions of frequency, while the source's spectrum is rough. Both are fitted there by least
-squares; what is left over is the noise.
+In a narrow band the response and the transient (from the difference between initial and final state of the record, which a window
+only smears) are both smooth functions of frequency, while the spectrum of the source is rough. Both are fitted there by least
+squares; the residual is the noise.
 
 References
 ----------

@@ -1,8 +1,7 @@
-"""How do records in which several inputs move, at once or one at a time, give the response of a signal to each of them?
+"""Responses of a signal to each of several inputs, from records in which they move together or one at a time.
 
-Close to a frequency every record says ``A(r) Y(k + r) = sum_i B_i(r) U_i(k + r) + T(r)``: the responses are shared by all
-records, the transient T is each one's own. Inputs that are smooth multiples of each other there say the same, and are not told
-apart.
+Close to a frequency, for every record ``A(r) Y(k + r) = sum_i B_i(r) U_i(k + r) + T(r)``: the responses are common to all
+records, the transient T differs. Inputs that are smooth multiples of each other there cannot be distinguished.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Which two signals of a record an estimator reads, and at which frequencies the source says anything."""
+"""The two signals of a record that an estimator reads, and the frequencies at which the source is excited."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the thesis makes a frequency response of a sweep; kept to reproduce its figures, not to identify from.
+"""Frequency response of a sweep as in the thesis; kept to reproduce its figures, not for identification.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Which C compiler does this machine have, and how does it make a library of a C text?"""
+"""The C compiler of this machine, and how it builds a library from C source."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""C text -> library, kept on disk under the hash of all that its machine code depends on.
+"""Cache of libraries on disk, under the hash of everything on which the machine code depends.
 
-A stale one is impossible: the name of a library is the hash of its C text, the compiler, its options and the processor. A
-damaged one is found by a checksum before it is loaded, and made anew.
+A stale library is impossible, because its name is the hash of its C source, the compiler, its options and the processor. A
+damaged one is detected by a checksum before it is loaded, and rebuilt.
 """
 
 from __future__ import annotations

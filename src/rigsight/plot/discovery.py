@@ -1,4 +1,4 @@
-"""How does a discovery look? The terms with their intervals and inclusion probabilities, and the free run against the records."""
+"""Figures of a discovery: the terms with their intervals and inclusion probabilities, and the free run against the records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How is every figure drawn: its style, its colors, the units shown, lines of many samples.
+"""Style of all figures: colors, units shown, lines of many samples.
 
 Nothing here touches pyplot: figures carry their own canvas, so that they can be drawn in any thread and are freed with
 their last reference.

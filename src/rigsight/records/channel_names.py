@@ -1,4 +1,4 @@
-"""What does the name of a channel give away: which signal it may be, and in which unit?"""
+"""Signal and unit suggested by the name of a channel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is in a channel, at a glance: how long, how fast, how large, and what is missing?"""
+"""Summary of a channel: length, sample rate, range, and missing samples."""
 
 from __future__ import annotations
 

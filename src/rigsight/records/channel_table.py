@@ -1,4 +1,4 @@
-"""Which channels of a measurement file are the signals that were asked for, and which time belongs to them?"""
+"""Selection of the channels of a measurement file for the requested signals, with their time axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What makes SI of a unit as files and people write it? The only place that knows pint."""
+"""Conversion of units as written in files to SI; the only module that uses pint."""
 
 from __future__ import annotations
 

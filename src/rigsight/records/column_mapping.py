@@ -1,4 +1,4 @@
-"""Where does a signal stand in a file, and what makes SI of its numbers?"""
+"""Column of a signal in a file, and its conversion to SI."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Are the samples equally spaced, and if nearly, how do they become so?"""
+"""Check for equally spaced samples, and resampling of nearly equal ones."""
 
 from __future__ import annotations
 

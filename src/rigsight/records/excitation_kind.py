@@ -1,4 +1,4 @@
-"""What drove the rig, and how strongly, as the samples of the input show it?"""
+"""Kind and amplitude of the excitation, from the samples of the input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does a signal repeat itself, or another one, and after how many samples?"""
+"""Period of a signal, or repetition of another signal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the samples look like a working measurement: does the signal move, and is it cut off at its extremes?"""
+"""Plausibility of samples: does the signal change, and is it clipped?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How does a measured file become a checked `Record` of a rig's signals?"""
+"""Reading a measured file as a checked `Record` of a rig's signals."""
 
 from __future__ import annotations
 

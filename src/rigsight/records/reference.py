@@ -1,4 +1,4 @@
-"""Does a record of a closed loop hold the reference of the controller, so that it can serve as instrument?"""
+"""Does a closed-loop record contain the reference of the controller, which can serve as instrument?"""
 
 from __future__ import annotations
 

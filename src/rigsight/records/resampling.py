@@ -1,4 +1,4 @@
-"""How do signals of different rates come onto one time axis, once the campaign asks for it?"""
+"""Resampling of signals with different rates to one time axis, if the campaign requests it."""
 
 from __future__ import annotations
 

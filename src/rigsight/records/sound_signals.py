@@ -1,4 +1,4 @@
-"""Can the signals that were found in a file be used? What is missing, still, cut off, or called nearly like another is told."""
+"""Checks of the signals of a file: missing, constant or clipped ones, and similar names, are reported."""
 
 from __future__ import annotations
 

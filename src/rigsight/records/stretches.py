@@ -1,6 +1,6 @@
-"""Where does the clock of a record pause, and which stretches between its pauses are records by themselves?
+"""Gaps in the time axis of a record, and the stretches between them that become separate records.
 
-A motion across a pause is unknown, so that nothing is put in its place: each stretch begins in a state of its own.
+The motion in a gap is unknown, so nothing is interpolated: each stretch has its own initial state.
 """
 
 from __future__ import annotations

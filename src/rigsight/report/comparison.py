@@ -1,4 +1,4 @@
-"""A comparison of models for people: tables on a terminal, and one self-contained HTML page with figures."""
+"""Report of a comparison of models: tables on a terminal, and one self-contained HTML page with figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the gap lies, for people: the rows and figures of that section."""
+"""Section "Where the gap lies": its rows and figures."""
 
 from __future__ import annotations
 

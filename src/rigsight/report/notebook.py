@@ -1,4 +1,4 @@
-"""How does a result look in a notebook? What the terminal says, as a small piece of HTML that needs nothing beside it."""
+"""Results in a notebook: the terminal output as a small self-contained piece of HTML."""
 
 from __future__ import annotations
 

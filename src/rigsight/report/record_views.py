@@ -1,4 +1,4 @@
-"""What does the page show of each record? What it is, what the simulations leave of it, its curves over time and frequency."""
+"""Records in the page: description, errors of the simulations, curves over time and frequency."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in the page, in which order? From a diagnosis to the rows and figures of each section."""
+"""Rows and figures of each section of the page, in order."""
 
 from __future__ import annotations
 

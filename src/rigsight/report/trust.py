@@ -1,4 +1,4 @@
-"""Can the numbers be trusted? The section of the report, its figure and table, and one line for a terminal."""
+"""Section on the trust in parameters: its figure and table, and one line for a terminal."""
 
 from __future__ import annotations
 

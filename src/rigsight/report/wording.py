@@ -1,4 +1,4 @@
-"""How does one say it in plain words? Sentences that the page and the terminal share."""
+"""Sentences that the page and the terminal share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What do the sensors of a MuJoCo model show while it follows controls? Beside records, or in examples in their place."""
+"""Sensor readings of a MuJoCo model for given controls, to compare with records or to replace them in examples."""
 
 from __future__ import annotations
 

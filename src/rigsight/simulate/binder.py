@@ -1,4 +1,4 @@
-"""What do the names in the declarations of a rig and its effects stand for in the equations of one structure?"""
+"""Meaning of the names in the declarations of a rig and its effects in the equations of one structure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which structure do a rig and a tuple of effects make?"""
+"""Composition of a rig and a tuple of effects to a structure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How do a rig's equations change with states and inputs, and where does it rest? Symbolic derivatives, called with numbers."""
+"""Symbolic derivatives of the equations of a rig by states and inputs, evaluated with numbers, and its equilibrium."""
 
 from __future__ import annotations
 

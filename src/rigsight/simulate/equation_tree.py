@@ -1,4 +1,4 @@
-"""What are the equations of a rig with effects made of, before anything is substituted: one tree that everything else reads."""
+"""The equations of a rig with effects before substitution: one tree that everything else reads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where does a mechanism of any shape stand still? Where its forces balance, with those that friction and hysteresis hold."""
+"""Equilibrium of a mechanism of any shape: balance of forces, including those held by friction and hysteresis."""
 
 from __future__ import annotations
 

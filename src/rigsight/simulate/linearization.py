@@ -1,7 +1,7 @@
-"""Which linear system do the equations of a rig follow close to where it rests?
+"""Linearization of the equations of a rig at its equilibrium.
 
 Derivatives are symbolic. Loops of control laws are closed in the equations, and so in what is returned. At rest dry friction is
-left out: no line has the slope of its jump.
+left out, because its jump has no slope.
 """
 
 from __future__ import annotations

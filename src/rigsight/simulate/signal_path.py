@@ -1,4 +1,4 @@
-"""How do effects enter a rig's equations? One walk along its places, which leaves an `EquationTree`.
+"""Insertion of effects into the equations of a rig: one pass along its places, which builds an `EquationTree`.
 
 At a drive: ``signal -> delays -> static effects and lags -> generalized force``. At a joint: ``motion -> what stands between it
 and the spring -> spring -> what changes its torque``, other torques beside. At a sensor: ``reading -> effects -> delays``.

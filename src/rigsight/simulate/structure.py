@@ -1,4 +1,4 @@
-"""What a rig with a tuple of effects is for a simulation: its parameters, its equations, and these without definitions."""
+"""A rig with a tuple of effects for simulation: its parameters, its equations, and these with definitions substituted."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Which bodies does another program simulate, by what names, and what can it be asked?
+"""Bodies that another program simulates: their names there, and the interface to the program.
 
-``M(q, p) q'' = f + h(q, q', f, p)``: the program gives the mass matrix M and the force h of weight, gyration and whatever else it
-has between and on the bodies; f are the forces of the rig's drives and joints. Numbers p are parameters of its own.
+``M(q, p) q'' = f + h(q, q', f, p)``: the program gives the mass matrix M and the force h of gravity, gyroscopic and all other
+effects between and on the bodies; f are the forces of the rig's drives and joints. Numbers p are parameters of its own.
 """
 
 from __future__ import annotations

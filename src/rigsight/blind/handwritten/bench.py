@@ -1,4 +1,4 @@
-"""How does a hand-written plant move in the records of a trial, and what do the rig's equations leave of that?"""
+"""Motion of a hand-written plant in the records of a trial, and the gap of the rig's equations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which records does a trial hold? Sample rate, hold, kinds, sizes, lengths and rests are drawn, no two trials alike."""
+"""Records of a trial: sample rate, hold, kinds, amplitudes, lengths and rests are drawn at random for each trial."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How does a stand move, what is recorded of it, and what do equations without its effects leave of that?"""
+"""Motion of a stand, its records, and the gap of the equations without its effects."""
 
 from __future__ import annotations
 

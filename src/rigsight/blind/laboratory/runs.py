@@ -1,4 +1,4 @@
-"""Which records does a laboratory take under which condition?"""
+"""Records that a laboratory takes under each condition."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does a laboratory do to a record, and how much of it? Sizes are drawn for each trial from what laboratories have."""
+"""Imperfections of laboratory records, with sizes drawn for each trial from realistic ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must a diagnosis reach to be believed, and has it?"""
+"""Goals of a diagnosis, and whether they are reached."""
 
 from __future__ import annotations
 

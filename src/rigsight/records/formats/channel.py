@@ -1,4 +1,4 @@
-"""What is a channel of a measurement file, before anybody has said which signal it is?"""
+"""A channel of a measurement file before it is mapped to a signal."""
 
 from __future__ import annotations
 

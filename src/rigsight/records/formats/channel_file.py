@@ -1,4 +1,4 @@
-"""Which format does a file have, and how is it opened so that nothing but one clear message comes of a damaged one?"""
+"""Detection of the format of a file, and opening it such that a damaged file gives a single clear message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How is a file read in a process of its own, so that no damage in it harms this one?"""
+"""Reading a file in a separate process, so that a damaged file cannot crash this one."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What does a MATLAB file of version 5 to 7 declare, and is it safe to read?
 
-scipy allocates what a file declares before it looks whether the data is there, and crashes over types that do not exist. The
-declarations are therefore walked through first, without reading any numbers (MAT-File Format, MathWorks, R2023a, chapter 1).
+scipy allocates what a file declares before it checks whether the data is present, and crashes on invalid types. The declarations
+are therefore checked first, without reading any numbers (MAT-File Format, MathWorks, R2023a, chapter 1).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Is it an ordinary file, so that reading it comes to an end?"""
+"""Check for a regular file (not a device or pipe), so that reading it ends."""
 
 from __future__ import annotations
 

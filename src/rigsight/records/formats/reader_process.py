@@ -1,9 +1,9 @@
-"""What does a reader say about a file, asked in a process of its own?
+"""A reader in a separate process.
 
-asammdf, libhdf5, scipy and pyarrow read in C, and a damaged file can make them crash, run in circles or ask for all memory;
-the process that asked then gets a message instead. Run as ``python -P -m rigsight.records.formats.reader_process FORMAT FILE``:
-one line of JSON tells what the file holds; then every line ``channel INDEX`` or ``axis INDEX`` on stdin is answered by a line of
-JSON with type and size of the samples, and their bytes.
+asammdf, libhdf5, scipy and pyarrow read in C, and a damaged file can make them crash, loop forever or request all memory; the
+calling process then gets a message instead. Run as ``python -P -m rigsight.records.formats.reader_process FORMAT FILE``: one line
+of JSON describes the file; then every line ``channel INDEX`` or ``axis INDEX`` on stdin is answered by a line of JSON with type
+and size of the samples, and their bytes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Where do names, units and numbers stand in a text, and what above them is neither?
+"""Location of names, units and numbers in a text, and of other lines above them.
 
-Loggers write what they know about the test above the table: its number, the date, the operator, in any number of cells. The
-rows of numbers are what all else is told by: the last lines of a file are some of them, and what stands right above the first
-one are units or names.
+Loggers write information about the test above the table: its number, the date, the operator, in any number of cells. The rows of
+numbers are found first: the last lines of a file belong to them, and the lines directly above the first one are units or names.
 """
 
 from __future__ import annotations

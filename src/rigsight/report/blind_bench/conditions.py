@@ -1,4 +1,4 @@
-"""Which words and rows do the trials of a laboratory become? By the condition under which their records were taken."""
+"""Words and rows for the trials of a laboratory, by the condition under which their records were taken."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was hidden against what was named: a matrix of single effects and controls, and what became of pairs."""
+"""Confusion matrix of hidden and named effects for single effects and controls, and the outcome for pairs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which figures show the score of a blind bench: stated probabilities against what was right, and errors on withheld records?"""
+"""Figures of a blind bench: stated probabilities against the share of right verdicts, and errors on withheld records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which words and rows does the score of a blind bench become? Page, terminal and text share them."""
+"""Words and rows of the score of a blind bench, shared by page, terminal and text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Are the names of a rig file free, known where they are read, and read at all?"""
+"""Checks of the names of a rig file: unique, declared where they are used, and used at all."""
 
 from __future__ import annotations
 

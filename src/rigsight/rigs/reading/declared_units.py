@@ -1,4 +1,4 @@
-"""Do the units of all expressions of a rig file add up, and are they those that the place of each demands?"""
+"""Checks of the units of all expressions of a rig file."""
 
 from __future__ import annotations
 

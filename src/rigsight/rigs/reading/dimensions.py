@@ -1,7 +1,7 @@
-"""Do the units of an expression add up?
+"""Dimensional analysis of an expression.
 
-A number that is part of a formula (2, 0.5) is a plain number. Any other (9.81) may stand for a constant whose unit nobody wrote:
-what it multiplies may have any unit. Angles count as plain numbers, as in SI.
+A number that is part of a formula (2, 0.5) is dimensionless. Any other (9.81) may be a constant without a stated unit, so a
+product with it may have any unit. Angles are dimensionless, as in SI.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What does a parsed expression stand for? The same as symbols, and always a real and finite value."""
+"""Conversion of a parsed expression to symbols, with checks that its value is real and finite."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may stand in an expression of a rig file, and what does it mean? Text is parsed, never executed.
+"""Syntax and meaning of expressions of a rig file. Text is parsed, never executed.
 
 Numbers, names, ``+ - * / ^``, parentheses, ``d(coordinate)`` for a rate, and a few functions. Kinks are written through the
 functions that the simulation knows how to cross (`rigsight.rigs.reading.functions`).

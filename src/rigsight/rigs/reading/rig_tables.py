@@ -1,4 +1,4 @@
-"""What may stand in a rig file: its tables and their keys, before any expression is read."""
+"""Tables and keys of a rig file, before any expression is parsed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does a rig file leave to another program? Its bodies, by what they are called there."""
+"""Bodies of a rig file that another program simulates, with their names there."""
 
 from __future__ import annotations
 

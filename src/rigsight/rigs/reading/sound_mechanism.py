@@ -1,4 +1,4 @@
-"""Can a declared mechanism move as it is written? Energies, forces that act on something, sensors that something moves."""
+"""Checks of a declared mechanism: energies, forces that act on a motion, sensors that read one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""At which line and column of a TOML file does the value of a key stand? tomllib does not say."""
+"""Line and column of the value of a key in a TOML file, which tomllib does not report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A MuJoCo model -> the tables of a rig file, with where each part comes from, so that numbers find the way back."""
+"""A MuJoCo model -> the tables of a rig file, with the origin of each part, so that parameters can be written back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinetic and potential energy of a tree of bodies, in steps with names that a person can follow from body to body.
+"""Kinetic and potential energy of a tree of bodies, in named steps from body to body.
 
 Angular velocity, velocity and direction of gravity are carried outward along the tree, each in the frame of its body.
 

@@ -1,7 +1,6 @@
-"""A joint whose gear gives way: the rotor and what it moves turn by themselves, with a spring between them.
+"""A joint with a compliant gear: rotor and load are separate, with a spring between them.
 
-The first joint keeps the actuator, the armature, damping and friction; a second one at its place is what lies between rotor and
-body.
+The first joint keeps the actuator, the armature, damping and friction; a second one at its place lies between rotor and body.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is in a MuJoCo model that a rig file cannot say? Each named, so that nothing is dropped silently."""
+"""Parts of a MuJoCo model that a rig file cannot represent. Each is named, so that nothing is dropped silently."""
 
 from __future__ import annotations
 

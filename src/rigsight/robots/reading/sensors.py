@@ -1,4 +1,4 @@
-"""Which sensors of a MuJoCo model can a rig file say? Those that read the motion of a joint."""
+"""Sensors of a MuJoCo model that a rig file can represent: those that read the motion of a joint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers and effects of a model -> the MuJoCo model that it began as, with what MuJoCo has a field for."""
+"""Parameters and effects of a model -> the original MuJoCo model, as far as MuJoCo has fields for them."""
 
 from __future__ import annotations
 

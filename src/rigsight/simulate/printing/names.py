@@ -1,4 +1,4 @@
-"""What is each symbol of a structure called where people read it: which letter, with which words below and dots above?"""
+"""Displayed name of each symbol of a structure: letter, subscript and dots."""
 
 from __future__ import annotations
 

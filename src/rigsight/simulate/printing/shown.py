@@ -1,4 +1,4 @@
-"""Which equations are people shown? Those of the tree, in the order of reading, in any language."""
+"""Displayed equations: those of the tree in reading order, in any language."""
 
 from __future__ import annotations
 

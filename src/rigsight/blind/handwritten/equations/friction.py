@@ -1,4 +1,4 @@
-"""Which dry frictions are there, as the literature writes them?
+"""Laws of dry friction from the literature.
 
 References
 ----------

@@ -1,7 +1,7 @@
-"""Which springs and dampers without memory of positions are there, as textbooks write them?
+"""Springs and dampers without memory from textbooks.
 
-Each is written as what it adds to a linear spring ``k x`` of the joint: where the law takes the place of that spring, its force
-is taken off.
+Each is written as the force added to a linear spring ``k x`` of the joint; if the law replaces that spring, the spring force is
+subtracted.
 
 References
 ----------
