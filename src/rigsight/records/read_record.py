@@ -25,7 +25,7 @@ from rigsight.records.sound_signals import (
     clipping_notes,
     listed_columns,
     moving,
-    refuse_what_nobody_measures,
+    refuse_implausible,
     rest_notes,
 )
 from rigsight.records.stretches import one_stretch, stretches
@@ -194,7 +194,7 @@ def read_stretches(
     raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
-    refuse_what_nobody_measures(path, raw, table)
+    refuse_implausible(path, raw, table)
     found: list[str] = []
     if require_outputs:
         raw, found = moving(path, raw, table, needed, outputs)

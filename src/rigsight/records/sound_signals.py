@@ -63,7 +63,7 @@ def listed_columns(table: Columns) -> str:
     return ", ".join(f"'{name}'" for name in table.names[:_LISTED]) or "none"
 
 
-def refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
+def refuse_implausible(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
     """Refuse numbers that are bytes of another type, or a lost sign of a decimal."""
     for signal, samples in raw.items():
         largest = float(np.max(np.abs(samples)))
