@@ -78,8 +78,8 @@ class DiagnosisResult(Diagnosis):
         Parameters
         ----------
         picture
-            ``"gap"``: how the gap shrinks, step by step. ``"candidates"``: what each of them leaves. ``"record"``: measured
-            and simulated output of one record, with the errors below. ``"trust"``: numbers as records alone have them.
+            ``"gap"``: how the gap shrinks, step by step. ``"candidates"``: the error of each. ``"record"``: measured and
+            simulated output of one record, with the errors below. ``"trust"``: numbers as records alone have them.
         record
             Name of the record, for ``"record"``; by default the first that was scored.
         output

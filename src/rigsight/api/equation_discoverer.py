@@ -25,7 +25,8 @@ class EquationDiscoverer(CampaignEstimator):
     Parameters
     ----------
     method
-        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. ``"full"``: the whole acceleration is.
+        ``"discrepancy"``: the rig's own terms are kept and their residual is regressed. ``"full"``: the whole acceleration is
+        regressed.
     pointwise
         Regress sample by sample instead of in the weak form.
     one_by_one

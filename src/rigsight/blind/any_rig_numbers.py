@@ -39,7 +39,7 @@ _SPREAD = 0.6
 _DAMPERS = math.exp(-3.0)
 """Size about which a number is drawn that stands in a joint's damping alone: one SI unit would leave no vibration."""
 _PULL = 0.05
-"""Weight of the distance to the first draw beside a factor e outside a band: it decides what the bands leave open."""
+"""Weight of the distance to the first draw relative to a factor e outside a band: it decides what the bands do not determine."""
 _LEAST_APART = 0.1
 """Smallest eigenvalue of the mass matrix, each coordinate in units of its own inertia; zero is a singular one."""
 _CONFIGURATIONS = 8

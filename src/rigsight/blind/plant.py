@@ -284,7 +284,7 @@ class _Run:
         return broken
 
     def _enter(self, t: float, state: NDArray[np.float64]) -> None:
-        """Find out what a plant is doing that nobody has watched so far."""
+        """Determine the current modes of a plant at the start."""
         index = self._equations.velocity_sign
         if index is not None and state[self._equations.velocity] == 0.0:
             above, below = self._pushed(t, state)

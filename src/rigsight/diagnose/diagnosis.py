@@ -143,7 +143,7 @@ def diagnose(
     forces = forces_at_joints(found.context, found.reidentified)
     if forces:
         say("missing force at each joint")
-    # A push that takes most of the gap away says more than a force of any course.
+    # A push that explains most of the gap is stronger evidence than a force of any shape.
     pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
     return replace(
         diagnosis,
@@ -271,7 +271,7 @@ def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
 def _with_disturbance(
     context: FitContext, model: Scored, floors: Sequence[NoiseFloor], bandwidth: float | None
 ) -> tuple[NoiseFloor, ...]:
-    """Return the floors, that of the first output with the force that would leave what a model leaves above it."""
+    """Return the floors, that of the first output with the disturbance force that would cause the error of a model above it."""
     first = context.rig.outputs[0].name
     if not all(first in record for record in context.scoring):
         return tuple(floors)

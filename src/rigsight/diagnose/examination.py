@@ -188,7 +188,7 @@ def examine(
     vector = noise_vector([signal.name for signal in task.rig.outputs], noise)
     candidates = [*models.singles, *pairs]
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
-    # A likelihood takes what is left for noise: it counts where the likeliest model leaves no more than that.
+    # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and checks.is_adequate(likeliest)
     ranking = rank(candidates, vector, rng, reidentified.error_over_noise, evidence.criterion, counts)
     if ranking.order and ranking.order[0].residuals:
@@ -279,7 +279,7 @@ def _singly(
         )
     bent = bool(task.given) and context.leaves_numbers_open(reidentified.fit)
     if bent or not task.rig.has_one_motion:
-        # What moves between the sensors, and which forces do it, is known once the equations fit, or from the given simulation.
+        # Motion and forces between the sensors are known once the equations fit, or from the given simulation.
         known = {**task.constants, **reidentified.fit.values, **(task.given if bent else {})}
         context = replace(context, scales=characteristic_scales(task.rig, task.estimation, known))
     say("re-identified")
@@ -296,7 +296,7 @@ def _singly(
         search.others
         and min((model.error_over_noise for model in singles), default=np.inf) > VERDICT.at_floor
     ):
-        # Nothing right may be lost where places or effects were ranked wrongly.
+        # A right model must not be lost because places or effects were ranked wrongly.
         if prepare is not None:
             prepare([context.simplest((effect,)) for effect in search.others])
         singles = fit_candidates(context, reidentified, search.others, say, singles)

@@ -48,7 +48,7 @@ class OutputGap:
     after
         With the effects of the verdict added.
     noise_floor
-        What a perfect model would leave.
+        Error of a perfect model.
     intervals
         95 % limits by stage and of ``"closed"``, see `quantify.gap_intervals`.
     """

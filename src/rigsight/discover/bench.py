@@ -304,7 +304,7 @@ class Bench:
             [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
             for attempt, structure in zip(attempts, structures, strict=True)
         ]
-        # Second starts come last: beside the first one they would only wait for the same kernel to be compiled.
+        # Second starts come last: next to the first one they would only wait for the same kernel to be compiled.
         begun = [
             (number, own[rank])
             for rank in range(max(map(len, starts), default=0))

@@ -62,8 +62,8 @@ def discover(
     task
         Records and rig.
     method
-        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term.
-        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. A rig of several joints has no other.
+        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term. ``"discrepancy"``: the
+        rig's own terms are kept and their residual is regressed; the only form for a rig of several joints.
     pointwise
         Regress sample by sample instead of in the weak form; not for a rig of several joints.
     seed
@@ -94,7 +94,7 @@ def discover(
     values = _linear_values(task, estimation)
     scales = characteristic_scales(task.rig, estimation, values)
     output = task.rig.outputs[0].name
-    # What the motion knows nothing of would be simulated in every fit.
+    # Outputs that do not affect the motion would otherwise be simulated in every fit.
     alone = tuple(_without_downstream(task.rig, record) for record in estimation)
     swallowed, centered = _offsets_found(task, alone, values, scales, _held(task))
     motions = threads.results(
@@ -127,7 +127,7 @@ def discover(
         )
     chosen = _without_damper(bench, selection, say)
     final, held = _polished(task, bench, chosen)
-    # A record that was set aside is fitted by the polish as well: only the equation before it has not seen it.
+    # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
     judged = chosen if how else bench.scored(chosen.support, final)
     if not math.isfinite(judged.error_over_noise):
         raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
@@ -207,7 +207,7 @@ def _distinct(
     stands_for: dict[str, list[str]] = {}
     dropped: set[int] = set()
     for i, j, _ in alike(projected, columns, _SAME_COLUMN):
-        # A loop may turn into friction or damping, not the other way round: the simpler term stands for it.
+        # A loop may degenerate to friction or damping, but not vice versa: the simpler term represents it.
         loops = [is_loop(library[k].effect) for k in (i, j)]
         first, second = (j, i) if loops == [True, False] else (i, j)
         if first not in dropped and second not in dropped:

@@ -149,7 +149,7 @@ def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Re
 
 
 def _one_amplitude(selection: Selection, chosen: Trial) -> str:
-    """Return what records of a single amplitude tell apart, and what they do not."""
+    """Return what records of a single amplitude distinguish, and what they do not."""
     others = sorted(
         (
             t

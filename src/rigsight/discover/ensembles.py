@@ -43,7 +43,7 @@ def inclusion(
     shares = {n: bench.projected.explained(c.column[:, None])[1] for n, c in bench.candidates.items()}
     ranked = sorted(shares, key=lambda name: -shares[name])
     kept = set(final.structure.effect_names)
-    # An effect that contains a kept one as a special case explains whatever that does, and would only share its draws.
+    # An effect that contains a selected one as a special case explains everything that this does, and would only share its draws.
     offered_terms = [
         name
         for name in dict.fromkeys((*polished, *proposed, *ranked))

@@ -57,7 +57,7 @@ class MissingForce:
     terms
         The terms that sparse regression takes, the surest first; may be empty.
     share
-        Share of what the equation leaves of the acceleration (or force, as power) that they explain; noise counts as left.
+        Share of the residual of the acceleration (or force, as power) that they explain, including noise.
     """
 
     terms: tuple[ShapeTerm, ...]
@@ -92,7 +92,7 @@ def missing_force(
     rng: np.random.Generator,
     has_stiffness: bool = True,
 ) -> MissingForce:
-    """Regress what the rig's own terms leave of the motion.
+    """Regression of the residual of the rig's own terms.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def missing_force(
     if not library:
         return MissingForce((), 0.0)
     columns = np.column_stack([candidate.column for candidate in library])
-    # Of terms that these records cannot tell apart the first stands for both: a pendulum's sine is a cube until it swings far.
+    # Of indistinguishable terms only the first is kept: the sine of a pendulum looks like a cubic term unless the swing is large.
     doubles = {second for _, second, _ in alike(projected, columns, _SAME_COLUMN)}
     library = [candidate for i, candidate in enumerate(library) if i not in doubles]
     columns = columns[:, [i for i in range(columns.shape[1]) if i not in doubles]]
@@ -131,7 +131,7 @@ def missing_force(
     coefficients, share = projected.explained(columns[:, taken])
     force = 1.0
     if rig.is_driven:
-        # The drive's force is known: per unit of acceleration it gives the inertia that goes with these terms.
+        # The force of the drive is known: its ratio to the acceleration gives the inertia for these terms.
         gain = evaluated(rig.motion.drive_gain, values)
         drive, *_ = projected.solved(columns[:, taken])[0]
         force = gain / drive if gain * drive > 0.0 else evaluated(rig.motion.inertia, values)

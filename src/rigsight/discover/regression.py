@@ -23,7 +23,8 @@ N_ENSEMBLE = 40
 N_BLOCKS = 40
 """Contiguous stretches of rows that an ensemble draws from: neighboring rows share their noise."""
 _CLEARLY = 1.1
-"""Factor by which a larger support must lower what is left: the columns, made of a smoothed motion, are no better."""
+"""Factor by which a larger support must lower the residual: the columns, from a smoothed motion, are not more accurate than
+this."""
 _TINY = 1e-10
 _RIDGE = 1e-12
 
@@ -61,7 +62,7 @@ class Projected:
         return np.asarray(columns - self._directions @ (self._directions.T @ columns))
 
     def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Return coefficients of further columns and the share of what the base leaves that they explain."""
+        """Return coefficients of further columns and the share of the residual of the base that they explain."""
         left, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
         if np.any(size <= _TINY * np.linalg.norm(columns, axis=0)):
@@ -71,7 +72,7 @@ class Projected:
         return solution / size, float(1.0 - (rest @ rest) / (left @ left))
 
     def solved(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of what is left."""
+        """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of the residual."""
         matrix = np.column_stack([self.base, columns])
         size = np.linalg.norm(matrix, axis=0) + 1e-300
         solution = np.linalg.lstsq(matrix / size, self.target, rcond=1e-12)[0]

@@ -107,7 +107,7 @@ class SupportStarts:
             own[effect.post_yield_stiffness_ratio] = without / total
         for parameter in effect.parameters:
             if parameter.name in candidate.linear and parameter.lower == 0.0:
-                # A resisting force that the regression turns round is one that is hardly there.
+                # A resisting force with the wrong sign in the regression is negligible.
                 own[parameter.name] = max(own[parameter.name], _SMALL * abs(own[parameter.name]))
             if parameter.name in own:
                 found[structure.parameter_name(effect, parameter.name)] = own[parameter.name]

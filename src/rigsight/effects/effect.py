@@ -215,7 +215,7 @@ class Effect:
 
     @property
     def holds_constant_force(self) -> bool:
-        """True for a force with a mean that goes with the direction: no record tells the mean from a constant force."""
+        """True for a force whose mean depends on the direction: no record distinguishes this mean from a constant force."""
         lopsided = self.torque is not None and self.signature.even_harmonics
         return lopsided and not (self.reads(symbols.x) or self.reads(symbols.position))
 

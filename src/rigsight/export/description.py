@@ -63,7 +63,7 @@ def equation_lines(exported: Exported) -> list[str]:
 
 
 def _as_shown(exported: Exported) -> list[str]:
-    """Return the equations as people are shown them: solved for the accelerations nobody would read them."""
+    """Return the equations as displayed: solved for the accelerations they would be unreadable."""
     shown, own = shown_equations(exported.structure), exported.names()
     names = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()}
     names |= {rate_symbol(state): f"{own[state]}'" for state in exported.structure.states}

@@ -77,7 +77,7 @@ def local_polynomial_response(
     band
         Limits [rad/s]; None takes all that the source excites.
     wanted
-        Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
+        Required frequencies [rad/s], ascending: other lines are skipped. None takes all of the band.
     instrument
         A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
         is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
@@ -152,7 +152,7 @@ def local_rational_response(
     band
         Limits [rad/s]; None takes all that the source excites.
     wanted
-        Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
+        Required frequencies [rad/s], ascending: other lines are skipped. None takes all of the band.
     instrument
         A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
         is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
@@ -193,7 +193,7 @@ def local_rational_response(
 
 @dataclass(frozen=True)
 class _LocalModel:
-    """Lines on each side of one, degree of the polynomials and of the denominator, and whether a transient is told apart."""
+    """Lines on each side of one, degree of the polynomials and of the denominator, and whether a transient is modelled."""
 
     half: int
     order: int

@@ -29,7 +29,7 @@ from rigsight.records.record import Hold, Record
 _OWN_SHARE = 1e-4
 """Share of an input's power that no other input explains, from which its response is its own: 40 dB, as for silence."""
 _MOSTLY = 0.5
-"""Share of its frequencies at which an input must be told apart to be worth a response."""
+"""Share of its frequencies at which an input must be distinguishable to get a response."""
 _SHORT = 0.5
 """Duration over that of the longest record below which a record would blur what the longest resolves."""
 _MOST_FREQUENCIES = 400
@@ -55,7 +55,7 @@ class ResponsesOfInputs:
     problems
         Why it is not, a sentence by (source, response).
     together
-        Inputs that move together in these records, so that nobody can tell their responses apart.
+        Inputs that change together in these records, so that their responses cannot be separated.
     """
 
     found: Mapping[tuple[str, str], FrequencyResponse]

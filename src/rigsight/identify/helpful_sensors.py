@@ -15,7 +15,7 @@ from rigsight.records.record import Record
 from rigsight.simulate import Structure, record_values, simulate
 
 _NOISE = 0.01
-"""Noise of a sensor that nobody has seen, over the RMS of what it would show: an assumption, of no good sensor."""
+"""Assumed noise of an unrecorded sensor, relative to the RMS of its reading: that of a mediocre sensor."""
 
 
 def helpful_sensors(

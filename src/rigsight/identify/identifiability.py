@@ -140,7 +140,7 @@ def relative_errors(found: Information) -> dict[str, float]:
         What the records say.
     """
     errors = conditional_errors(found.root)
-    # What does next to nothing is held: that it may be anything is no reason to doubt the others.
+    # A parameter with almost no influence is held, so that its uncertainty does not affect the others.
     held = errors >= POORLY_KNOWN
     errors[~held] = marginal_errors(found.root[:, ~held])
     return dict(zip(found.names, map(float, errors), strict=True))
@@ -176,7 +176,7 @@ class _Quantity:
 
 
 class _Search:
-    """Puts parameters together until what is left is determined or named."""
+    """Combines parameters until the rest is determined or named."""
 
     def __init__(self, found: Information) -> None:
         self._found = found

@@ -20,12 +20,12 @@ from rigsight.simulate import Structure
 _NOISE_ROUNDS = 3
 _SETTLED = 0.02
 _DIFFERENT = 0.01
-"""Probability of a difference as large by chance, below which two parameter sets are told apart."""
+"""Probability of such a difference by chance, below which two parameter sets count as different."""
 
 
 @dataclass(frozen=True)
 class RecordResidual:
-    """What a parameter set leaves of one record.
+    """Error of a parameter set on one record.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class JointFit:
     noise
         Standard deviation by which residuals of each output were divided.
     residuals
-        What it leaves of every record.
+        Its error on every record.
     kinds
         The fits of each kind alone.
     probability

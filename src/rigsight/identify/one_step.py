@@ -94,7 +94,7 @@ class OneStep:
         return propagated_covariance(found, self._chain)
 
     def left(self, changes: Sequence[Floats]) -> list[Floats]:
-        """Return what is left of such changes after the step, in units of the noise, shape as given; 0 where not measured."""
+        """Return such changes after the step, in units of the noise, shape as given; 0 where not measured."""
         stacked = self._stacked(changes)
         steps = self._inverse @ self._gradients(stacked)
         found = []

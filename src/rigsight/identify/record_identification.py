@@ -181,7 +181,7 @@ def _lateral(
         )
     band = None
     if motion.measured is not None:
-        # Where psi itself drowns, its noise would pass for a source.
+        # Where psi is below its noise, the noise would act as a source.
         band = (float(motion.measured.omega[0]), float(motion.measured.omega[-1]))
     # psi is measured: it is smooth between its samples, whatever the current does.
     smooth: Hold = "band_limited"
@@ -303,7 +303,7 @@ def _judged(
         return replace(path, problem=fit.message)
     gain = fit.values["gain"]
     if not of_velocity and not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
-        # Its sign would be blamed on a sensor.
+        # Its sign would wrongly be attributed to a sensor.
         return replace(path, problem=_undetermined(["the gain"]))
     # The break frequency of a velocity is often too low to be seen; mass and damping show in the slope all the same.
     found = physical(fit)

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _CHANCE = 1e-3
 """Probability of means as far apart by chance below which they are said to differ: with ten outputs one campaign in a hundred."""
 _WORTH_TELLING = 0.1
-"""Share of what is left, as power, from which differing means are what keeps a model from the records, and not a trifle of it."""
+"""Share of the residual, as power, above which differing means are the main error of a model."""
 _LEAST_TOLD = 1e-6
 _NOTHING = 1e-6
 """Share of what records say of a parameter that is rounding: squares of derivatives that are known to a thousandth of this."""
@@ -28,7 +28,7 @@ _NOTHING = 1e-6
 
 @dataclass(frozen=True)
 class DifferingMeans:
-    """Means of what a model leaves that differ from record to record.
+    """Mean residuals of a model that differ from record to record.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class DifferingMeans:
     means
         Record -> mean of measured minus simulated.
     share
-        Share of what is left, as power, that goes with the means.
+        Share of the residual, as power, that the means explain.
     probability
         Chance of means as far apart if the offset is the same everywhere.
     """

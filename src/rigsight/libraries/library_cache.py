@@ -45,7 +45,7 @@ def cache_folder() -> Path:
     Raises
     ------
     InputError
-        If the variable is not set and nobody knows a home folder.
+        If the variable is not set and there is no home folder.
     """
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:

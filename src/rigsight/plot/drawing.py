@@ -31,7 +31,7 @@ REIDENTIFIED = "#cc79a7"
 WITH_EFFECT = "#0072b2"
 FLOOR = "#1d2126"
 OTHER = "#9aa4ae"
-"""Okabe and Ito's palette: told apart by color-blind readers, and in gray by line style."""
+"""Okabe and Ito's palette: distinguishable for color-blind readers, and in gray by line style."""
 STAGE_STYLES: Mapping[Stage, Mapping[str, Any]] = {
     "before": {"color": GIVEN, "linestyle": (0, (5, 1.6))},
     "reidentified": {"color": REIDENTIFIED, "linestyle": (0, (2, 1))},

@@ -43,7 +43,7 @@ _MISLEADING = {"Grad": "deg", "grad": "deg, or gon"}
 
 
 class UnknownUnitError(ValueError):
-    """A unit that nobody knows, or that is no unit of the quantity; the text says which."""
+    """A unit that is unknown or does not fit the quantity; the text says which."""
 
 
 def factor(unit: str, si: str) -> float:

@@ -11,7 +11,7 @@ from rigsight.errors import InputError
 from rigsight.records.record import Hold
 
 FEWEST_SAMPLES = 50
-# Beyond, squares and quotients of what was read leave the range of numbers; bytes of another type look like this.
+# Beyond, squares and quotients would overflow; data read with a wrong type looks like this.
 LARGEST_NUMBER = 1e100
 SHORTEST_TIME = 1e-100
 # Of the sample time: above the first a record is refused; below the second interpolation adds more error than it mends.

@@ -243,7 +243,7 @@ def read_stretches(
 
 @dataclass(frozen=True)
 class _Dialect:
-    """How a text is written, as far as somebody said so."""
+    """The format of a text, as far as specified."""
 
     separator: str | None
     decimal: str | None

@@ -46,7 +46,7 @@ class RecordView:
     title, facts
         Name, and role, kind, amplitude, length in words.
     rows
-        Output, and what each stage leaves of it in words.
+        Output, and the error of each stage in words.
     charts
         Each output over time, then each signal path over frequency.
     missing

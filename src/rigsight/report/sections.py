@@ -76,7 +76,7 @@ def budget_drawing(diagnosis: Diagnosis) -> Figure:
 
 
 def budget_figure(diagnosis: Diagnosis) -> PageFigure:
-    """Return the gap budget with the words that go with it."""
+    """Return the gap budget with its caption."""
     alt = " ".join(
         f"{output}: {stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
         for output, gap in diagnosis.gap.items()
@@ -122,7 +122,7 @@ def ranking_drawing(diagnosis: Diagnosis) -> Figure:
 
 
 def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
-    """Return the ranking with the words that go with it."""
+    """Return the ranking with its caption."""
     names = [effects_label(candidate.effects) for candidate in diagnosis.candidates]
     scored = [
         f"{name} {c.error_over_noise:.3g}"

@@ -20,7 +20,7 @@ TIMES = "\u00d7"
 _WITHOUT_EFFECT = "no effect, refitted parameters"
 _PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
 _SEPARATES = 1.0
-"""RMS difference in standard deviations of the noise below which an experiment is no help."""
+"""RMS difference in standard deviations of the noise below which an experiment does not help."""
 _PLACES = {
     "actuator": "at the actuator",
     "sensor": "at the sensor",
@@ -109,7 +109,7 @@ def stage_names(diagnosis: Diagnosis) -> dict[Stage, str]:
 
 
 def stages_told(diagnosis: Diagnosis, gap: OutputGap | GapPart) -> str:
-    """Return what each stage leaves: ``"given simulation 42 %, re-identified 13 %, with effect 0.94 %"``."""
+    """Return the error of each stage: ``"given simulation 42 %, re-identified 13 %, with effect 0.94 %"``."""
     return ", ".join(
         f"{name} {gap_percent(getattr(gap, stage))}" for stage, name in stage_names(diagnosis).items()
     )
@@ -224,7 +224,7 @@ def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """Return what a named or an unknown cause leaves and with what that goes; empty where it leaves nothing to tell."""
+    """Return the remaining error of a named or an unknown cause and its correlated signal; empty where there is none."""
     left = diagnosis.remainder
     return (
         left.text
@@ -234,7 +234,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
 
 
 def missing_force_sentence(diagnosis: Diagnosis) -> str:
-    """Return what is known of the force that is missing where no effect explains the gap; empty where nothing is."""
+    """Return a sentence on the missing force if no effect explains the gap; empty where nothing is known."""
     if diagnosis.missing_force is not None:
         return diagnosis.missing_force.sentence
     forces = diagnosis.joint_forces

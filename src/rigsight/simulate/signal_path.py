@@ -242,7 +242,7 @@ class _Path:
             joint.force.xreplace({c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates})
         )
         carried, torques = [spring, static], []
-        # What weighs on a joint is known before what goes with its load.
+        # The load of a joint must be known before effects that depend on it.
         for effect in sorted(effects, key=lambda effect: effect.reads(canonical.load)):
             if effect.torque is None:
                 continue

@@ -248,7 +248,7 @@ class LaboratoryBench:
         return self._fitted(compose(self.rig), records, self.values, self.free)
 
     def scored(self, refit: FitResult, records: Sequence[Record]) -> FitResult:
-        """Return what fitted equations leave of other records."""
+        """Return the residuals of fitted equations on other records."""
         return self._fitted(compose(self.rig), records, refit.values, ())
 
     def floor(

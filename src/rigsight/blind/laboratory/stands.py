@@ -50,7 +50,7 @@ class Stand:
     held
         Parameters that its records do not tell beside the others.
     looped
-        True for one that nobody runs open loop.
+        True for a stand that is never operated in open loop.
     """
 
     name: str

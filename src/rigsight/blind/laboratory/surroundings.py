@@ -13,7 +13,7 @@ from rigsight.blind.laboratory.subjects import LaboratorySubject
 GAPS = (5.0, 100.0)
 """Gap that the re-identified equations leave, in units of the true floor: what an eye sees in a plot, up to a wrong model."""
 LEAST_BESIDE = 1.5
-"""Least gap of a further effect beside the main one, in units of the floor: less is nothing that anybody sees."""
+"""Least gap of a further effect in addition to the main one, in units of the floor: less is not visible."""
 _NOISE = (3e-4, 3e-3)
 """Sensor noise in units of the reading's size: 70 to 50 dB, a laser head's or a strain gauge's."""
 _INPUT_NOISE = (2e-4, 1e-2)

@@ -173,7 +173,7 @@ def _refitted(
 def _shifted(
     context: FitContext, effects: tuple[Effect, ...], base: FitResult
 ) -> tuple[float | None, float | None]:
-    """Return the fitted shift and what is left with it."""
+    """Return the fitted time offset and the remaining error."""
     if not context.rig.has_one_motion:
         return None, None  # with control loops and several drives a shift is no delay of one input
     names = {effect.name for effect in (*context.modelled, *effects)}

@@ -41,7 +41,7 @@ def asked_offsets(
     linear, singles
         The re-identified equations, and every effect by itself.
     allowed
-        What a named cause may leave, in units of the noise floor.
+        Error that a named cause may leave, in units of the noise floor.
     """
     models = [reidentified, *(m for m in singles if m.fit.residuals and np.isfinite(m.error_over_noise))]
     forgetful = [m for m in models if not _remembers(m.effects)]

@@ -54,7 +54,7 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
     try:
         motions = joint_motions(context.rig, records, reidentified.fit.values, context.noise)
     except (SimulationError, np.linalg.LinAlgError):
-        # A map is no reason to have no diagnosis.
+        # A diagnosis is still useful without this map.
         return ()
     motions = tuple(motion for motion in motions if np.isfinite(motion.left))
     parts: list[StatePart] = []
@@ -98,7 +98,7 @@ def _plane(context: FitContext, motion: JointMotion, lacks: bool) -> Plane:
     return Plane(
         x=np.concatenate(motion.displacement),
         v=np.concatenate(motion.velocity),
-        # What resists the motion is what the equations lack with the other sign.
+        # The resisting force is the missing force with the opposite sign.
         force=force if lacks else np.full(force.size, NOTHING),
         force_noise=rms(np.concatenate(motion.error)) if lacks else NOTHING,
         forced=tuple(signal.name for signal in context.rig.outputs),

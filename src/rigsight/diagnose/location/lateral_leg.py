@@ -142,7 +142,7 @@ def _projected(
 
 
 def _left(record: Record, names: tuple[str, str], numbers: _Numbers) -> NDArray[np.float64]:
-    """Return what is left of y with these numbers; only the initial value is fitted."""
+    """Return the residual of y with these parameters; only the initial value is fitted."""
     decay = _decay(record, numbers.rate)
     follows = numbers.gain * _answer(_moved(record, names[0], numbers.shift), record.dt, numbers.rate)
     left = record[names[1]] - follows - numbers.offset * (1.0 - decay)

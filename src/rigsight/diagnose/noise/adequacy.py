@@ -12,11 +12,11 @@ not.
 
 References
 ----------
-E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for turning signs (the wild bootstrap with Rademacher weights).
-R. De Santis, J. J. Goeman, J. Hemerik, S. Davenport and L. Finos, J. Am. Stat. Assoc. (2025), doi 10.1080/01621459.2025.2491775,
-for turned signs beside fitted numbers.
-P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the smallest of several p-values.
-T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for what the size of a remainder goes with; here by ranks.
+E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for flipping signs (the wild bootstrap with Rademacher weights). R. De
+Santis, J. J. Goeman, J. Hemerik, S. Davenport and L. Finos, J. Am. Stat. Assoc. (2025), doi 10.1080/01621459.2025.2491775, for
+sign flips with fitted parameters. P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the
+smallest of several p-values. T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for the dependence of the size of a
+residual on a variable; here by ranks.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def adequacy(
         told = _turned(fresh, new, stretches, signs, innovations.followed)
         if told is None:
             continue
-        # How large it is counts in the readings themselves; what is new in them says only whether it is there.
+        # The size is computed in the readings themselves; innovations only decide whether it is significant.
         seen = _turned(answers.without_free(columns), seen_left, stretches, signs)
         share = (
             0.0 if seen is None else max(0.0, seen.reached - seen.mean) / float(answers.left @ answers.left)
@@ -190,13 +190,13 @@ class Checks:
 
     def of(self, model: Scored) -> Adequacy:
         """Return the adequacy of a model."""
-        # A model may be fitted on, and then leaves something else.
+        # A model may be fitted further and then has another residual.
         own = model.names, model.fit.cost
         if own not in self._known:
             significance = (
                 VERDICT.significance if model.error_over_noise <= self._allowed else VERDICT.against_a_floor
             )
-            # Noise that only motion makes is no reason to say that nothing is missing.
+            # Noise that occurs only in motion does not show that nothing is missing.
             steady = not model.effects and model.error_over_noise > self._at_floor
             self._known[own] = adequacy(self._context, model, self._rng, significance, steady)
         return self._known[own]
@@ -208,7 +208,7 @@ class Checks:
 
 @dataclass(frozen=True)
 class _Turned:
-    """How much of what is left goes with some columns, and how much where the signs of its stretches are turned."""
+    """Part of the residual explained by some columns, and the same after the signs of its stretches are flipped."""
 
     reached: float
     by_chance: Floats
@@ -225,10 +225,10 @@ class _Turned:
 def _turned(
     columns: Floats, left: Floats, stretches: Sequence[slice], signs: Floats, followed: Followed | None = None
 ) -> _Turned | None:
-    """Return how much goes with columns that no parameter follows; None if there are none.
+    """Return how much is explained by columns after projecting out the parameters; None if none remain.
 
-    What parameters and initial states took of what is left is missing from it once signs are turned, so that chance would seem
-    smaller than it is: with `followed` each turn counts in units of what it then expects.
+    The part of the residual absorbed by parameters and initial states is missing after signs are flipped, which would
+    underestimate chance: with `followed` each flip is normalized by its expected value.
     """
     basis = orthonormal(columns)
     if basis.shape[1] == 0:
@@ -263,7 +263,7 @@ def _is_spread(answers: Answers) -> bool:
 
 
 def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
-    """Return how the size of what is left goes with how much moves: with what of several chance explains least."""
+    """Return the dependence of the size of the residual on the size of the motion: the most significant of several."""
     left = [float(np.mean(answers.seen_left[part] ** 2)) for part in stretches]
     rig = answers.context.rig
     moving: list[tuple[str, str, Sequence[Floats]]] = []

@@ -61,7 +61,7 @@ def disturbance(
     records
         What was scored.
     left
-        What the model leaves of the first output of each record, shape (n_samples,).
+        Residuals of the model in the first output of each record, shape (n_samples,).
     noise
         Standard deviation of the sensor's noise.
     bandwidth

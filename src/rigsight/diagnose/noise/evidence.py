@@ -68,7 +68,7 @@ class Evidence:
         self._context = context
         self._responses = self._of_forces(reidentified)
         self._known: dict[tuple[int, float], Floats] = {}
-        # Models are kept beside what was found, so that no other has their identity.
+        # Models are stored with the results, so that no other object can have the same identity.
         self._criteria: dict[int, tuple[Scored, float]] = {}
         self.powers = self._fitted_powers(self._remainders(reference))
 
@@ -129,7 +129,7 @@ class Evidence:
         return float(sum(np.sum(entr(own)) for own in leverages))
 
     def _remainders(self, model: Scored) -> list[tuple[Floats, float]]:
-        """Return what a model leaves of each record that is long enough, shape (n, n_outputs), with its sample time."""
+        """Return the residuals of a model on each record that is long enough, shape (n, n_outputs), with its sample time."""
         found = self._context.on_all_records(model).residuals
         records = self._context.records
         return [
@@ -163,7 +163,7 @@ class Evidence:
         return self._known[key]
 
     def _spectra(self, n_samples: int, dt: float) -> Floats:
-        """Return the expected spectrum of what is left, shape (lines, outputs)."""
+        """Return the expected spectrum of the residual, shape (lines, outputs)."""
         return np.asarray(np.einsum("kij,ij->ki", self._gains(n_samples, dt), self.powers))
 
     def _fitted_powers(self, remainders: Sequence[tuple[Floats, float]]) -> Floats:

@@ -35,7 +35,7 @@ _TIMES = 4
 
 
 def law_columns(answers: Answers, effect: Effect) -> Floats:
-    """Return what any other law of the signals that an effect reads would change, at its place; shape (n, n_columns).
+    """Return the responses to any other law of the signals that an effect reads, at its place; shape (n, n_columns).
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
     """
     place = answers.context.rig.acts_at(effect)
     if effect.place in (Place.SENSOR, Place.ACTUATOR):
-        # What is limited or dead at once is no other form of what comes late, nor the other way round.
+        # A static nonlinearity is not another form of a delay or lag, nor vice versa.
         is_late = bool(effect.states) or effect.delay is not None or effect.reading_delay is not None
         if effect.place is Place.SENSOR:
             return (_changes_of if is_late else _readings_of)(answers, place)
@@ -62,12 +62,12 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
 
 
 def alternatives(answers: Answers) -> Iterator[tuple[str, str, Floats]]:
-    """Yield what a remainder may go with, in words, with the place and the answers of all readings, shape (n, n_columns).
+    """Yield each possible cause of a residual in words, with the place and the responses of all readings, shape (n, n_columns).
 
     Parameters
     ----------
     answers
-        Of the equations that leave the remainder. The place is empty for what has none.
+        Of the equations with the residual. The place is empty for a cause without a place.
     """
     rig = answers.context.rig
     for joint in motion_columns(rig):

@@ -25,7 +25,7 @@ Answer = Callable[[Floats], NDArray[np.complex128]]
 
 @dataclass(frozen=True)
 class Run:
-    """The way along a record and what a model leaves there, shape (n_samples,) each; `dt` is its sample time [s]."""
+    """Position along a record and the residual of a model there, shape (n_samples,) each; `dt` is its sample time [s]."""
 
     way: Floats
     left: Floats
@@ -47,11 +47,11 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
     Parameters
     ----------
     law
-        What comes back with the position.
+        The position-periodic law.
     runs
-        Records; long ones are read in the stretch that leaves most.
+        Records; of long ones only the stretch with the largest residual is used.
     answer
-        What the output makes of it.
+        Response of the output to it.
     count
         Number of lines.
     """
@@ -76,7 +76,7 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
 
 
 class _Spectrum:
-    """What a run leaves over frequency, and how a force along its way would look there."""
+    """Spectrum of the residual of a run, and that of a force along its position."""
 
     def __init__(self, run: Run, answer: Answer) -> None:
         n = run.way.size

@@ -36,8 +36,8 @@ _HOPELESS_TOLERANCE = 1e-2
 def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
     """Re-identify the equations without an effect.
 
-    From numbers that a regression found, or from those of the given simulation where a rig with these cannot be simulated: a
-    coordinate that no sensor reads leaves the regression some of them open.
+    Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
+    former: the regression does not determine all parameters if no sensor reads a coordinate.
     """
     structure = context.composed()
     problem, free = context.problem(structure, context.estimation), context.free_parameters(structure)
@@ -96,7 +96,7 @@ def fit_candidates(
 
 
 def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> Scored:
-    """Fit a candidate from where it is nearly absent: its equations are those of the base there, so that none need be worse."""
+    """Fit a candidate from nearly zero effect, where its equations equal those of the base, so that it cannot end worse."""
     structure, (effect,) = look.structure, look.effects
     start = next(start_values(context, structure, effect, base, {}))
     faint = {
@@ -104,7 +104,7 @@ def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> S
         for p in effect.parameters
         if p.null is not None
     }
-    # A constant force that is held where somebody knows it stays there.
+    # A constant force that is held at its known value stays there.
     known = context.constant_forces_beside(look.effects)
     begin = replace(base, values={**start, **base.values, **faint, **known})
     return _fitted(context, look.effects, structure, look.free, (begin,), promising=False)
@@ -215,7 +215,7 @@ def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool
 
 
 def finished(context: FitContext, scored: Scored) -> Scored:
-    """Fit on from elsewhere, and with exponents and constant forces free that were fixed so far, where that helps."""
+    """Continue the fit from other starts, and with exponents and constant forces freed, where that helps."""
     scored = restarted(context, scored)
     fixed = scored.fit.structure.fixed
     names = [

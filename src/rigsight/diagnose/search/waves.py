@@ -58,7 +58,7 @@ def _law(effect: Effect) -> tuple[list[str], Law]:
 
 
 def _runs(context: FitContext, effect: Effect, base: FitResult) -> tuple[list[Run], float]:
-    """Return the way that an effect sees along each record with what is left there, and the sign of what it adds."""
+    """Return the position that an effect reads along each record with the residual there, and the sign of its contribution."""
     rig = context.rig
     outputs = [signal.name for signal in rig.outputs]
     if effect.place is Place.SENSOR or rig.has_one_motion:
@@ -87,7 +87,7 @@ def _runs(context: FitContext, effect: Effect, base: FitResult) -> tuple[list[Ru
 
 
 def _answer(context: FitContext, effect: Effect, base: FitResult) -> Answer:
-    """Return the answer of what is left to a force at the effect's joint; 1 for a sensor's error or a force that is measured."""
+    """Return the response of the residual to a force at the effect's joint; 1 for a sensor error or a measured force."""
     rig = context.rig
     if effect.place is Place.SENSOR or not rig.is_driven:
         return lambda omega: np.ones(omega.size, dtype=np.complex128)

@@ -73,12 +73,12 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
         "damping depends on the motion: damping that grows with speed or displacement is missing, or has another form",
         _LADDER,
     ),
-    # Within the sliding range a spring of hysteresis or presliding lets go.
+    # In the sliding range the spring of a hysteresis or of presliding friction slips.
     (Pattern.AMPLITUDE, Role.STIFFNESS, -1): Meaning(
         "stiffness depends on the motion: a softening spring, hysteresis or presliding friction is missing, or has another form",
         _LADDER,
     ),
-    # A clearance takes the spring away from small motions.
+    # Within a clearance the spring does not act on small motions.
     (Pattern.AMPLITUDE, Role.STIFFNESS, 1): Meaning(
         "stiffness depends on the motion: a hardening spring, an end stop or free play is missing, or has another form",
         _LADDER,
@@ -95,11 +95,11 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
         "the equation of the effect does not quite fit the rig: it depends on amplitude in another way",
         _LADDER,
     ),
-    # No mass depends on the amplitude: it makes up for a law that does.
+    # A mass does not depend on the amplitude: it compensates for a law that does.
     (Pattern.AMPLITUDE, None, None): Meaning(
         "it compensates for an effect that depends on the motion and is missing or has another form", _LADDER
     ),
-    # What a load presses on rubs: the constant stands in a place where the equations do not have it.
+    # A load increases friction: the constant acts at a place where the equations do not contain it.
     (Pattern.CONSTANT, Role.DAMPING, None): Meaning(
         "friction depends on it, like the friction of a loaded joint, which the equations do not include",
         "Record three values of it with the same input.",

@@ -129,7 +129,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
         own.append(alone)
     values = np.array([fit.values[name] for name in free])
     made = Pieces(free, values, found.place, found.coordinates, found.error, tuple(whole), {})
-    # The memory with which a window begins sticks and slips: no straight line tells what it does.
+    # The initial state of a hysteresis sticks and slips: its effect is not linear.
     remembers = bool(np.any(context.problem(fit.structure, records[:1]).data.limited))
     if remembers or any(WINDOW in record.name for record in records):
         return made

@@ -51,7 +51,7 @@ class ParameterTrust:
     direction
         1 where it grows along `goes_with`, -1 where it falls, else 0.
     goes_with
-        With what it goes: ``"amplitude"``, the name of a constant, ``"time"``; of several that cannot be told apart all of them.
+        With what it goes: ``"amplitude"``, the name of a constant, ``"time"``; if several cannot be distinguished, all of them.
     points_to
         Likely cause and next experiment; None where it is stable.
     """
@@ -110,7 +110,7 @@ class Trust:
     parameters
         One each, those that differ first.
     entangled
-        Pairs that can hardly be told apart.
+        Pairs that can hardly be separated.
     """
 
     statement: str

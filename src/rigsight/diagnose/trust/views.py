@@ -127,7 +127,7 @@ def _by_level(alone: View, order: Order) -> View:
 
 def _portions(of: Pieces) -> View:
     count = of.portions
-    # What one number leaves of a record along which it changes is no noise of its parts.
+    # The residual of a common parameter in a record along which it changes is not noise of its parts.
     spectra = NoiseSpectra.of(of.cut[count])
     parts = [[piece for piece in of.cut[count] if piece.place[0] == i] for i in range(count)]
     labels = tuple(f"{_NAMES[TRUST.windows.index(count)]} {i + 1}" for i in range(count))

@@ -81,7 +81,7 @@ class Replicates:
         return sum(steps for _, steps in self._undisturbed)
 
     def responses(self, forces: Sequence[Floats]) -> list[Floats]:
-        """Return by how much forces at the joints change what is left of each record.
+        """Return the change of the residuals of each record by forces at the joints.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Replicates:
         return self._of_each_record(lambda i: self._response(i, forces[i], None))
 
     def with_noise(self, noise: Sequence[Floats]) -> list[Floats]:
-        """Return by how much noise of the sensors changes what is left of each record: itself, less what an observer makes of it.
+        """Return the change of the residuals of each record by sensor noise: the noise itself less the response of the observer.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Replicates:
         return self._of_each_record(lambda i: self._changed(i, None, noise[i]))
 
     def drawn(self, sources: Sources, n_replicates: int, rng: np.random.Generator) -> list[Floats]:
-        """Return changes of what is left of each record as forces and sensors of these sizes make them.
+        """Return random changes of the residuals of each record for forces and sensor noise of these sizes.
 
         Parameters
         ----------
@@ -144,7 +144,8 @@ class Replicates:
             if not record.observed:
                 return noise
             force = np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints), noise.shape[2]))
-        # What is left is the reading less its prediction. A force moves the reading; an observer's prediction follows the noise.
+        # The residual is the reading less its prediction. A force changes the reading; the prediction of an observer tracks the
+        # noise.
         sign = -1.0 if record.observed else 1.0
         return noise + sign * self._response(index, force, noise)
 

@@ -95,8 +95,8 @@ def likeliest_sources(
     Parameters
     ----------
     left
-        What a model leaves of each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout where
-        it was not measured.
+        Residuals of a model on each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout
+        where it was not measured.
     of_noise
         White noise of each sensor, shape (n_samples, n_replicates), and what it leaves of each record, shape (n_samples,
         n_outputs, n_replicates), both in units of the noise; outer sequence over sensors.

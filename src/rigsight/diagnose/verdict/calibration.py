@@ -41,11 +41,11 @@ class Situation:
     first_share
         Share of the first model in the ranking of those with an effect, 0 to 1.
     left, gap
-        What that model and what the re-identified equations leave, in units of the noise floor.
+        Errors of that model and of the re-identified equations, in units of the noise floor.
     n_effects
         Number of its effects.
     adequate
-        Whether what it leaves counts as noise and disturbance.
+        Whether its residual counts as noise and disturbance.
     lower_bound
         Whether the noise floor is only a lower bound.
     several_places
@@ -109,7 +109,7 @@ class Calibration:
         return _logistic(self.first, situation.figures())
 
     def probabilities(self, situation: Situation, shares: Sequence[float]) -> list[float]:
-        """Return the probability of each model with an effect; what is left of 1 is that of all else.
+        """Return the probability of each model with an effect; the rest to 1 is that of all other causes.
 
         Parameters
         ----------

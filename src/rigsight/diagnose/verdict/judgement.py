@@ -23,7 +23,7 @@ class Judgement:
 
 
 def most_left(gap: float) -> float:
-    """Return what a named cause may leave, in units of a measured noise floor, of a gap in the same units."""
+    """Return the error that a named cause may leave, in units of a measured noise floor, for a gap in the same units."""
     return min(max(VERDICT.least_left, 1.0 + VERDICT.left_of_gap * (gap - 1.0)), VERDICT.most_left)
 
 
@@ -46,18 +46,18 @@ def judge(
     best
         The best model with an effect.
     is_adequate
-        Says whether what a model leaves goes with nothing, see `adequacy`.
+        Says whether the residual of a model is correlated with nothing, see `adequacy`.
     cause
         Says how much of the gap the best model takes, and what contradicts it.
     lower_bound
-        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
-        may stand well above it, so that a modest rest which no model lowers is taken for noise.
+        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances may
+        stand well above it, so that a modest error that no model reduces is taken for noise.
     """
     at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
     helps = best.error_over_noise * VERDICT.worthwhile < reidentified.error_over_noise
     retuned = reidentified.error_over_noise * VERDICT.worthwhile < error_before
     needs_effect = helps and reidentified.error_over_noise > VERDICT.at_floor
-    # Numbers that were fitted to a record like the held-out ones suit them by chance where no numbers suit all records.
+    # Parameters fitted to a record similar to the held-out ones may fit these by chance although no parameters fit all records.
     if not needs_effect and (error_before <= VERDICT.at_floor or (error_before <= at_floor and not retuned)):
         return Judgement("none", reidentified, "The error of the given simulation is within the noise floor.")
     if not needs_effect and reidentified.error_over_noise <= at_floor:

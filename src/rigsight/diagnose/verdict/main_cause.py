@@ -20,18 +20,18 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class MainCause:
-    """How much of the re-identified gap a model takes.
+    """The share of the re-identified gap that a model explains.
 
     Attributes
     ----------
     share
         Of the squared gap above the noise floor.
     at_least
-        What it is in all but one of twenty resamplings of the records' stretches.
+        Lower limit of the share in 95 % of the resamplings of the records' stretches.
     contradicted_by
-        Models that are as good, act at other places and take another part of the gap.
+        Equally good models that act at other places and explain another part of the gap.
     equalled_by
-        Models that are as good and act at other places, but take the same part.
+        Equally good models that act at other places but explain the same part.
     """
 
     share: float
@@ -41,7 +41,7 @@ class MainCause:
 
     @property
     def clear(self) -> bool:
-        """True where the model surely takes the larger part and nothing that is as good contradicts it."""
+        """True if the model certainly explains more than half and no equally good model contradicts it."""
         return self.at_least > VERDICT.larger_part and not self.contradicted_by
 
 
@@ -53,7 +53,7 @@ def main_cause(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> MainCause:
-    """Say how much of what the equations leave a model takes.
+    """Determine the share of the residual of the equations that a model explains.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def main_cause(
     best
         The model with an effect.
     tied
-        Models whose held-out error cannot be told from that of the best.
+        Models whose held-out error does not differ significantly from that of the best.
     noise
         Noise floor of each output, shape (n_outputs,).
     rng

@@ -46,7 +46,7 @@ class Ranking:
     probabilities
         Of each to be the cause among those tried.
     tied
-        Models whose held-out error cannot be told from the chosen one's.
+        Models whose held-out error does not differ significantly from that of the chosen one.
     grounds
         What each probability rests on, in the same order.
     error_of_choice
@@ -72,8 +72,8 @@ def rank(
 ) -> Ranking:
     """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
 
-    Held-out errors say what an engineer sees, and little where noise or a force from outside leaves much of every model. There
-    the spectrum of what is left says more.
+    Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
+    model. Then the spectrum of the residual says more.
 
     Parameters
     ----------
@@ -84,11 +84,11 @@ def rank(
     rng
         Source of the resampling.
     gap
-        What the rig's own equations leave, re-identified, in units of the noise floor.
+        Error of the re-identified equations of the rig, in units of the noise floor.
     criterion
         Minus twice the log of a model's evidence, see `evidence`; None ranks by held-out errors alone.
     evidence_counts
-        False where what the likeliest model leaves is no noise: then evidence is told and ranks nothing.
+        False if the residual of the most likely model is not noise: then the evidence is reported but not used for the ranking.
 
     References
     ----------
@@ -108,7 +108,7 @@ def rank(
     best = float(np.min(errors))
     inexact = (VERDICT.model_error * max(best - 1.0, 0.0) + VERDICT.inexact * gap) / best
     tolerance = np.hypot(VERDICT.tie, inexact)
-    # Far above the floor no form is exact, and a small difference is no hint of the true one.
+    # Far above the floor no model is exact, and a small difference does not indicate the true one.
     fine = VERDICT.inexact + VERDICT.model_error * max(best - VERDICT.at_floor, 0.0) / best
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
@@ -208,9 +208,9 @@ def _likened(model: Scored, others: Sequence[Scored]) -> bool:
 
 
 def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
-    """Return True if a model stands beside a constant force that nobody knew of, where another explains that force too.
+    """Return True if a model needs an unknown constant force that another model explains.
 
-    Those whose mean force nothing asks for are no rivals, see `with_a_mean_that_is_needed`.
+    Models whose mean force is not needed have been removed before, see `same_equation`.
     """
     return any(
         other.n_free == model.n_free
@@ -223,7 +223,7 @@ def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
 
 
 def _unidentifiable_sensor_effect(model: Scored) -> bool:
-    """Return True for a linear effect of the sensor of a rig with one output: it is one of the drive in the same records."""
+    """Return True for a linear effect of the sensor of a rig with one output: it is equivalent to one of the drive."""
     one_output = len(model.fit.structure.rig.outputs) == 1
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
 

@@ -13,20 +13,21 @@ from rigsight.diagnose.pushes.alternatives import BY_RECORD
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the model of the verdict leaves above noise and disturbance.
+    """Error of the diagnosed model above noise and disturbance.
 
     Attributes
     ----------
     share
-        Of the squared gap of the re-identified equations; 0 where it goes with nothing and so counts as noise and disturbance.
+        Of the squared gap of the re-identified equations; 0 where it correlates with nothing and so counts as noise and
+        disturbance.
     where
-        Joint, drive or sensor at which it arises; empty where it goes with nothing, or with no place.
+        Joint, drive or sensor at which it arises; empty where it correlates with nothing, or with no place.
     goes_with
-        Signal, time or record; empty where it goes with nothing.
+        Signal, time or record with which it correlates; empty where there is none.
     p_value
-        Probability that noise and disturbance alone would agree as well with anything that was looked at.
+        Probability that noise and disturbance alone correlate this well with anything that was tested.
     beside_a_cause
-        True where the verdict names one: then what is left is something beside it.
+        True if the verdict names a cause: then the remaining error is in addition to it.
     """
 
     share: float
@@ -71,7 +72,7 @@ class Remainder:
 
 
 def _in_words(goes_with: str) -> str:
-    """Return with what a remainder goes as a part of a sentence."""
+    """Return the correlated signal as part of a sentence."""
     kind, _, what = goes_with.partition(BY_RECORD)
     return goes_with if kind else f"the record: {what} differs from record to record"
 
@@ -79,7 +80,7 @@ def _in_words(goes_with: str) -> str:
 def remainder_of(
     reidentified: Scored, model: Scored, found: Adequacy, lower_bound: bool, beside_a_cause: bool
 ) -> Remainder:
-    """Return what a model leaves.
+    """Return the remaining error of a model.
 
     Parameters
     ----------
@@ -88,9 +89,9 @@ def remainder_of(
     model
         The model of the verdict.
     found
-        Whether what it leaves goes with anything.
+        Whether its residual is correlated with anything.
     lower_bound
-        True if the noise floor is only a lower bound: then only what surely goes with something counts as remainder.
+        True if the noise floor is only a lower bound: then only a significant correlation counts as remaining error.
     beside_a_cause
         True where the verdict names one.
     """

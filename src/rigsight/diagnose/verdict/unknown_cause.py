@@ -17,7 +17,7 @@ from rigsight.rigs import Rig
 def force_of_one_motion(
     context: FitContext, reidentified: Scored, has_stiffness: bool, rng: np.random.Generator
 ) -> MissingForce | None:
-    """Return the shape of the force that a rig with one motion lacks; None for any other rig.
+    """Return the shape of the force missing on a rig with one motion; None for any other rig.
 
     There is none beside effects that are modelled already either: the rig's own terms do not stand alone there.
 
@@ -39,14 +39,14 @@ def force_of_one_motion(
 
 
 def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointForce, ...]:
-    """Return the force that would have to be missing at each joint, the likeliest first; none of a rig with one motion.
+    """Return the force that would have to be missing at each joint, the most likely first; none for a rig with one motion.
 
     There are none beside effects that are modelled already either.
 
     Parameters
     ----------
     context, reidentified
-        Records, of which the liveliest stretches are looked at, and the re-identified equations on them.
+        Records, of which the most excited stretches are used, and the re-identified equations on them.
     """
     if context.modelled or context.rig.has_one_motion:
         return ()
@@ -59,7 +59,7 @@ def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointFo
             context.noise,
         )
     except (SimulationError, np.linalg.LinAlgError):
-        # What is not known of the cause is no reason to have no diagnosis.
+        # A diagnosis is still useful if the missing force cannot be found.
         return ()
 
 

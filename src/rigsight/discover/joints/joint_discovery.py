@@ -95,7 +95,7 @@ def discover_at_joints(
     joints = missing_forces(task.rig, centered, known, task.noise, np.random.default_rng(seed))
     say("missing forces")
     found = [alone]
-    # The law of a joint that is ruled out is not polished.
+    # The law of a joint that is ruled out is not refitted.
     for force in not_contradicted(joints):
         if force.law.terms:
             start = {**known, **force.parameters}

@@ -38,7 +38,7 @@ STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _MOST_TERMS = 4
 _SAME_COLUMN = 1.0 - 1e-7
-"""Correlation of terms that no record of this length could tell apart; of others the likelihood decides."""
+"""Correlation above which terms cannot be distinguished by a record of this length; otherwise the likelihood decides."""
 _SAME_STIFFNESS = 0.5
 """Relative difference within which a coefficient is the stiffness of the spring: play leaves it as it is."""
 _WORTH = 0.05
@@ -330,7 +330,7 @@ def _law(
         std = {n: abs(share) * float(error) for n, share in candidate.linear.items()}
         if any(values[name] < named[name].lower for name in candidate.linear):
             return None
-        # What stands between motion and spring takes the spring's own stiffness off.
+        # An effect between motion and spring replaces the stiffness of the spring.
         if not candidate.linear and abs(value - stiffness) > _SAME_STIFFNESS * abs(stiffness):
             return None
         units = {n: rig.with_unit(p, found.joint.name).unit for n, p in named.items()}

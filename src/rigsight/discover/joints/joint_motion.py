@@ -190,7 +190,7 @@ def _sizes(
     size[:n] = np.where(size[:n] > 0.0, size[:n], np.max(moving) if moving.size else 1.0)
     size[n : 2 * n] = np.maximum(size[n : 2 * n], omega * size[:n])
     size = np.where(size > 0.0, size, 1.0)
-    # What a force has to be that moves its joint as far as it moves, within one radian of the motion.
+    # Size of a force that moves its joint by its motion within one radian of the motion.
     rates = (linear.transition[0] - np.eye(n_states)) / linear.dt
     for joint, (force, rate) in zip(rig.mechanism.joints, forces, strict=True):
         motion = joint_motion(equations.structure, joint)[0]

@@ -156,7 +156,7 @@ class Loop:
     column
         Rows of the loop's own deflection of all records, shape (n_rows,).
     share
-        Share of what the rig's own terms leave that the loop explains.
+        Share of the residual of the rig's own terms that the loop explains.
     """
 
     values: Mapping[str, float]
@@ -178,7 +178,7 @@ def best_loop(
     driven: bool,
     threads: IdleThreads,
 ) -> Loop | None:
-    """Return the loop that explains most of what the rig's own terms leave, None where none explains anything.
+    """Return the loop that explains most of the residual of the rig's own terms, None where none explains anything.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def best_loop(
         seen: dict[bytes, NDArray[np.float64]] = {}
 
         def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-            """Return what is left at a point and at a step along each axis: a few loops cost as much as one."""
+            """Return the residual at a point and at a step along each axis: a few loops cost as much as one."""
             key = theta.tobytes()
             if key not in seen:
                 seen.clear()

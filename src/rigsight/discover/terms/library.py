@@ -118,7 +118,7 @@ def candidates(
     driven: bool,
     threads: IdleThreads | None = None,
 ) -> list[Candidate]:
-    """Return one candidate per effect, at the inner values that explain most of what the rig's own terms leave.
+    """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ An assumption: ten times as much as for the direction itself; an arm with three 
 _TAKES_PART = 1e-9
 SMOOTHED = 15
 """Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
-record however fast it is sampled, and what a disturbance leaves of a resonance is some of them wide."""
+record however fast it is sampled, and the resonance excited by a disturbance is some of them wide."""
 
 
 def colored_covariance(

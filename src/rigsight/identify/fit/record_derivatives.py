@@ -153,7 +153,7 @@ def own_derivatives(
             there = theta + share * step
             there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
             tried = evaluated.sensitivities(there)[0]
-            # A motion that leaves the range of numbers is no improvement.
+            # A motion that diverges is no improvement.
             with np.errstate(over="ignore", invalid="ignore"):
                 if float(tried[0] @ tried[0]) < float(residual @ residual):
                     ahead = tried

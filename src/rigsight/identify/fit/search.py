@@ -19,7 +19,7 @@ from rigsight.identify.fit.fit_problem import Evaluation, Problem
 from rigsight.simulate import simulate_outputs
 
 FINE_TOLERANCE = 1e-6
-"""A search that stops at larger changes of the cost is a rough one: kinks are the least of what it leaves."""
+"""A search that stops at larger changes of the cost is only a rough one, for which kinks do not matter."""
 _SETTLED = 3e-3
 """Length of a step, in standard errors, after which no more are made: with steps that halve, a hundredth is left at most."""
 _MOST_STEPS = 20

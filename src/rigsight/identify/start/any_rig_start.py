@@ -99,7 +99,7 @@ def any_rig_start(
                 break
             pieces, whole = rough.lengthening(start)
             if pieces is not None and not rough.explains(whole):
-                # The motion is chaotic: no search finds values that a simulation of the whole could follow any better.
+                # The motion is chaotic: no search finds values with which a simulation of the whole record is better.
                 best = pieces
                 break
             found = min(found, whole, key=lambda fit: fit.cost)

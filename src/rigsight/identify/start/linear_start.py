@@ -58,7 +58,7 @@ def linear_start(
         return any_rig_start(rig, records, constants, known)
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
-        # A free decay is nothing but its ends, and this start takes those for what is to be left out.
+        # A free decay consists only of end terms, which this method treats as transients to be removed.
         return any_rig_start(rig, records, constants, {**_one_offset(rig), **known})
     records = driven
     found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)

@@ -104,7 +104,7 @@ class LinearizedResponses:
         driven = (through @ (b @ record.inputs).T[:, :, None])[:, :, 0].T
         answer = driven + d[record.seen] @ record.inputs
         left = (record.shown - answer) * record.weights
-        # What the ends add: one column for each state, and a constant for each sensor for what sampling makes of them.
+        # End terms: one column for each state, and a constant for each sensor for their aliasing.
         ends = np.moveaxis(through, 0, 1) * record.weights[:, :, None]
         own = np.eye(len(record.seen))[:, None, :] * record.weights[:, :, None]
         columns = np.concatenate([ends, own], axis=2).reshape(-1, n + len(record.seen))

@@ -15,7 +15,7 @@ _MOST_FACTORS = 6
 
 
 class MixedError(ValueError):
-    """Unknown parameters and signals cannot be told apart."""
+    """Unknown parameters and signals cannot be separated."""
 
 
 def parameter_products(

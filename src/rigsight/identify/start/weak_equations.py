@@ -177,7 +177,7 @@ class WeakEquations:
         return found
 
     def _separated(self, measured: MeasuredStates) -> tuple[list[_Term], list[_Term]]:
-        """Return the terms of all equations, and those in which signals and unknown parameters cannot be told apart."""
+        """Return the terms of all equations, and those in which signals and unknown parameters cannot be separated."""
         equations = self._equations
         structure = equations.structure
         symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))

@@ -107,9 +107,9 @@ def record_response(
     least_clearness
         Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
     with_coherence
-        False where nobody reads the coherence: it takes as long as a third of a local model.
+        False if the coherence is not needed: it takes a third of the time of a local model.
     wanted
-        Frequencies [rad/s] that somebody reads; a local method leaves out other lines. None for all.
+        Required frequencies [rad/s]; a local method skips other lines. None for all.
     instrument
         The reference of a closed loop: a local method divides the responses to it, unless the source does not answer it.
 

@@ -150,7 +150,7 @@ def find_layout(
     Raises
     ------
     InputError
-        If there are too many columns, or nobody can say which line holds their names.
+        If there are too many columns, or the line with their names cannot be determined.
     """
     looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
     last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]

@@ -37,7 +37,7 @@ def main(kind: str, path: Path) -> None:
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
-        # Who asked ends what runs in circles; if it was killed, nobody does.
+        # The calling process ends a reader that loops; if it was killed, nothing does.
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
     reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
     try:

@@ -133,14 +133,14 @@ def find_head(
     wanted
         Names that are asked for: the line that holds them holds the names.
     header
-        Whether there are names, or in which line they stand, counted from 1 in the file; None where nobody said so.
+        Whether there are names, or the line of the names, counted from 1 in the file; None if unspecified.
     number_of
         Number in the file of a line.
 
     Raises
     ------
     UnclearHeadError
-        If nobody can say which line holds the names.
+        If the line with the names cannot be determined.
     """
     if isinstance(header, int) and not isinstance(header, bool):
         return _told(dialect, lines, header, number_of)

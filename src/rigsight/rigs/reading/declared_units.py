@@ -11,7 +11,7 @@ _ENERGY = "J"
 
 
 def check_units_add_up(declaration: Declaration, order: list[Path]) -> None:
-    """Refuse units that nobody knows, or that do not add up.
+    """Reject unknown or inconsistent units.
 
     Parameters
     ----------

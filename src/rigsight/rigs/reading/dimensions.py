@@ -42,7 +42,7 @@ def dimension(unit: str) -> Dimension:
     Raises
     ------
     UnitError
-        If nobody knows the unit, or it is not the SI unit of what it measures: equations hold in SI alone.
+        If the unit is unknown, or is not the SI unit of its quantity: equations are in SI units only.
     """
     from pint.errors import PintError
 
@@ -195,7 +195,7 @@ class _Walk:
         if base is None or base == self._plain:
             return base
         power = constant(node.children[1])
-        # An exponent that is a parameter gives a unit that nobody can write down, and so do powers of powers.
+        # An exponent that is a parameter gives an undefined unit, and so do powers of powers.
         if power is None or max(abs(p * power) for p in base.values()) > _LARGEST_POWER:
             return None
         return base**power

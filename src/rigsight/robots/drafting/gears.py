@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import mujoco
 
 _DAMPING_RATIO = 0.1
-"""Of the rotor on the spring of its gear, where nobody knows the damping (**assumption**): steel is less damped, grease more."""
+"""Of the rotor on the spring of its gear, if the damping is unknown (**assumption**): steel is less damped, grease more."""
 
 
 def split_joints(

@@ -77,7 +77,7 @@ class Motion:
         y
             States.
         drives
-            What leaves each drive, in the unit of its input.
+            Output of each drive, in the unit of its input.
         resist
             Force of the law against each coordinate [N, N m].
         """

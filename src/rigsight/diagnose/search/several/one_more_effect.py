@@ -37,7 +37,7 @@ def with_one_more(
     context
         Records, scales and noise.
     parent
-        The model that leaves something.
+        The model that is extended.
     effects
         Candidates to add.
     known
@@ -47,7 +47,7 @@ def with_one_more(
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     least_share
-        Share of the squared remainder that pushes like those of one of the effects must take away for any of them to be tried.
+        Share of the squared residual that the pushes of one of the effects must explain for any of them to be tried.
     """
     open_ones = [
         effect

@@ -36,7 +36,7 @@ def grown(
     forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return models of two and three effects that close half or more of what the best with one less leaves, fitted and scored.
+    """Return fitted models of two and three effects that close at least half of the error of the best with one less.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def grown(
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= SEARCH.finest_steps]
     allowed = _half_closed(usable[0].error_over_noise)
-    # An effect that was left out of the singles, as another says the same, may still be half of a pair.
+    # An effect that was left out of the singles because another is equivalent may still be part of a pair.
     alone = {effect.name: np.inf for effect in effects} | {
         model.names[0]: model.error_over_noise for model in singles
     }
@@ -94,7 +94,8 @@ def grown(
             pairs += with_one_more(context, parent, forms.partners(parent, effects), pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     if best_pair is not None and best_pair.error_over_noise <= allowed:
-        # What came second may be right and the first only its relative: another as good alone may do better in its place.
+        # The second effect may be right and the first only similar to the right one: another equally good single effect may be
+        # better in its place.
         for second in (model for model in usable if model not in tried):
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
@@ -146,7 +147,7 @@ def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Sc
 
 
 def _half_closed(left: float) -> float:
-    """Return what one more effect may leave of what is left, in units of the noise floor."""
+    """Return the error that one more effect may leave, in units of the noise floor."""
     return left - VERDICT.larger_part * (left - 1.0)
 
 
@@ -160,7 +161,7 @@ def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect])
 def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
     """Return the singles, refitted where they do better from where they stand in a pair than from where they were found.
 
-    A second effect may do no more than lift a fit of the first over a ridge; without it the first then explains as much.
+    A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
 
     Parameters
     ----------
