@@ -18,7 +18,7 @@ from rigsight.workflow.progress_display import listening
 
 
 class EquationDiscoverer(CampaignEstimator):
-    """Discover the governing equations by sparse regression, polished in free run and chosen by held-out records.
+    """Discover the governing equations by sparse regression, refined by output-error fits and selected on held-out records.
 
     What ``rigsight discover`` does.
 

@@ -24,11 +24,11 @@ Table = Literal["records", "joint"]
 
 
 class IdentificationResult(Identification):
-    """The result of an identification, as it is in ``identification.json``, ready to be looked at."""
+    """The result of an identification, as it is in ``identification.json``, with plots, tables and files."""
 
     @classmethod
     def of(cls, found: Identification) -> Self:
-        """Return an identification of any origin, for instance of `run_identify`, ready to be looked at.
+        """Return an identification of any origin, for instance of `run_identify`, with plots, tables and files.
 
         Parameters
         ----------

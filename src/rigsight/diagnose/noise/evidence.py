@@ -119,9 +119,9 @@ class Evidence:
         return gained
 
     def _price_of_states(self, model: Scored) -> float:
-        """Return the price of a model's initial states: of each the logarithm of the number of samples that tell of it.
+        """Return the penalty of a model's initial states: for each, the logarithm of the number of samples that inform it.
 
-        That is the entropy of their leverages, the same for all states that move the readings alike.
+        This is the entropy of their leverages, the same for all states with the same effect on the readings.
         """
         found = self._context.on_all_records(model)
         answers = answers_to_states(self._context.problem(found.structure, self._context.records), found)
@@ -139,7 +139,7 @@ class Evidence:
         ]
 
     def _of_forces(self, reidentified: Scored) -> Linearization | None:
-        """Return how forces at the joints move the sensors; None where the equations have no slope."""
+        """Return the responses of the sensors to forces at the joints; None where the equations cannot be linearized."""
         structure = compose(with_probes(self._context.rig), self._context.modelled)
         values = {**reidentified.fit.values, **dict(reidentified.fit.structure.fixed), PUSH_SIZE: 1.0}
         try:

@@ -163,7 +163,7 @@ def fit_candidate(
 
 
 def refine(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Fit those models to full precision whose held-out error is close to the best; the best of them to the end."""
+    """Fit models with a held-out error close to the best to full precision, the best of them to convergence."""
     best = min((m.error_over_noise for m in models), default=float("inf"))
 
     def one(model: Scored) -> Scored:
@@ -206,7 +206,7 @@ def _refined(context: FitContext, model: Scored, max_evaluations: int) -> Scored
 
 
 def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool = True) -> Scored:
-    """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking.
+    """Fit a candidate to all records after its first look: carefully if it is promising, else only to rank it.
 
     `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
     """
@@ -232,7 +232,7 @@ def finished(context: FitContext, scored: Scored) -> Scored:
 
 
 def restarted(context: FitContext, settled: Scored) -> Scored:
-    """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
+    """Restart the fit from values suggested by its effects, as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
     for _ in range(SEARCH.most_restarts):
         if settled.error_over_noise <= VERDICT.exact:

@@ -22,7 +22,7 @@ _DAMPING_RATIO = 0.5
 
 
 def wave_starts(context: FitContext, effect: Effect, base: FitResult) -> Iterator[dict[str, float]]:
-    """Yield an effect's own values at the lines over the position that a fit without it leaves.
+    """Yield an effect's own values at the position-periodic lines in the residual of a fit without it.
 
     Parameters
     ----------

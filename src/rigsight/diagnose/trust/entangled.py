@@ -12,7 +12,7 @@ from rigsight.identify import FitResult
 
 
 def entangled(fit: FitResult) -> tuple[Entangled, ...]:
-    """Return the pairs of numbers whose errors go together, the closest first.
+    """Return the pairs of parameters with correlated errors, the highest correlation first.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from rigsight.rigs import Rig
 
 
 class Pattern(StrEnum):
-    """How a number differs."""
+    """Pattern in which a parameter differs."""
 
     STABLE = "stable"
     AMPLITUDE = "with amplitude"
@@ -34,7 +34,7 @@ class Pattern(StrEnum):
 
 
 class Role(StrEnum):
-    """What a number is in the equations."""
+    """Role of a parameter in the equations."""
 
     DAMPING = "damping"
     STIFFNESS = "stiffness"
@@ -47,14 +47,14 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a pattern points to.
+    """Likely meaning of a pattern.
 
     Attributes
     ----------
     cause
         Likely cause, a main clause without a full stop.
     experiment
-        What would tell, a sentence.
+        The experiment that would decide, a sentence.
     """
 
     cause: str
@@ -138,7 +138,7 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
 
 
 def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
-    """Return what a pattern points to, the most special entry first; None where nothing differs.
+    """Return the likely meaning of a pattern, from the most specific entry; None where nothing differs.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
     role
         What it is in the equations.
     direction
-        1 where it grows, -1 where it falls, 0 where it does neither.
+        1 if it rises, -1 if it falls, 0 otherwise.
     """
     for known_role, known_direction in ((role, direction), (role, None), (None, None)):
         found = _MEANINGS.get((pattern, known_role, known_direction))
@@ -157,7 +157,7 @@ def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
 
 
 def roles(rig: Rig, effects: Iterable[str]) -> dict[str, Role]:
-    """Return what each number is in the equations.
+    """Return the role of each parameter in the equations.
 
     Parameters
     ----------

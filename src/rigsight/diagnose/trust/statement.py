@@ -22,20 +22,20 @@ def statement(
     asked: Sequence[str],
     left_open: Sequence[str] = (),
 ) -> str:
-    """Return what is known of the numbers, in a few sentences.
+    """Return the statement on the parameters, in a few sentences.
 
     Parameters
     ----------
     numbers
         Those that differ first.
     pairs
-        Numbers that go together.
+        Correlated parameters.
     n_records
         Number of records.
     asked
         Kinds of groups that were compared.
     left_open
-        Numbers that all records together do not determine.
+        Parameters that all records together do not determine.
     """
     differing = [number for number in numbers if not number.stable]
     sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
@@ -63,7 +63,7 @@ def statement(
 
 
 def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
-    """Return numbers that differ in one way and point to one thing together, in their order."""
+    """Return parameters grouped by pattern and likely cause, in their order."""
 
     def way(number: ParameterTrust) -> tuple[str, tuple[str, ...], str]:
         return number.pattern, number.goes_with, number.points_to.cause if number.points_to else ""
@@ -86,7 +86,7 @@ def _differs(alike: Sequence[ParameterTrust]) -> str:
 
 
 def _course(number: ParameterTrust) -> str:
-    """Return how a number differs, with values at both ends of its course."""
+    """Return how a parameter differs, with values at both ends of its trend."""
     moves = number.moves
     if number.pattern is Pattern.WINDOW:
         return f"{number.name} {moves} when windows get shorter{_ends(number, number.groups[WINDOW_LENGTH], 'in')}"
@@ -165,7 +165,7 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked
 
 
 def _vagueness(number: ParameterTrust) -> float:
-    """Return the typical relative error of a number in groups; nothing of one that may be zero."""
+    """Return the typical relative error of a parameter in groups; zero for one that may be zero."""
     errors = [one.std for groups in number.groups.values() for one in groups]
     if not errors or abs(number.value) <= TRUST.may_be_zero * number.std:
         return 0.0

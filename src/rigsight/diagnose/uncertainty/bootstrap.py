@@ -62,7 +62,7 @@ class Uncertainty:
     method
         ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces, or not in reasonable time.
     sources
-        The forces and the noise that were drawn, noise in SI units; None for the formula.
+        The disturbance forces and the noise of the draws, noise in SI units; None for the formula.
     """
 
     std: dict[str, float]
@@ -171,7 +171,7 @@ def _size_at(
 ) -> float:
     """Return the white force at a joint that would cause about the whole residual; 0 where it shows in no sensor.
 
-    In small steps of size: friction that holds the mass hides a small force.
+    The size is increased in small steps, because sticking friction hides a small force.
     """
     name = context.rig.mechanism.joints[joint].name
     size = _FIRST * context.scales[f"force@{name}"]

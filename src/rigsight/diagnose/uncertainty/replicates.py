@@ -64,7 +64,7 @@ class Replicates:
 
     @cached_property
     def _undisturbed(self) -> list[tuple[Floats, int]]:
-        """Readings of each record without a force, and how many steps of integration they take."""
+        """Readings of each record without a force, and their number of integration steps."""
 
         def of_record(index: int) -> tuple[Floats, int]:
             record = self.context.estimation[index]
@@ -77,7 +77,7 @@ class Replicates:
 
     @property
     def n_steps(self) -> int:
-        """Steps of integration of one replicate: how long it takes, on any machine."""
+        """Integration steps of one replicate: a measure of its cost that does not depend on the computer."""
         return sum(steps for _, steps in self._undisturbed)
 
     def responses(self, forces: Sequence[Floats]) -> list[Floats]:

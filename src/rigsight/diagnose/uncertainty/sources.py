@@ -41,16 +41,16 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Sources:
-    """Sizes of what disturbs a rig and its sensors.
+    """Sizes of disturbance forces and sensor noise.
 
     Attributes
     ----------
     noise_std
         Of each sensor's white noise, shape (n_outputs,).
     force_std
-        Of each joint's force by its corner, shape (n_joints, n_corners), in the unit of the joint's force.
+        Of the force at each joint by corner frequency, shape (n_joints, n_corners), in the unit of the joint's force.
     corners
-        Angular frequency above which each falls [rad/s], infinite for white forces, shape (n_corners,).
+        Corner frequencies of the low-pass noise [rad/s], infinite for white forces, shape (n_corners,).
     """
 
     noise_std: Floats
@@ -76,7 +76,7 @@ class Sources:
 
 
 def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> Floats:
-    """Draw forces of variance 1 that fall above a corner [rad per sample], white ones for an infinite corner; time is axis 0."""
+    """Draw low-pass forces of variance 1 with a corner [rad per sample], white ones for an infinite corner; time is axis 0."""
     white = rng.standard_normal(shape)
     pole = np.exp(-corner)
     white[1:] *= np.sqrt(1.0 - pole**2)
@@ -90,7 +90,7 @@ def likeliest_sources(
     dts: Sequence[float],
     corners: Floats,
 ) -> Sources:
-    """Return the sizes of sources under which the spectra of a remainder are likeliest.
+    """Return the maximum likelihood sizes of sources from the spectra of a residual.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def likeliest_sources(
 
 
 def _likeliest(power: Floats, gains: Floats, weights: Floats) -> Floats:
-    """Return the powers of sources, shape (n_sources,), under which averaged lines, shape (n,), are likeliest.
+    """Return the maximum likelihood powers of sources, shape (n_sources,), from averaged spectral lines, shape (n,).
 
     Each update lowers the weighted sum of ``log(expected) + power / expected`` and keeps powers positive.
     """

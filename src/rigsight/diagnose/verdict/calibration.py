@@ -32,7 +32,7 @@ _STEEPEST = 6.0
 
 @dataclass(frozen=True)
 class Situation:
-    """What the probability of a verdict is told from.
+    """Figures from which the probability of a verdict is computed.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Situation:
     several_places: bool
 
     def figures(self) -> dict[str, float]:
-        """Return what the logistic models read, by name."""
+        """Return the inputs of the logistic models by name."""
         has_effect = self.verdict in ("effect", "unknown")
         share = min(max(self.first_share, 0.0), 1.0)
         log_odds = math.log((share + 1e-12) / (1.0 - share + 1e-12))
@@ -90,7 +90,7 @@ class Calibration:
         Coefficients by figure, with ``"intercept"``: that the cause is among the models tried, and that it is the first of them
         if it is.
     least_probability
-        Models at least so probable belong to the set; it holds the cause of nine trials in ten.
+        Models with at least this probability belong to the set, which contains the cause in nine trials of ten.
     n_trials
         Training trials.
     """
@@ -145,7 +145,7 @@ class Calibration:
 
 @functools.cache
 def trained() -> Calibration:
-    """Return the calibration that the package brings."""
+    """Return the calibration included in the package."""
     text = resources.files(__package__).joinpath(FILE).read_text(encoding="utf-8")
     return Calibration(**json.loads(text))
 

@@ -48,7 +48,7 @@ def judge(
     is_adequate
         Says whether the residual of a model is correlated with nothing, see `adequacy`.
     cause
-        Says how much of the gap the best model takes, and what contradicts it.
+        Says how much of the gap the best model explains, and what contradicts it.
     lower_bound
         True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances may
         stand well above it, so that a modest error that no model reduces is taken for noise.

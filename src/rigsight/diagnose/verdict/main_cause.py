@@ -83,7 +83,7 @@ def main_cause(
 
 
 def _common_part(reidentified: Scored, one: Scored, other: Scored, noise: NDArray[np.float64]) -> float:
-    """Return the share of what one model explains of the gap that another explains as well, of squares."""
+    """Return the share of the squared gap explained by one model that another explains too."""
     explained = differing = 0.0
     for gap, left, others_left in zip(reidentified.residuals, one.residuals, other.residuals, strict=True):
         explained += float(np.nansum(((gap - left) / noise) ** 2))

@@ -18,21 +18,21 @@ _AT_BOUND = 1e-6
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why a number of a fitted model is not believed; `grave` where it counts against the model."""
+    """Why a parameter of a fitted model is implausible; `grave` if it counts against the model."""
 
     text: str
     grave: bool
 
 
 def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
-    """Return what is implausible about a model's numbers.
+    """Return the implausible parameters of a model.
 
     Parameters
     ----------
     model
         Fitted and scored.
     reidentified
-        The re-identified equations, whose numbers are those of the rig without an effect.
+        The re-identified equations, with the parameters of the rig without an effect.
     """
     fit = model.fit
     parameters = {p.name: p for p in fit.structure.parameters}
@@ -69,7 +69,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
 
 
 def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:
-    """Return the ranking with a plausible model in front of an implausible one that is hardly better and at the same place.
+    """Return the ranking with a plausible model before an implausible one that is hardly better and at the same place.
 
     Parameters
     ----------

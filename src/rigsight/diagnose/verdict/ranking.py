@@ -18,7 +18,7 @@ from rigsight.effects.effect import Place
 
 @dataclass(frozen=True)
 class Grounds:
-    """What the probability of one model rests on.
+    """Basis of the probability of one model.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Grounds:
     held_out
         Share of the resamplings of the held-out errors in which it is the simplest of the best.
     evidence
-        Logarithm of its evidence, less that of the likeliest model [nats]; None where its fit was not finished.
+        Logarithm of its evidence relative to the most probable model [nats]; None where its fit was not finished.
     """
 
     share: float
@@ -44,15 +44,15 @@ class Ranking:
     order
         Models, the chosen one first, then by held-out error.
     probabilities
-        Of each to be the cause among those tried.
+        Probability of each to be the cause among those tried.
     tied
         Models whose held-out error does not differ significantly from that of the chosen one.
     grounds
-        What each probability rests on, in the same order.
+        Basis of each probability, in the same order.
     error_of_choice
-        What the model with the best held-out errors in a resampling leaves of the stretches that were not drawn, in units of the
-        noise floor, root mean square of all resamplings. Evidence, which knows all records, has no part in that choice. Not a
-        number where a model was chosen by other means, or nothing was left out.
+        Error, on the stretches not drawn in a resampling, of the model with the best held-out errors in it, in units of the noise
+        floor; RMS over all resamplings. Evidence, which uses all records, does not affect this selection. NaN if a model was
+        selected by other means, or nothing was left out.
     """
 
     order: tuple[Scored, ...]
@@ -173,7 +173,7 @@ def _error_of_choice(
 def _evidence_of(
     models: Sequence[Scored], errors: NDArray[np.float64], criterion: Callable[[Scored], float] | None
 ) -> list[float | None]:
-    """Return the log evidence of each model less that of the likeliest; None for those far off, not fitted to their end."""
+    """Return the log evidence of each model relative to the most probable one; None if not fitted to convergence."""
     if criterion is None:
         return [None] * len(models)
     told = [
@@ -197,7 +197,7 @@ def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[n
 
 
 def _likened(model: Scored, others: Sequence[Scored]) -> bool:
-    """Return True if an effect of this model is only another shape of one that a model with as many numbers has."""
+    """Return True if an effect of this model is only another form of one in a model with equally many parameters."""
     return any(
         other.n_free == model.n_free
         and len(other.effects) == len(model.effects)

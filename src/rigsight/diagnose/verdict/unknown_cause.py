@@ -64,9 +64,9 @@ def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointFo
 
 
 def traced_to(rig: Rig, forces: Sequence[JointForce]) -> tuple[str, ...]:
-    """Return the places of the only missing force that agrees with all sensors; empty where none or several do.
+    """Return the places of the only missing force that agrees with all sensors; empty if none or several agree.
 
-    Those are a joint, and the drives that act along its very motion.
+    These are a joint, and the drives that act along the same motion.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def grown(
 
     Returns
     -------
-    Each with the effect first that explains more by itself.
+    Each with the effect that explains more alone in first place.
     """
     usable = sorted(
         (m for m in singles if m.residuals and np.isfinite(m.error_over_noise)),
@@ -129,7 +129,7 @@ def grown(
 
 
 def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:
-    """Return models with the effect first that explains more by itself.
+    """Return models with the effect that explains more alone in first place.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect])
 
 
 def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
-    """Return the singles, refitted where they do better from where they stand in a pair than from where they were found.
+    """Return the singles, refitted where they are better from their values in a pair than from their own starts.
 
     A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
 
@@ -207,9 +207,9 @@ def _more_general(
     known: Sequence[Scored],
     prepare: Prepare | None,
 ) -> list[Scored]:
-    """Return the pairs in which an effect that contains one of the pair's stands in its place, fitted from there.
+    """Return the pairs in which one effect is replaced by a more general one, fitted from there.
 
-    Beside another effect a simpler relative may lead at a first look, as it has fewer numbers to find.
+    In combination with another effect a simpler form may lead at a first look, because it has fewer parameters to fit.
     """
     alone = {model.names[0]: model for model in singles}
     swaps = []
@@ -241,6 +241,6 @@ def _more_general(
 
 
 def _alike(one: Scored, other: Scored) -> bool:
-    """Return True if one is a special or limiting case of the other: what is missing beside them is the same."""
+    """Return True if one is a special or limiting case of the other: the effect missing in addition is the same."""
     parents = {name for model in (one, other) for effect in model.effects for name in effect.parents}
     return bool(parents & {*one.names, *other.names})

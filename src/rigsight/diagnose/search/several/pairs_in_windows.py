@@ -20,7 +20,7 @@ from rigsight.diagnose.search.starts import start_values
 def pairs_in_windows(
     context: FitContext, windows: FitContext, reidentified: Scored, pairs: Sequence[Scored]
 ) -> list[Scored]:
-    """Return the nearest pairs, fitted and scored in windows.
+    """Return the best pairs, fitted and scored in windows.
 
     Parameters
     ----------

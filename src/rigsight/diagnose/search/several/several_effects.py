@@ -50,7 +50,7 @@ def several_effects(
 
     Returns
     -------
-    Each with the effect first that explains more by itself.
+    Each with the effect that explains more alone in first place.
     """
     best = min(singles, key=lambda model: model.error_over_noise, default=None)
     is_excused = lower_bound and best is not None and best.error_over_noise <= VERDICT.at_lower_bound
