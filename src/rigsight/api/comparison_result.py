@@ -61,7 +61,7 @@ class ComparisonResult(Comparison):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
 
         Raises
         ------

@@ -87,7 +87,7 @@ class DiagnosisResult(Diagnosis):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
 
         Raises
         ------

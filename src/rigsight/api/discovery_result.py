@@ -46,7 +46,7 @@ class DiscoveryResult(Discovery):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
         """
         return discovery_figure(self)
 

@@ -58,7 +58,7 @@ class IdentificationResult(Identification):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class IdentificationResult(Identification):
         Parameters
         ----------
         table
-            ``"records"``: what each record shows by itself. ``"joint"``: the one set for all records.
+            ``"records"``: the estimates from each record alone. ``"joint"``: the one set for all records.
 
         Raises
         ------

@@ -28,7 +28,8 @@ from rigsight.rigs import Rig
 _CUTS = (80.0, 30.0)
 """Where the thesis cuts the response of the motion to the input, and of what follows it to the motion (4.3 and 4.5) [rad/s]."""
 _LEAST_CLEARNESS = 10.0
-"""Power over variance (10 dB) from which a measured line is compared; a fit asks for more, an error has its floor beside it."""
+"""Power over variance (10 dB) from which a measured line is compared; a fit needs more, while an error is shown with its
+floor."""
 _POLES: Mapping[Method, int] = {"local_rational": 2, "local_polynomial": 0}
 """Degree of the denominator that a local model of several inputs has."""
 _PER_NEPER = 20.0 / math.log(10.0)
@@ -153,7 +154,7 @@ def measured_responses(
 def _of_inputs(
     record: Record, paths: tuple[SignalPath, ...], method: Method
 ) -> tuple[dict[str, FrequencyResponse], list[str]]:
-    """Return the responses to each input that moves in a record; the others say nothing here."""
+    """Return the responses to each input that moves in a record."""
     found: dict[str, FrequencyResponse] = {}
     problems: list[str] = []
     moving = [path for path in paths if path.response in record and not is_constant(record[path.source])]

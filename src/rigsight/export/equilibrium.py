@@ -12,7 +12,7 @@ from rigsight.simulate.kinks import freeze, is_zero
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
 NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"
-"""What a file says that is asked for another one."""
+"""Message of a file if another equilibrium is requested."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from rigsight.frequency.signal_pair import (
 from rigsight.records.record import Hold, Record
 
 SPARE = 6
-"""Equations beyond the unknowns in the narrowest band chosen by itself: a variance from fewer is a lottery."""
+"""Equations in excess of the unknowns in the narrowest automatic band: with fewer, the variance is unreliable."""
 _CHUNK = 4096
 _RANK = 1e-11
 """Relative singular value below which two terms of a local model are the same."""

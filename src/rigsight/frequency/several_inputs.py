@@ -299,7 +299,7 @@ class _LocalModels:
             picked = np.clip(center - width // 2, 0, s.omega.size - width)[:, None] + np.arange(width)
             r = (s.omega[picked] - omega[:, None]) / reach
             powers = r[..., None] ** np.arange(max(n_terms, self._poles + 1))
-            # Beyond its last line a record says nothing.
+            # A record has no information beyond its last line.
             heard = (omega <= s.omega[-1])[:, None, None]
             near_inputs = np.moveaxis(s.inputs[self._moving][:, picked], 0, 2)
             near = np.where(heard, lines[picked][..., None], 0.0)

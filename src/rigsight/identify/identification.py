@@ -46,7 +46,7 @@ class PathIdentification:
 
 @dataclass(frozen=True, eq=False)
 class RecordIdentification:
-    """What one estimation record shows by itself.
+    """Results of one estimation record alone.
 
     Attributes
     ----------

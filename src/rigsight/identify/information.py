@@ -53,7 +53,7 @@ class Information:
 
 
 def information(fit: GreyBoxFit, result: FitResult) -> Information:
-    """Return what the records of a fit say of its parameters.
+    """Return the information of the records of a fit on its parameters.
 
     Parameters
     ----------

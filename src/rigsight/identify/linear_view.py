@@ -183,7 +183,7 @@ def linear_view(
     measured
         Their frequency responses.
     known
-        What the records say of the parameters.
+        Information of the records on the parameters.
 
     Raises
     ------

@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 
 
 def marginal_errors(root: Floats) -> Floats:
-    """Return the standard error of each coordinate, infinite where it takes part in what nothing is known of."""
+    """Return the standard error of each coordinate, infinite if it has a component in an undetermined direction."""
     _, singular, right = np.linalg.svd(root, full_matrices=True)
     sizes = np.zeros(root.shape[1])
     sizes[: singular.size] = singular

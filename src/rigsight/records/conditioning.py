@@ -51,7 +51,7 @@ class TimeBase:
     def resample(self, samples: NDArray[np.float64], hold: Hold | None = None) -> NDArray[np.float64]:
         """Return samples on the even grid, shape (n_samples,).
 
-        An input is interpolated as its `hold` says it ran between the samples; None is an output, smooth by nature.
+        An input is interpolated according to its `hold`; None is an output, smooth by nature.
         """
         if self.stamps is None or hold == "zoh":
             return samples

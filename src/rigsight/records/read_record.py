@@ -208,7 +208,7 @@ def read_stretches(
         found.append(
             f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, because nothing drives the rig."
         )
-    # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
+    # If nothing drives the rig and nothing was measured, only time gives the number of samples.
     kept = [*raw] or [TIME]
     measured = [output.name for output in outputs if output.name in raw] if require_outputs else []
     cut = stretches(path.name, TIME, table, measured)

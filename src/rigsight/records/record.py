@@ -52,7 +52,7 @@ class Record:
     observed
         Bandwidth [rad/s], by sensor, of the observer that pulls a simulation towards what was measured while it is fitted.
     free_offsets
-        Outputs whose sensor has an offset of its own in this record: a fit estimates it as it does the state at the beginning.
+        Outputs whose sensor has its own offset in this record: a fit estimates it together with the initial state.
 
     Raises
     ------

@@ -28,7 +28,7 @@ from rigsight.report.wording import (
 
 @dataclass(frozen=True)
 class NotebookTable:
-    """A table of texts; `heads` may be empty, the first cell of a row says what the row is of."""
+    """A table of texts; `heads` may be empty, the first cell of a row is its label."""
 
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]

@@ -82,7 +82,7 @@ class LaboratoryBench:
 
     @cached_property
     def noise(self) -> dict[str, float]:
-        """What a sensor by itself adds to each reading."""
+        """Noise that a sensor adds to each reading."""
         by_size = math.hypot(self.around.noise, self.around.step / math.sqrt(12.0))
         return {signal.name: by_size * self.sizes[signal.name] for signal in self.rig.outputs}
 

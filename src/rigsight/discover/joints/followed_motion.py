@@ -79,7 +79,7 @@ class FollowedMotion:
     jumps: list[NDArray[np.bool_] | None] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep the values known beforehand, to which an estimate is held where the records say nothing."""
+        """Keep the prior values, to which an estimate is held where the records do not determine it."""
         self.known = dict(self.values)
         self.jumps = [None] * len(self.motions)
 

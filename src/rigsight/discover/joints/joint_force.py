@@ -208,7 +208,7 @@ def missing_forces(
 
 
 def not_contradicted(forces: Sequence[JointForce]) -> tuple[JointForce, ...]:
-    """Return the missing forces that the sensors contradict no more than a few times as much as the one they contradict least.
+    """Return the missing forces whose error over all sensors is at most a few times that of the best one.
 
     Parameters
     ----------

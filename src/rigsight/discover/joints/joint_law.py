@@ -81,7 +81,7 @@ class LawTerm:
         return f"{shape} ({kind}: {numbers})"
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; what stands inside a term has no standard error of its own, nor has what is not determined."""
+        """Return plain data; nonlinear and undetermined parameters have no standard error."""
         known = {name: std for name, std in self.std.items() if math.isfinite(std)}
         return {
             "name": kind_of(self.effect.name),

@@ -176,7 +176,7 @@ def _sizes(
     linear: LinearizedMotion,
     omega: float,
 ) -> Floats:
-    """Return the size of every state: what the sensors say of it, by its rate or by its coordinate, else that of the others."""
+    """Return the size of every state: from sensors of it, its rate or its coordinate, else from the other states."""
     seen = np.max(np.abs(linear.seen), axis=0)
     spreads = np.array(
         [max((float(np.std(r[s.name])) for r in records if s.name in r), default=0.0) for s in rig.outputs]

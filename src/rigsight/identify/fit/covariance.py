@@ -100,7 +100,7 @@ def sandwich_covariance(
     known = vectors[:, seen]
     inverse = (known / eigenvalues[seen]) @ known.T
     covariance = inverse @ (filling / np.outer(size, size)) @ inverse / np.outer(size, size)
-    # A coordinate that takes part in an unseen direction may be anything, however well its share in the seen ones is known.
+    # A coordinate with a component in an undetermined direction is undetermined, however well its other components are known.
     takes_part = max(_TAKES_PART, (_MIXED * derivative_error) ** 2)
     undetermined = np.sum(vectors[:, ~seen] ** 2, axis=1) > takes_part
     covariance[undetermined, :] = 0.0

@@ -179,7 +179,7 @@ class Problem:
     def _put_together(
         self, products: NDArray[np.float64], projections: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what all records say of all coordinates, given what each says of the parameters and its own initial states.
+        """Return the normal equations of all coordinates from those of each record for the parameters and its own initial states.
 
         Parameters
         ----------

@@ -246,7 +246,7 @@ class GreyBoxFit:
         return self._result(together, *outcome, finish=True)
 
     def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
-        """Return what the records say of parameters at their start, with all initial states as unknown as they are.
+        """Return the information of the records on parameters at their start, with unknown initial states.
 
         The Fisher information of relative changes, of changes in units of their size where a value is zero; NaN where the start
         cannot be simulated.

@@ -85,7 +85,7 @@ def any_rig_start(
         return dict(known)
     defaults = {p.name: p.default for p in sought if p.default is not None}
     if rig.mechanism.bodies_are_nonlinear and len(defaults) == len(sought):
-        # Another program answers to these numbers, so the error of its equations costs as much as simulations do.
+        # Another program evaluates these equations, so their error is as costly as simulations.
         return {**known, **defaults}
     values = {**constants, **known}
     rough = _Rough(rig, records, values, [p.name for p in sought])
@@ -207,7 +207,7 @@ class _Rough:
         for record in self._records:
             edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
             pieces += [record.slice(int(a), int(b)) for a, b in pairwise(edges)]
-        # Each has an initial state of its own: of many, some say enough.
+        # Each has its own initial state: of many, some are sufficient.
         if count > 1:
             pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
         problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
@@ -216,7 +216,7 @@ class _Rough:
 
 
 def _told(information: Floats, free: Sequence[str]) -> list[str]:
-    """Return parameters that the records tell if the others are held: as many as they tell combinations."""
+    """Return as many parameters as the records determine combinations; they are determined if the others are held."""
     if not np.all(np.isfinite(information)):
         return list(free)
     values, vectors = np.linalg.eigh(information)

@@ -28,7 +28,7 @@ from rigsight.rigs import Follower, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _UNKNOWN = 1.0
-"""Value of a parameter of which the records say nothing."""
+"""Value of a parameter that the records do not determine."""
 _STILL = 1e-12
 """Range of a signal relative to its size that is rounding."""
 

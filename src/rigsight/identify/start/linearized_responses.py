@@ -31,8 +31,8 @@ _USABLE_BAND = 0.8
 _MOST_LINES = 200
 """Lines of all records together, evenly chosen among those that say something."""
 _RELATIVE_ERROR = 0.05
-"""Share of each line by which a linearization may be beside it: weak lines then count as much as strong ones, and a resonance
-that is not yet where it belongs does not outweigh all else."""
+"""Relative error of each line that a linearization may have: weak lines then count as much as strong ones, and a resonance that
+is not yet where it belongs does not outweigh all else."""
 
 
 @dataclass(frozen=True)

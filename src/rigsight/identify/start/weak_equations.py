@@ -94,7 +94,7 @@ class WeakEquations:
     equations
         The rig's.
     records
-        Estimation records; those that do not show all states say nothing here.
+        Estimation records; those that do not show all states are not used here.
     values
         Value of each known constant and parameter.
     free

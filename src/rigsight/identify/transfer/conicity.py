@@ -95,7 +95,7 @@ def estimate_conicity(
     value = _bounded(c_y, largest, r_0, b)
     unbounded = _unbounded(c_y, largest, r_0, b)
     slope = abs(conicity_slope(value if unbounded is None else unbounded, r_0, b))
-    # At its maximum c_y is flat in delta_0, and the delta method says nothing.
+    # At its maximum c_y is flat in delta_0, and the delta method fails.
     error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
     percent = f"{100.0 * level:g} %"
     if low_c >= 1.0:

@@ -99,7 +99,7 @@ def _order(data: bytes) -> str:
 
 
 def _unpacked(packed: memoryview, order: str, file: str) -> bytes:
-    """Return the one element inside a compressed one; no more is unpacked than it says it has."""
+    """Return the one element inside a compressed one; no more is unpacked than it declares."""
     unpacker = zlib.decompressobj()
     head = unpacker.decompress(packed, 8)
     if len(head) < 8:

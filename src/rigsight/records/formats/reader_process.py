@@ -41,7 +41,7 @@ def main(kind: str, path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
     reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
     try:
-        # Before the limit: what libraries set aside for their threads is no matter of the file.
+        # Before the limit is set: memory that libraries reserve for their threads does not depend on the file.
         import_module(PACKAGES[kind])
         limit_memory(most_memory(path))
         with contextlib.contextmanager(reader)(path) as file:

@@ -48,7 +48,7 @@ class Head:
 
 
 class UnclearHeadError(ValueError):
-    """Nobody can say which line holds the names; the text says what stands there and what to write."""
+    """The line with the names cannot be determined; the text describes the lines and what to write."""
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def _names_time(cell: str) -> bool:
 
 
 def _names_in(dialect: Dialect, lines: Sequence[str], block: range, wanted: Collection[str]) -> int:
-    """Return which of several lines of words holds the names: what is asked for, a time, or what has units below it."""
+    """Return which of several lines of words contains the names: by requested names, a time, or units below it."""
     rows = {i: dialect.cells(lines[i]) for i in block}
     held = {i: len(set(cells) & set(wanted)) for i, cells in rows.items()}
     most = [i for i in block if held[i] == max(held.values())]

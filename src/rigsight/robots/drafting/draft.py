@@ -46,7 +46,7 @@ class Gear:
 
 @dataclass(frozen=True)
 class RigDraft:
-    """A rig file that says what a MuJoCo model says.
+    """A rig file equivalent to a MuJoCo model.
 
     Attributes
     ----------
