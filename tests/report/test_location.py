@@ -99,7 +99,7 @@ def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagn
     unknown = replace(variant("unknown"), missing_force=None, joint_forces=forces)
     assert missing_force_sentence(unknown).startswith(
         "A missing force at load or motor alone, of any shape over time, would leave an error of 0.95 × the noise floor over "
-        "all sensors (at shaft 145). No law of the motion of load"
+        "all sensors (at shaft 145). No function of the motion of load"
     )
     page = words(render(unknown))
     assert "motor 1.2 × not a function of the motion shaft 145 × ruled out by the sensors" in page
