@@ -129,7 +129,7 @@ def test_simulate_converts_units_and_asks_about_those_in_names(
     code, stdout, _ = run(*asked)
     assert code == 0
     assert "Note: drive.csv, column 't_ms': values taken as s without conversion" in stdout
-    assert "Note: drive.csv, column 'F_kN': taken in N as it stands" in stdout
+    assert "Note: drive.csv, column 'F_kN': values taken as N without conversion" in stdout
     assert "--unit u=kN" in stdout
     code, stdout, _ = run(*asked, "--unit", "t=ms", "--unit", "u=kN")
     assert (code, "Note" in stdout) == (0, False)
