@@ -34,13 +34,13 @@ def read_channels(
     Parameters
     ----------
     path
-        A measurement file that is no delimited text.
+        A measurement file other than delimited text.
     columns
-        Signal name, or `time`, -> where it stands.
+        Signal name, or `time`, -> its column.
     time
         Name of the time among them.
     time_is_mapped
-        True if a user said where it stands, so that it has to stand there.
+        True if the user mapped it, so that the column must exist.
     optional
         Signals that may be missing.
     dt
@@ -49,7 +49,7 @@ def read_channels(
     Raises
     ------
     InputError
-        Naming file and channel, and the mend.
+        If a channel cannot be used; the message gives file, channel and the remedy.
     """
     with open_channels(path) as file:
         found = {
@@ -83,7 +83,7 @@ def read_channels(
 def _find(
     path: Path, file: ChannelFile, signal: str, mapping: ColumnMapping, optional: bool
 ) -> Channel | None:
-    """Return the channel that a mapping names, by full name, by name without group, or by number."""
+    """Return the channel of a mapping, by full name, by name without group, or by number."""
     channels = file.channels
     if isinstance(mapping.name, int):
         if 1 <= mapping.name <= len(channels):

@@ -47,12 +47,12 @@ class UnknownUnitError(ValueError):
 
 
 def factor(unit: str, si: str) -> float:
-    """Return what one `unit` is in the unit `si`, an angle never taken for a plain number.
+    """Return the factor from `unit` to `si`; angles are not treated as dimensionless.
 
     Raises
     ------
     UnknownUnitError
-        If the unit is not known or measures something else.
+        If the unit is unknown or of another quantity.
     """
     unit = unit.strip()
     if unit == si:
@@ -92,12 +92,12 @@ def _registry() -> Any:
 
 
 def has_si(unit: str) -> bool:
-    """Return True if a rig's signal has a unit of its own; some take their input in any."""
+    """Return True if a rig's signal has a fixed unit; some accept their input in any unit."""
     return unit != INPUT_UNIT
 
 
 def in_drive_unit(unit: str) -> tuple[float, str] | None:
-    """Return what one `unit` of a drive is in its SI unit, and that unit: kN is 1000 N. None where it is no unit of a drive."""
+    """Return the factor from a unit of a drive to its SI unit, and that unit; None if it is not a unit of a drive."""
     for si in DRIVES:
         with contextlib.suppress(UnknownUnitError):
             return factor(unit, si), si
@@ -111,7 +111,7 @@ def _drive_of(unit: str | None) -> str | None:
 
 
 def is_a(unit: str, si: str) -> bool:
-    """Return True if a unit as a file states it measures the same as `si`."""
+    """Return True if a unit stated in a file has the same dimension as `si`."""
     try:
         factor(unit, si)
     except UnknownUnitError:
@@ -120,7 +120,7 @@ def is_a(unit: str, si: str) -> bool:
 
 
 def is_unit(text: str) -> bool:
-    """Return True if a text is a unit, of whatever."""
+    """Return True if a text is a unit of any quantity."""
     try:
         _ratio(text, text)
     except UnknownUnitError:
@@ -131,7 +131,7 @@ def is_unit(text: str) -> bool:
 def si_mapping(
     file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None
 ) -> tuple[ColumnMapping, tuple[str, ...]]:
-    """Return a mapping with the scale that makes SI of a column, and notes on what was converted.
+    """Return a mapping with the scale from a column to SI, and notes on the conversion.
 
     Parameters
     ----------
@@ -140,9 +140,9 @@ def si_mapping(
     signal, si
         The rig's signal and its unit.
     mapping
-        What the campaign says: scale and offset win, then its unit, then the file's.
+        Mapping in the campaign: scale and offset take precedence, then its unit, then the unit of the file.
     stated
-        Unit that the file states, None where it states none.
+        Unit stated in the file, None if there is none.
 
     Raises
     ------

@@ -83,18 +83,18 @@ def check_long_enough(file: str, n_samples: int) -> None:
 def time_base(
     stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str = "line"
 ) -> TimeBase:
-    """Return the even grid on which the stamps lie.
+    """Return the even grid of the time stamps.
 
     Parameters
     ----------
     stamps
-        Time stamps as they stand in the file, shape (n_samples,).
+        Time stamps in the file, shape (n_samples,).
     lines
         Line number of every stamp, shape (n_samples,).
     file
         Name for messages.
     row
-        What messages call a row.
+        Name of a row in messages.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def time_base(
 
 
 def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the samples behind which others are missing; none where the steps vary everywhere, which is jitter.
+    """Return the samples after which others are missing; none if the steps vary everywhere (jitter).
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ def read_record(
     Raises
     ------
     InputError
-        As `read_stretches`, and where the clock of the file pauses.
+        As `read_stretches`, and if the time axis has gaps.
     """
     return read_stretches(path, inputs, outputs, at_pauses="refuse", **options)[0]
 
@@ -104,7 +104,7 @@ def read_stretches(
     beside: Sequence[str] = (),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
-    """Read, check and repair the stretches of a record between the pauses of its clock; mostly there is one.
+    """Read, check and repair the stretches of a record between gaps in its time axis; usually there is only one.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def read_stretches(
     constant_inputs
         Input that the file does not hold -> its value throughout [SI].
     moving_inputs
-        Names of the inputs without whose motion nothing can be learned: a motion that is prescribed.
+        Names of the inputs that must change for an identification: a prescribed motion.
     name
         How results call the record, by default the file's name without its ending.
     role, kind, amplitude, hold
@@ -137,14 +137,14 @@ def read_stretches(
     constants
         See `Record`.
     beside
-        Names of signals that are none of the rig's; they are read where the file has them, in whatever unit.
+        Names of signals that do not belong to the rig; they are read if the file has them, in any unit.
     at_pauses
-        Whether a pause parts records, or makes the file unusable.
+        Whether a gap splits the record, or makes the file unusable.
 
     Raises
     ------
     InputError
-        Naming file, line or column, and the mend, for whatever makes the record unusable.
+        If the record is unusable; the message gives file, line or column, and the remedy.
     """
     columns = columns or {}
     time = columns.get(TIME, ColumnMapping(TIME))

@@ -68,8 +68,8 @@ def resampled(
 ) -> Resampled:
     """Return the signals on the even axis that all of them cover.
 
-    Inputs are interpolated as their hold says they ran between the samples, outputs, smooth by nature, by cubic splines. An
-    axis coarser than the samples is refused: what lies above its Nyquist frequency would fold into the record.
+    Inputs are interpolated according to their hold, outputs, which are smooth, by cubic splines. An axis coarser than the samples
+    is rejected, because content above its Nyquist frequency would alias.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class NamedSignal(Protocol):
 
 
 def check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: bool) -> None:
-    """Refuse inputs that are missing where the rig was driven, or where a column may well be one of them."""
+    """Reject missing inputs if the rig was driven, or if a column may be one of them."""
     names = [name for name in table.names if name not in table.labels.values()]
     is_free = is_free and not all(name.isdecimal() for name in (*names, *table.labels.values()))
     for signal in absent:
@@ -48,7 +48,7 @@ def check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: 
 
 
 def alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]:
-    """Tell of a column that was not read although it is called nearly like an output that is missing: a slip of the pen."""
+    """Report an unread column whose name is similar to that of a missing output: possibly a typing error."""
     unread = [name for name in table.names if name not in table.labels.values()] if missing else []
     return [
         f"{path.name}: has no column '{signal}', so {signal} counts as not recorded in this file.{hint} Map it under columns if "
@@ -59,12 +59,12 @@ def alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]
 
 
 def listed_columns(table: Columns) -> str:
-    """Return how a file calls its columns, for a message."""
+    """Return the names of the columns of a file for a message."""
     return ", ".join(f"'{name}'" for name in table.names[:_LISTED]) or "none"
 
 
 def refuse_implausible(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
-    """Refuse numbers that are bytes of another type, or a lost sign of a decimal."""
+    """Reject implausibly large numbers, from a wrong data type or a lost decimal point."""
     for signal, samples in raw.items():
         largest = float(np.max(np.abs(samples)))
         if largest > LARGEST_NUMBER:
@@ -121,7 +121,7 @@ def rest_notes(
 
 
 def clipping_notes(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> list[str]:
-    """Tell of signals that are cut off at their extremes."""
+    """Report clipped signals."""
     return [
         f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples are exactly at its "
         f"extreme {level:g}. Check range and saturation of sensor, amplifier or drive."

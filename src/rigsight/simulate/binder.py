@@ -24,7 +24,7 @@ class Binder:
     unique
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
-        Values of parameters that stand in the equations as numbers.
+        Values of parameters that appear in the equations as numbers.
     """
 
     def __init__(

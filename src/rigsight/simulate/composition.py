@@ -43,7 +43,7 @@ def compose(
     Raises
     ------
     InputError
-        If an effect makes no sense on this rig or is given twice.
+        If an effect does not apply to this rig or is given twice.
 
     Notes
     -----

@@ -52,7 +52,7 @@ def equation_tree(
     unique
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
-        Values of parameters that stand in the equations as numbers.
+        Values of parameters that appear in the equations as numbers.
     offsets
         Sensors whose readings are shifted, each by a state that never changes.
     observed

@@ -94,7 +94,7 @@ def simulate(
     InputError
         If `before` is not samples of each of the rig's inputs.
     SimulationError
-        If the motion leaves the range of numbers or the model is too stiff.
+        If the motion diverges or the model is too stiff.
     """
     if before is not None:
         earlier = _before(structure, before)
@@ -197,7 +197,7 @@ def simulate_outputs(
     Raises
     ------
     SimulationError
-        If the motion leaves the range of numbers or the model is too stiff.
+        If the motion diverges or the model is too stiff.
     """
     held, p = read_ahead(structure, held, p)
     status, out, _ = kernel_of(structure).simulate_one(

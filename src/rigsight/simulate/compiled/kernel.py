@@ -140,7 +140,7 @@ class Kernel:
         Returns
         -------
         status
-            0, or why it stopped: 1 for too many steps, 2 for a motion beyond the range of numbers, 3 for lack of memory.
+            0, or why it stopped: 1 for too many steps, 2 for a diverging motion, 3 for lack of memory.
         out
             What is computed at each sample, shape (n_samples, n_computed).
         state
