@@ -23,6 +23,6 @@ def test_what_a_message_quotes_does_not_reach_the_terminal_as_a_command(sign: st
 
 
 def test_values_that_python_does_not_write_out_are_shown_by_their_type() -> None:
-    assert shown(16**9000) == "a int that is too large to be shown"
+    assert shown(16**9000) == "a int too large to be shown"
     assert shown("a") == "'a'"
     assert len(shown("x" * 10_000)) < 400

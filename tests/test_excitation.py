@@ -81,7 +81,7 @@ def test_a_stepped_sine_gives_every_frequency_its_whole_periods() -> None:
         np.testing.assert_allclose(signal[turn], 1.5 * np.sin(one * (T[turn] - start)), atol=1e-9)
     assert np.all(signal[ends[-1] < T] == 0.0)
     assert np.max(np.abs(np.diff(signal))) < 1.01 * 1.5 * omega[-1] * T[1]
-    with pytest.raises(InputError, match="give more time"):
+    with pytest.raises(InputError, match="give a longer duration"):
         stepped_sine(T, 1.0, omega, cycles=100)
     with pytest.raises(InputError, match="highest frequency must be above 0"):
         stepped_sine(T, 1.0, np.array([1.0, 5000.0]))

@@ -69,7 +69,7 @@ class Truth:
         self._held = held
         self._atol = RTOL * np.maximum(sizes, 1e-290)
         self._delay = 0.0 if structure.delay is None else float(structure.delay.xreplace(numbers))
-        late = structure.measured_late
+        late = structure.first_shown_late
         self._late = 0.0 if late is None else float(late.xreplace(numbers))
         self._longest = longest
         self._modes = [1.0] * len(frozen.modes)

@@ -31,7 +31,7 @@ DECLARATIONS: tuple[dict[str, Any], ...] = (
         ],
         "states": [{"symbol": "z", "rate": ["-", "v", ["/", "z", "T_z"]], "dimension": "x", "limit": "T_z"}],
         "searched_as": [{"first": "k_z", "second": "T_z", "sum_range": [0.0, 1.0], "difference_range": [-1.0, 1.0]}],
-        "special_cases": {"k_z": 0.5}, "elastic_share": "k_z",
+        "special_cases": {"k_z": 0.5}, "post_yield_stiffness_ratio": "k_z",
     },
     {
         "name": "my_delay", "place": "actuator", "summary": "The input is late.", "energy": "active", "signature": "steady",
@@ -41,7 +41,7 @@ DECLARATIONS: tuple[dict[str, Any], ...] = (
     },
 )  # fmt: skip
 """Sound ones."""
-_EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "measured_late")
+_EXPRESSIONS = ("torque", "spring", "deflection", "drive", "delay", "lateral", "measured", "reading_delay")
 _FUNCTIONS = {
     "Abs": sp.Abs, "sign": sp.sign, "exp": sp.exp, "log": sp.log, "tanh": sp.tanh, "gamma": sp.gamma, "Max": sp.Max,
     "f": sp.Function("f"), "floor": sp.floor,

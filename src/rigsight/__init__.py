@@ -1,6 +1,7 @@
 """Diagnosis of the gap between a test rig and its simulation: where it lies, what causes it, how far it shrinks.
 
-``import rigsight as rs`` offers what the commands do. Nothing is loaded before a name is used: command lines answer at once.
+``import rigsight as rs`` exports the functions of the commands. Modules are loaded only when a name is used, so that the command
+line starts quickly.
 """
 
 from __future__ import annotations

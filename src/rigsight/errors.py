@@ -43,7 +43,7 @@ def shown(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):
         # Python writes out neither whole numbers of thousands of digits nor the deepest nests.
-        text = f"a {type(value).__name__} that is too large to be shown"
+        text = f"a {type(value).__name__} too large to be shown"
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
 
 

@@ -58,7 +58,7 @@ BROKEN: dict[str, tuple[Change, tuple[str, ...]]] = {
     "rig file outside": (replaced(toml, "train.toml", "../train.toml"), ("rig.file", "leaves the campaign's")),
     "rig file linked": (linked, ("rig.file", "is a link that leaves")),
     "rig file is a folder": (replaced(toml, "train.toml", "."), ("rig.file", "does not exist")),
-    "rig file no toml": (replaced(train, "[energy]", "[energy"), ("train.toml", "no valid TOML", "line")),
+    "rig file no toml": (replaced(train, "[energy]", "[energy"), ("train.toml", "not valid TOML", "line")),
     "rig file with a slip": (replaced(train, '"phi_m - phi_l"', '"phi_m - phi_x"'), ("train.toml, line", "phi_x")),
     "rig name no name": (replaced(train, '"train"', '"../train"'), ("train.toml, line 1, column 8: name", "letters")),
     "two roots in units": (replaced(train, 'damping = "d_s"', 'damping = "k_s"'), ("joints.shaft.damping",)),

@@ -118,4 +118,4 @@ def test_a_campaign_alone_runs_no_function(stage: Path, run: Run, monkeypatch) -
     (stage / "stage.toml").write_text(RIG.replace('name = "stage"', 'name = "unknown_to_this_process"'))
     code, stdout, stderr = run("diagnose", stage, "--out", stage / "results")
     assert (code, stdout) == (2, "")
-    assert "is a function of Python, and a rig file runs no code" in stderr
+    assert "is a Python function, but rig files must not run code" in stderr

@@ -47,7 +47,7 @@ def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
     told = json.loads(stdout)
     assert code == 0
     assert told["left_out"] == [
-        "range of joints: slider; the rig moves past it, and end_stop says it as an effect"
+        "range of joints: slider; the rig moves past it; use the effect end_stop for it"
     ]
     assert max(told["free_run"]["relative_difference"].values()) < 1e-5
 

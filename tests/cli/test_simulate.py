@@ -28,7 +28,7 @@ BROKEN_MODELS: dict[str, tuple[Callable[[dict[str, Any]], object] | str, tuple[s
     "effect twice": (lambda m: m["effects"].append("cubic_stiffness"), ("twice",)),
     "effect of another rig": (
         lambda m: m.update(rig="element", effects=["input_delay"]),
-        ("input_delay", "makes no sense"),
+        ("input_delay", "does not apply"),
     ),
     "missing parameters": (
         lambda m: (m["parameters"].pop("m"), m["effect_parameters"].clear()),
@@ -128,8 +128,8 @@ def test_simulate_converts_units_and_asks_about_those_in_names(
     asked = ("simulate", write_model(), record, "-o", out, "--column", "t=t_ms", "--column", "u=F_kN")
     code, stdout, _ = run(*asked)
     assert code == 0
-    assert "Note: drive.csv, column 't_ms': taken in s as it stands" in stdout
-    assert "Note: drive.csv, column 'F_kN': taken in N as it stands" in stdout
+    assert "Note: drive.csv, column 't_ms': values taken as s without conversion" in stdout
+    assert "Note: drive.csv, column 'F_kN': values taken as N without conversion" in stdout
     assert "--unit u=kN" in stdout
     code, stdout, _ = run(*asked, "--unit", "t=ms", "--unit", "u=kN")
     assert (code, "Note" in stdout) == (0, False)

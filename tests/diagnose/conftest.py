@@ -120,7 +120,7 @@ def two_masses() -> Rig:
 
 @pytest.fixture(scope="session")
 def scored() -> MakeScored:
-    """Make a model from its residuals in units of the noise floor, or from its excess alone."""
+    """Make a model from its residuals in units of the noise floor, or from its RMS alone."""
 
     def make(
         effects: tuple[str, ...] = (),

@@ -123,7 +123,7 @@ def test_what_a_loose_rig_does_at_rest_is_not_taken_for_noise(cubic_records: tup
     assert diagnosis.effects == ("cubic_stiffness",)
     assert diagnosis.noise_floors[0].lower_bound
     assert diagnosis.noise_floors[0].std == pytest.approx(NOISE, rel=0.2)
-    assert any("The rig moved there" in note for note in diagnosis.notes)
+    assert any("the rig was moving at rest" in note for note in diagnosis.notes)
 
 
 def test_none_when_the_given_simulation_is_right() -> None:

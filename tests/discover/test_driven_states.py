@@ -80,6 +80,6 @@ def test_what_the_declaration_says_decides_what_is_a_filter() -> None:
 
 
 def test_a_mass_that_rides_along_is_not_offered() -> None:
-    names = {effect.name for effect in offered_effects(AXIS, has_spring=True)}
+    names = {effect.name for effect in offered_effects(AXIS, has_stiffness=True)}
     assert "actuator_lag" in names
     assert "flexible_mode" not in names

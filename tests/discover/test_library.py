@@ -32,7 +32,7 @@ def test_a_column_is_the_term_along_the_motion(
     motion = motion_of(data.rig, data.records[0], values, 2e-5)
     scales = characteristic_scales(data.rig, data.records, values)
     rows = rows_of([motion], scales["time"])
-    projected = own_regression(data.rig, False, [motion], rows)
+    projected = own_regression(data.rig, True, [motion], rows)
     (found,) = candidates([effect_named(name)], [motion], rows, projected, scales, True)
     # A force that resists: it takes acceleration away.
     np.testing.assert_allclose(found.column, -rows.of(term(motion.x, motion.v)), rtol=1e-6, atol=1e-15)

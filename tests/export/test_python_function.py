@@ -91,7 +91,7 @@ def test_where_friction_holds_what_the_inputs_left_a_start_under_load_is_asked_f
     case = case_named("friction at a load")
     simulate, structure = exported(case)["simulate"], case.model.structure
     pushed = case.inputs[0] + 0.2
-    with pytest.raises(ValueError, match=r"known for inputs of zero alone.*initial_state"):
+    with pytest.raises(ValueError, match=r"known only for zero inputs.*initial_state"):
         simulate(case.t, pushed)
     start = [0.02, 0.005, 0.0, 0.0]
     record = Record("pushed", case.t[1], {"u": pushed}, {"u": "A"}, hold=case.model.hold)

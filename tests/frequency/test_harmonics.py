@@ -50,7 +50,7 @@ def test_a_linear_system_has_its_response_and_no_harmonics(second_order) -> None
 def test_what_is_no_sweep_is_told() -> None:
     record = swept(0.0, 0.0)
     noise = np.random.default_rng(19).normal(size=T.size)
-    with pytest.raises(InputError, match="it is no sweep"):
+    with pytest.raises(InputError, match="it is not a sweep"):
         track_harmonics(record.with_signals(u=noise), "u", "y")
     with pytest.raises(InputError, match="passes zero 0 times"):
         track_harmonics(record.with_signals(u=np.ones(T.size)), "u", "y")

@@ -111,5 +111,5 @@ def test_lines_that_are_wanted_are_those_of_the_whole(second_order, method) -> N
     assert np.array_equal(found.omega, some)
     assert np.array_equal(found.values, whole.values[10:400:7])
     assert np.array_equal(found.variance, whole.variance[10:400:7])
-    with pytest.raises(InputError, match="any of the frequencies"):
+    with pytest.raises(InputError, match="any of the requested frequencies"):
         method(record, "u", "psi", wanted=some + 1e3)

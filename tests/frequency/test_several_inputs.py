@@ -110,7 +110,7 @@ def test_inputs_that_move_together_are_not_told_apart(factor: float) -> None:
     found = responses_of_inputs([recorded(left, factor * left, rng)], INPUTS, OUTPUTS)
     assert not found.found
     assert found.together == (("left", "right"),)
-    assert "moves together with 'right'" in found.problems["left", "x"]
+    assert "changes together with 'right'" in found.problems["left", "x"]
 
 
 def test_one_more_record_tells_them_apart() -> None:
@@ -126,7 +126,7 @@ def test_an_input_that_rests_has_no_response_and_spoils_none() -> None:
     rng = np.random.default_rng(7)
     found = responses_of_inputs([recorded(multisine(rng), np.full(N, 0.3), rng)], INPUTS, OUTPUTS)
     assert set(found.found) == {("left", "x"), ("left", "z")}
-    assert "does not move in any record" in found.problems["right", "z"]
+    assert "does not change in any record" in found.problems["right", "z"]
 
 
 def test_records_of_other_lengths_and_sample_times_are_read_together() -> None:
@@ -152,22 +152,22 @@ def test_a_sensor_that_some_records_lack_is_read_from_the_others() -> None:
     assert found.found["left", "z"].records == (first.name,)
     assert found.found["left", "x"].records == (first.name, lacking.name)
     nothing = responses_of_inputs([lacking], INPUTS, OUTPUTS)
-    assert nothing.problems["left", "z"] == "no record holds 'z'."
+    assert nothing.problems["left", "z"] == "no record contains 'z'."
 
 
 def test_a_response_that_drowns_in_noise_is_said_to() -> None:
     rng = np.random.default_rng(10)
     found = responses_of_inputs([recorded(1e-4 * multisine(rng), multisine(rng), rng)], INPUTS, OUTPUTS)
     assert set(found.found) == {("right", "x"), ("right", "z")}
-    assert "does not stand out of its noise" in found.problems["left", "x"]
+    assert "does not exceed its noise" in found.problems["left", "x"]
 
 
 def test_steps_give_no_response() -> None:
     rng = np.random.default_rng(11)
     step = recorded((T > 5.0).astype(float), np.zeros(N), rng, kind="step")
     found = responses_of_inputs([step], INPUTS, OUTPUTS)
-    assert "moves in steps alone" in found.problems["left", "x"]
-    assert "does not move" in found.problems["right", "x"]
+    assert "only has steps" in found.problems["left", "x"]
+    assert "does not change in any record" in found.problems["right", "x"]
 
 
 def test_without_inputs_there_is_nothing_to_respond_to() -> None:

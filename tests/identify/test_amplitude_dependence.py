@@ -8,7 +8,7 @@ import numpy as np
 
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import PathIdentification, RecordIdentification
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.records import Kind, Record
 
 UNITS = {"k": "N/m", "d": "N s/m"}
@@ -69,7 +69,7 @@ def test_a_resonance_that_moves_is_told_where_intervals_are_too_wide() -> None:
     ]
     statement, changing = amplitude_dependence(records, UNITS, "A")
     assert changing == ()
-    assert "lies between 30 and 37 rad/s" in statement
+    assert "is between 30 and 37 rad/s" in statement
     steady, _ = amplitude_dependence([replace(r, resonance=30.0) for r in records], UNITS, "A")
     assert "resonance" not in steady
 

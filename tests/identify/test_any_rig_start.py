@@ -142,7 +142,7 @@ def test_a_known_value_is_kept_and_others_follow_from_it() -> None:
 
 def test_records_without_a_sensor_or_without_motion_are_refused() -> None:
     rig = rig_of("drive_train")
-    with pytest.raises(InputError, match=r"No estimation record holds a sensor.*motor_angle, load_angle"):
+    with pytest.raises(InputError, match=r"No estimation record contains a sensor.*motor_angle, load_angle"):
         linear_start(rig, [Record("run", DT, {"u": chirp(1.0)}, {})], constants_of(rig), {})
     still = Record("run", DT, {"u": chirp(1.0), "motor_angle": np.full_like(T, 0.3)}, {})
     with pytest.raises(InputError, match="No sensor moves"):

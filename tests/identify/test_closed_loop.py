@@ -81,20 +81,20 @@ def test_the_variance_is_that_of_the_errors(estimator) -> None:  # type: ignore[
 def test_a_reference_that_drives_nothing_is_not_used_and_that_is_told() -> None:
     unrelated = loop().with_signals(reference=np.cumsum(np.random.default_rng(2).standard_normal(N)))
     seen = read(unrelated)
-    assert "does not answer the instrument 'reference'" in seen.unused_instrument
+    assert "is not correlated with the instrument 'reference'" in seen.unused_instrument
     np.testing.assert_array_equal(seen.response.values, read(unrelated, None).response.values)
-    with pytest.raises(InputError, match="does not answer"):
+    with pytest.raises(InputError, match="not correlated with the instrument"):
         local_rational_response(unrelated, "u", "x", instrument="reference")
 
 
 def test_a_method_without_use_for_an_instrument_says_so() -> None:
-    assert "'h1' has no use for it" in read(loop(), method="h1").unused_instrument
+    assert "'h1' does not use it" in read(loop(), method="h1").unused_instrument
 
 
 def test_identify_tells_what_the_reference_was_used_for() -> None:
     campaign = make_campaign("axis", [loop(0.02), loop(0.02, 0.01)], constants={"gain": 1.0})
     found = identify_campaign(campaign, EstimationOptions())
-    (told,) = [text for text in found.warnings if "closed loop" in text]
+    (told,) = [text for text in found.warnings if "closed-loop records" in text]
     assert "'loop_0.02', 'loop_0.01'" in told
     assert "instrument" in told
     assert all("by reference" in record.motion.measured.method for record in found.records)  # type: ignore[union-attr]

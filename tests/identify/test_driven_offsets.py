@@ -97,5 +97,5 @@ def test_motion_that_the_fits_do_not_explain_widens_the_interval() -> None:
 def test_a_handful_of_samples_is_refused() -> None:
     record = swept(np.random.default_rng(5))
     short = replace(record, signals={name: samples[:10] for name, samples in record.signals.items()})
-    with pytest.raises(InputError, match="10 samples show no offset"):
+    with pytest.raises(InputError, match="10 samples are too few to find an offset"):
         driven_offsets(short, fitted("u", "psi", YAW, None))

@@ -65,7 +65,7 @@ def test_the_noise_is_found_from_the_residuals(linear: JointFit) -> None:
 
 def test_sweeps_and_steps_of_one_linear_rig_share_their_parameters(linear: JointFit) -> None:
     assert linear.probability > 0.01
-    assert linear.statement.startswith("One parameter set serves")
+    assert linear.statement.startswith("One parameter set fits")
     assert [k.kind for k in linear.kinds] == ["sweep", "step"]
     for kind in linear.kinds:
         assert len(kind.residuals) == 3

@@ -77,7 +77,7 @@ def test_the_message_says_what_to_write() -> None:
         "run.mf4",
         "'Winkel'",
         "'Grad'",
-        "the file states",
+        "stated in the file",
         "write deg",
         'unit = "..."',
         "scale = 1.0",
@@ -93,7 +93,7 @@ def test_scale_and_unit_exclude_each_other() -> None:
 def test_a_drive_may_be_given_in_any_unit_of_drives() -> None:
     mapping, notes = si_mapping("run.mat", "u", "input", ColumnMapping("F", unit="kN"), "F", None)
     assert (mapping.scale, notes) == (1000.0, ())
-    with pytest.raises(InputError, match=r"no unit of a drive \(A, V, N, N m\)"):
+    with pytest.raises(InputError, match=r"not a unit of a drive \(A, V, N, N m\)"):
         si_mapping("run.mat", "u", "input", ColumnMapping("F", unit="mm"), "F", None)
 
 
@@ -109,6 +109,6 @@ def test_a_unit_in_a_name_that_is_not_read_is_asked_about() -> None:
 
 def test_a_unit_of_the_campaign_that_contradicts_the_column_is_told() -> None:
     _, (note,) = si_mapping("run.csv", "t", "s", ColumnMapping("Time [s]", unit="ms"), "Time [s]", None)
-    assert "taken in ms, as the campaign says, though its name ends with s." in note
+    assert "taken in ms, as stated in the campaign, although its name ends with s." in note
     _, (note,) = si_mapping("run.mf4", "x", "m", ColumnMapping("x", unit="mm"), "x", "um")
     assert "though the file states um" in note

@@ -149,7 +149,7 @@ def test_a_matlab_variable_without_its_parts_is_refused(
     path.write_bytes(HEADER + flagged(flags, n_parts * element(9, bytes(480))) + behind)
     message = told(path)
     assert message is not None
-    assert ("has not the parts" in message) == (not is_sound)
+    assert ("lacks parts" in message) == (not is_sound)
 
 
 @pytest.mark.parametrize("bomb", BOMBS)
@@ -200,4 +200,4 @@ def test_a_library_that_does_not_come_back_is_ended_and_told(
     monkeypatch.setattr("rigsight.records.formats.isolated_reader.LONGEST_WAIT", 0.0)
     message = told(path)
     assert message is not None
-    assert "crash, or run in circles" in message
+    assert "crashes or does not finish" in message

@@ -333,7 +333,7 @@ def test_matlab_needs_no_extra_before_7_3(
 
 def test_a_dialect_means_nothing_for_other_formats(tmp_path: Path) -> None:
     write_matlab(tmp_path / "run.mat", rows(), {})
-    with pytest.raises(InputError, match="separator means nothing"):
+    with pytest.raises(InputError, match="separator does not apply"):
         read(tmp_path / "run.mat", separator=";")
 
 

@@ -65,7 +65,7 @@ def test_resampling_is_done_when_asked_and_told(tmp_path: Path, hold: str, manne
     np.testing.assert_allclose(record["u"], np.sin(3 * record.t), atol=error)
     np.testing.assert_array_equal(record["u"][::2], np.sin(3 * (0.02 * np.arange(200))))
     (note,) = record.notes
-    assert "resampled onto 0.01 s" in note
+    assert "resampled to 0.01 s" in note
     assert f"u from 0.02 s ({manner}" in note
     assert "x from" not in note
 

@@ -43,7 +43,7 @@ def test_stretches_keep_their_times_and_samples(write_csv: WriteCsv) -> None:
     assert [record.name.partition(" ")[2] for record in found] == ["part 1", "part 2", "part 3"]
     (note,) = found[0].notes
     assert "between lines 151 and 152 (300; the time jumps from 1.49 to 4.5), and at 1 more place" in note
-    assert "3 records, each with initial states of its own; nothing was put between" in note
+    assert "3 records, each with its own initial state; nothing was interpolated" in note
     assert found[1].notes == ()
 
 

@@ -73,7 +73,7 @@ def test_the_table_below_is_read(
 
 def test_what_was_passed_over_is_said(tmp_path: Path) -> None:
     found = read(tmp_path, "Bench 7;Kim\nRate;100\nt;u;x\ns;A;m\n" + rows())
-    assert "2 lines above the names in line 3 are no part of the table" in found.notes[0]
+    assert "2 lines above the names in line 3 are not part of the table" in found.notes[0]
     assert "line 4: taken as a row of units (s, A, m)" in found.notes[1]
     assert read(tmp_path, "t;u;x\n" + rows()).notes == ()
 
@@ -102,7 +102,7 @@ REFUSED: dict[str, tuple[str, dict[str, object], str]] = {
     "a table begun anew": ("t;u;x\n" + rows() + "t;u;x\n" + rows(), {}, r"line 82.*not a number"),
     "begun anew at once": ("t;u;x\n0;1;2\nt;u;x\n" + rows(), {}, r"begin in lines 2 and 4.*header = LINE"),
     "text in the first row": ("t;u;x\n0;one;2\n" + rows(), {}, r"line 2, column 'u': 'one' is not a number"),
-    "many lines of words": ("t;u;x\ns;A;m\nraw;raw;raw\n" + rows(), {}, r"lines 1 to 3 all stand above"),
+    "many lines of words": ("t;u;x\ns;A;m\nraw;raw;raw\n" + rows(), {}, r"lines 1 to 3 are all above"),
     "a line that is not there": ("t;u;x\n" + rows(), {"header": 900}, r"header = 900: that line is blank"),
     "a cut row": ("Bench 7\nt;u;x\n" + rows() + "1;2\n", {}, r"line 83: 2 columns, but 3 above it"),
 }

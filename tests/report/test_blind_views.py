@@ -19,7 +19,7 @@ def test_the_verdict_names_every_goal_that_is_missed(outcome_like: Like, wrong_o
     text = views.verdict_text(content).replace("\u00a0", " ")
     assert text.startswith("2 of 4 goals are reached.")
     assert "single effects named (50 % instead of 98 %)" in text
-    assert "3 of the goals could not be tried" in text
+    assert "3 of the goals could not be tested" in text
     assert not views.all_reached(content)
 
 
@@ -36,7 +36,7 @@ def test_a_goal_within_the_interval_is_said_to_be(outcome_like: Like) -> None:
     single = rows["Single effects named"]
     assert (single.goal, single.found, single.trials) == ("98 %", "100 %", "5 of 5")
     assert single.interval == "57 to 100 %"
-    assert single.reached == "yes, but the interval holds the goal"
+    assert single.reached == "yes, but the interval contains the goal"
     assert rows["Pairs, both effects named"].reached == "not tried"
     assert rows["Pairs, both effects named"].interval == ""
 
@@ -62,7 +62,7 @@ def test_groups_are_in_the_order_of_their_gaps(outcome_like: Like) -> None:
     ("benches", "words"),
     [
         ([("small", 1)], "1 of design small, seed 1"),
-        ([("external", 0)], "1 campaign of somebody else"),
+        ([("external", 0)], "1 campaign from an external source"),
     ],
 )
 def test_it_is_said_which_benches_were_scored(

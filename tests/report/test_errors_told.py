@@ -16,8 +16,8 @@ def told(diagnosis: Diagnosis, method: StdMethod) -> Diagnosis:
 
 
 def test_each_method_is_told(diagnosis: Diagnosis) -> None:
-    assert "random forces from outside" in errors_told(told(diagnosis, "bootstrap"))
-    assert "formula of the fit" in errors_told(told(diagnosis, "formula"))
+    assert "random disturbance forces" in errors_told(told(diagnosis, "bootstrap"))
+    assert "covariance of the fit" in errors_told(told(diagnosis, "formula"))
 
 
 def test_nothing_is_told_where_no_number_was_fitted(diagnosis: Diagnosis) -> None:

@@ -98,11 +98,11 @@ def test_the_missing_force_is_told_joint_by_joint(variant: Callable[[str], Diagn
     forces = (joint_force("load", 0.95), joint_force("motor", 1.2), joint_force("shaft", 145.0))
     unknown = replace(variant("unknown"), missing_force=None, joint_forces=forces)
     assert missing_force_sentence(unknown).startswith(
-        "A missing force at load or motor alone, whatever its course, leaves 0.95 × the noise floor of what all sensors show "
-        "(at shaft 145). No law of the motion of load"
+        "A missing force at load or motor alone, of any shape over time, would leave an error of 0.95 × the noise floor over "
+        "all sensors (at shaft 145). No function of the motion of load"
     )
     page = words(render(unknown))
-    assert "motor 1.2 × no law of its motion shaft 145 × ruled out by the sensors" in page
+    assert "motor 1.2 × not a function of the motion shaft 145 × ruled out by the sensors" in page
     assert "ruled out by the sensors" not in words(render(variant("effect")))
 
 
@@ -113,7 +113,7 @@ def test_the_maps_of_joints_are_those_that_the_verdict_names_else_all(diagnosis:
     (maps,) = joint_maps(several)
     assert [figure.key for figure in maps.figures] == ["where-joint-1-states", "where-joint-2-states"]
     assert "By state of load, along the motion" in maps.figures[0].caption
-    assert "if all that they lack acts at load." in maps.figures[0].caption
+    assert "if everything missing acts at load." in maps.figures[0].caption
     assert "where-joint-2-states" in render(several)
     (named,) = joint_maps(replace(several, where=("shaft",)))
     assert ["By state of shaft" in figure.caption for figure in named.figures] == [True]

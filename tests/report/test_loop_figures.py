@@ -36,7 +36,9 @@ def test_whole_periods_are_drawn_where_the_given_element_errs_most(
     variant: Callable[[str], Diagnosis],
 ) -> None:
     (figure,) = loop_figures(replace(variant("loops"), traces=(sine_trace(30, 20),)))
-    found = re.search(r"motion of ±10 mm: ([\d.]+) s to ([\d.]+) s, where it errs most", figure.caption)
+    found = re.search(
+        r"motion of ±10 mm: ([\d.]+) s to ([\d.]+) s, where the error is largest", figure.caption
+    )
     assert found, figure.caption
     begin, end = float(found[1]), float(found[2])
     assert abs(end - begin - 4.0) <= 0.02

@@ -143,9 +143,12 @@ def test_the_page_says_what_to_measure_next_and_what_the_records_show(
     page_of: Callable[[str], str],
 ) -> None:
     words = Page(page_of("advised")).words()
-    assert "To tell Coulomb friction apart, drive a sweep of amplitude 1.25 A from 0.5 to 40 rad/s" in words
     assert (
-        "No experiment of the menu tells Stribeck friction apart: the best, a sine of amplitude 0.5 A at 3 rad/s"
+        "To confirm or rule out Coulomb friction, record a sweep of amplitude 1.25 A from 0.5 to 40 rad/s"
+        in words
+    )
+    assert (
+        "None of the experiments considered would rule out Stribeck friction: with the best, a sine of amplitude 0.5 A at 3 rad/s"
         in words
     )
     assert (

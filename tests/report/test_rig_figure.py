@@ -52,7 +52,7 @@ def test_a_rival_at_another_place_is_paler(diagnosis: Diagnosis) -> None:
     assert set(marks) == {"load_bearing", "motor_bearing"}
     figure = rig_figure(changed)
     assert figure is not None
-    assert "Paler, and possible too: motor_bearing." in figure.caption
+    assert "Paler, also possible: motor_bearing." in figure.caption
 
 
 @pytest.mark.parametrize(

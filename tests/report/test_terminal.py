@@ -60,7 +60,10 @@ def test_a_narrow_terminal_wraps(diagnosis: Diagnosis) -> None:
 
 def test_one_experiment_is_named_and_the_rest_left_to_the_report(variant: Callable[[str], Diagnosis]) -> None:
     text = "\n".join(printed(variant("advised")))
-    assert "To tell Coulomb friction apart, drive a sweep of amplitude 1.25 A from 0.5 to 40 rad/s" in text
+    assert (
+        "To confirm or rule out Coulomb friction, record a sweep of amplitude 1.25 A from 0.5 to 40 rad/s"
+        in text
+    )
     assert "differ by 23 standard deviations of the noise" in text
     assert "Stribeck friction apart" not in text
 

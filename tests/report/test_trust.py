@@ -82,5 +82,5 @@ def test_a_notebook_has_picture_and_table(diagnosis: Diagnosis) -> None:
     table = found.to_dataframe("trust")
     assert len(table) == 12
     assert set(table["pattern"]) == {"with amplitude", "stable"}
-    with pytest.raises(InputError, match="No number"):
+    with pytest.raises(InputError, match="No parameter"):
         DiagnosisResult.of(replace(diagnosis, trust=None)).plot("trust")

@@ -16,10 +16,10 @@ from rigsight.report.wording import percent, remainder_sentence, verdict_name, v
     [
         ("two effects", "caused by Coulomb friction and cubic stiffness in the yaw dynamics; adding them closes"),
         ("own effect", "caused by my gear"),
-        ("parameters", "caused by wrong parameters: the same equations with better numbers close over 99.9 %"),
+        ("parameters", "caused by wrong parameters: refitting the same equations closes over 99.9 %"),
         ("none", "no gap to explain: the given simulation leaves 1.02 × the noise floor"),
         ("unknown", "unknown: the best of 4 candidates, Bouc-Wen hysteresis, still leaves 1.04 × the noise floor; "
-                    "the evidence points to something in the yaw dynamics."),
+                    "the evidence points to a cause in the yaw dynamics."),
         ("no candidates", "The cause of the gap is unknown."),
         ("element", "in the dynamics"),
     ],
@@ -42,33 +42,33 @@ def test_no_gap_far_above_the_floor_says_that_the_floor_seems_too_low(
         for name, gap in none.gap.items()
     }
     sentence = verdict_sentence(replace(none, gap=far))
-    assert "goes with nothing" in sentence
-    assert "noise floor seems too low" in sentence
+    assert "correlates with no signal" in sentence
+    assert "noise floor is probably too low" in sentence
     assert "too small" not in sentence
 
 
 def test_an_unknown_cause_says_with_what_the_rest_goes(variant: Callable[[str], Diagnosis]) -> None:
     left = Remainder(0.89, ("pivot",), "velocity of pivot", 0.0008)
     sentence = remainder_sentence(replace(variant("unknown"), remainder=left))
-    assert "89 % of the squared gap, still goes with velocity of pivot" in sentence
-    assert "the larger part of the gap is not explained" in sentence
+    assert "89 % of the squared gap, still correlates with velocity of pivot" in sentence
+    assert "more than half of the gap is not explained" in sentence
 
 
 def test_beside_an_unknown_cause_nothing_smaller_is_missing() -> None:
     left = Remainder(0.1, ("elbow",), "change of angle_2", 0.002, beside_a_cause=False)
-    assert left.text.endswith("goes with change of angle_2 (p = 0.002).")
-    assert "something smaller is missing too" in replace(left, beside_a_cause=True).text
+    assert left.text.endswith("correlates with change of angle_2 (p = 0.002).")
+    assert "a smaller effect is missing too" in replace(left, beside_a_cause=True).text
 
 
 def test_a_number_that_differs_by_record_is_told_as_such() -> None:
     left = Remainder(0.02, (), "record: T_c", 0.001)
-    assert "still goes with the record: T_c differs from one to another" in left.text
+    assert "still correlates with the record: T_c differs from record to record" in left.text
 
 
 def test_no_more_than_the_noise_is_no_second_cause(variant: Callable[[str], Diagnosis]) -> None:
     """What goes with something below the floor is told of the numbers, and not as something smaller that is missing too."""
     left = Remainder(0.0, (), "record: d_r", 0.003)
-    assert "no more than the noise floor, but it still goes with the record" in left.text
+    assert "within the noise floor, but it still correlates with the record" in left.text
     found = replace(variant("effect"), adequate=False, remainder=left)
     assert verdict_name(found) == "Missing effect"
     assert verdict_name(replace(found, remainder=replace(left, share=0.02))) == "Main cause"

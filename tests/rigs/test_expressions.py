@@ -48,7 +48,7 @@ def test_an_expression_means_what_it_says(text: str, expected: float) -> None:
         ("a**2", 1, "powers are written with"),
         ("siin(a)", 0, "Did you mean 'sin'"),
         ("min(a)", 0, r"min\(x, y\)"),
-        ("a$b", 1, "has no meaning here"),
+        ("a$b", 1, "is not allowed here"),
         ("d(a + b)", 0, "rate of one coordinate"),
         ("a^99", 2, "exponent"),
         ("1e999", 0, "too large"),

@@ -63,7 +63,7 @@ def changed(old: str, new: str) -> str:
 
 
 WRONG = {
-    "no toml": ("name = ", "is no valid TOML"),
+    "no toml": ("name = ", "is not valid TOML"),
     "nothing": ("", "the line 'name = ...' is missing"),
     "key": (
         changed('stiffness = "k_s"', 'stifness = "k_s"'),
@@ -80,21 +80,21 @@ WRONG = {
         changed('stiffness = "k_s"', 'stiffness = "d_s"'),
         "line 55.*joints.shaft.stiffness.*kg m",
     ),
-    "unknown unit": (changed('unit = "A"', 'unit = "foo"'), "line 5, column 8.*'foo' is not known"),
+    "unknown unit": (changed('unit = "A"', 'unit = "foo"'), "line 5, column 8.*'foo' is unknown"),
     "no SI": (changed('[coordinates.phi_m]\nunit = "rad"', '[coordinates.phi_m]\nunit = "deg"'), "not SI"),
     "unused": (changed('\ndamping = "d_l"', ""), "parameters.d_l: no equation reads 'd_l'"),
-    "still sensor": (changed('reads = "phi_l"', 'reads = "u/u"'), "nothing that moves is read"),
+    "still sensor": (changed('reads = "phi_l"', 'reads = "u/u"'), "it reads nothing that moves"),
     "loop": (
         TRAIN + '\n[signals]\na = "b*2"\nb = "a/2"\n',
-        "a loop without a state in it: a -> b -> a|b -> a -> b",
+        r"an algebraic loop \(no state in it\): a -> b -> a|b -> a -> b",
     ),
     "name taken": (
         TRAIN + '\n[states.k_s]\nrate = "1"\nunit = "1"\n',
-        "'k_s' is taken by \\[parameters.k_s\\]",
+        "'k_s' is already used by \\[parameters.k_s\\]",
     ),
     "code": (
         changed('signal = "u"', "signal = \"__import__('os')\""),
-        "line 66, column 22.*has no meaning here",
+        "line 66, column 22.*is not allowed here",
     ),
     "log of zero": (changed("lower = 1e-9", "lower = 0.0"), "line 15, column 9.*above 0, got 0"),
     "default": (changed("lower = 0.0", "lower = 0.0\ndefault = -1.0"), "-1 is not within"),
@@ -111,23 +111,26 @@ WRONG = {
         "no input 'w'",
     ),
     "no sensor": (TRAIN[: TRAIN.index("[sensors")], r"at least one \[sensors.NAME\]"),
-    "force": (changed('"k_t*motor"', '"motor*k_t/k_t"'), "force times what it acts along is J"),
+    "force": (
+        changed('"k_t*motor"', '"motor*k_t/k_t"'),
+        "force times the expression that it acts along is in J",
+    ),
     "nested": (changed('"k_s"', '"' + "(" * 100 + "k_s" + ")" * 100 + '"'), "nested 60 deep"),
     "no number": (changed("default = 0.05", "default = nan"), "finite number"),
     "list": (changed('signal = "u"', 'signal = ["u"]'), "line 66.*drives.motor.signal"),
-    "start": (TRAIN + '\n[initial]\nphi_x = "1"\n', "'phi_x' is no coordinate"),
+    "start": (TRAIN + '\n[initial]\nphi_x = "1"\n', "'phi_x' is not a coordinate"),
     "unit of a rate": (
         TRAIN + '\n[states.z]\nrate = "phi_l - z"\nunit = "rad"\n',
-        "should be in 1/s, as the unit of the state demands",
+        "should be in 1/s, from the unit of the state",
     ),
-    "twice": (TRAIN + "\n[joints.shaft]\n", "is no valid TOML"),
+    "twice": (TRAIN + "\n[joints.shaft]\n", "is not valid TOML"),
     "linear energy": (changed("J_l*d(phi_l)^2/2", "J_l*d(phi_l)^2/2 + J_m*d(phi_m)*9.81"), "sum of squares"),
     "force fed back": (
         changed('signal = "u"', 'signal = "u - load/9.81"').replace(
             "[sensors.motor_angle]",
             '[sensors.load]\nreads = "force(shaft)"\nunit = "N m"\n[sensors.motor_angle]',
         ),
-        "drives.motor.signal: the force of a joint is read",
+        "drives.motor.signal: it reads the force of a joint",
     ),
     "joint that never moves": (
         changed('motion = "phi_l"', 'motion = "phi_l - phi_l"'),

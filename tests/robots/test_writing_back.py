@@ -191,7 +191,7 @@ def test_isaac_settings_hold_friction_and_delay_of_each_joint() -> None:
 
 @pytest.mark.parametrize(
     ("controls", "dt", "said"),
-    [(np.zeros((5, 3)), STEP, "shape"), (np.zeros((5, 2)), 1.5 * STEP, "whole number")],
+    [(np.zeros((5, 3)), STEP, "shape"), (np.zeros((5, 2)), 1.5 * STEP, "multiple of the model's step")],
 )
 def test_controls_that_do_not_fit_are_refused(controls: np.ndarray, dt: float, said: str) -> None:
     with pytest.raises(InputError, match=said):

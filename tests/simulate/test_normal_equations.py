@@ -96,5 +96,5 @@ def test_a_set_that_diverges_spoils_no_other(rng):
 
 def test_what_a_late_sensor_shows_is_refused(rng):
     structure = compose(RUNNING_GEAR, [effect_named("sensor_delay")])
-    with pytest.raises(ValueError, match="late sensor"):
+    with pytest.raises(ValueError, match="delayed sensor"):
         normal_equations(structure, [], np.zeros((len(structure.names), 1)), np.zeros((0, 3, 1)))

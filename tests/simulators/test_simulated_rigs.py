@@ -170,19 +170,19 @@ def test_two_models_are_two_rigs_and_a_changed_file_is_told(folder):
     ("way", "old", "new", "message"),
     [
         ("mujoco", '"slide"', '"slid"', r"has no joint 'slid'. Did you mean 'slide'"),
-        ("mujoco", "body_mass pendulum", "body_mass pendul", "is no number of the model"),
-        ("mujoco", "body_mass pendulum", "mass", "is no number of the model"),
-        ("mujoco", "body_mass pendulum", "body_ipos pendulum -1", "is no number of the model"),
+        ("mujoco", "body_mass pendulum", "body_mass pendul", "is not a number of the model"),
+        ("mujoco", "body_mass pendulum", "mass", "is not a number of the model"),
+        ("mujoco", "body_mass pendulum", "body_ipos pendulum -1", "is not a number of the model"),
         (
             "mujoco",
             "body_mass pendulum",
             "dof_frictionloss slide",
-            "follows from other numbers of the model, or counts nowhere",
+            "is derived from other numbers of the model or does not affect",
         ),
-        ("mujoco", "body_mass pendulum", "body_subtreemass cart", "follows from other numbers"),
-        ("mujoco", '"hinge"', '"slide"', "'slide' stands there twice"),
-        ("mujoco", 'file = "cart.xml"', 'file = "a\\u0000b"', "is no name of a file"),
-        ("mujoco", 'kind = "mujoco"', 'kind = "mujoko"', "is no simulator. Did you mean 'mujoco'"),
+        ("mujoco", "body_mass pendulum", "body_subtreemass cart", "is derived from other numbers"),
+        ("mujoco", '"hinge"', '"slide"', "'slide' is used twice"),
+        ("mujoco", 'file = "cart.xml"', 'file = "a\\u0000b"', "is not a file name"),
+        ("mujoco", 'kind = "mujoco"', 'kind = "mujoko"', "is not a simulator. Did you mean 'mujoco'"),
         ("mujoco", "cart.xml", "card.xml", "card.xml cannot be read: No such file"),
         ("fmu 2.0", '"position"', '"place"', "has no state 'place'"),
         ("fmu 2.0", '"torque"', '"moment"', "has no input 'moment'"),
@@ -193,10 +193,10 @@ def test_two_models_are_two_rigs_and_a_changed_file_is_told(folder):
             "fmu 2.0",
             'kind = "fmu"',
             'kind = "fmu"\nwithout_armature = true',
-            "it is of mujoco, and this is fmu",
+            "it belongs to mujoco, but this is fmu",
         ),
-        ("fmu 2.0", 'm_p = "pend', 'm_q = "pend', "'m_q' is no constant and no parameter"),
-        ("python", 'file = "cart"', 'file = "card"', "is a function of Python, and a rig file runs no code"),
+        ("fmu 2.0", 'm_p = "pend', 'm_q = "pend', "'m_q' is neither a constant nor a parameter"),
+        ("python", 'file = "cart"', 'file = "card"', "is a Python function, but rig files must not run code"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(way, old, new, message, folder):
@@ -211,11 +211,15 @@ def test_what_is_wrong_is_told_with_its_place(way, old, new, message, folder):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (('x = "force"', 'phi = "torque"'), ('x = "torque"', 'phi = "force"'), "no mass matrix follows"),
+        (
+            ('x = "force"', 'phi = "torque"'),
+            ('x = "torque"', 'phi = "force"'),
+            "no mass matrix can be derived",
+        ),
         (
             ('x = "speed"', 'phi = "turning"'),
             ('x = "turning"', 'phi = "speed"'),
-            "have to belong to the coordinates",
+            "must belong to their coordinates",
         ),
     ],
 )
@@ -238,7 +242,7 @@ def test_an_fmu_that_switches_at_events_is_refused(folder):
     with zipfile.ZipFile(path, "w") as fmu:
         for name, text in content.items():
             fmu.writestr(name, text.replace(b'numberOfEventIndicators="0"', b'numberOfEventIndicators="2"'))
-    with pytest.raises(InputError, match="switches at events"):
+    with pytest.raises(InputError, match="has state events"):
         rig_of_text(cart.RIG + cart.FMU.replace("FILE", "events.fmu"), folder=folder)
 
 

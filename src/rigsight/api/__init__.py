@@ -1,1 +1,1 @@
-"""What the commands do, from Python: estimators, their results, and the functions beside them; `import rigsight` offers it."""
+"""The Python API of the commands: estimators, their results, and functions; exported by `import rigsight`."""

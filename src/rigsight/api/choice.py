@@ -1,4 +1,4 @@
-"""Which of several things by name does a caller mean? The first where none is named."""
+"""Choice of one of several items by name; the first if no name is given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How are models held against the records of a campaign from Python?"""
+"""Comparison of models with the records of a campaign from Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well do models do on records? The errors of a comparison, with pictures, a table and files."""
+"""Result of a comparison: errors of models on records, with pictures, a table and files."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ComparisonResult(Comparison):
-    """The result of a comparison, as it is in ``comparison.json``, ready to be looked at.
+    """The result of a comparison, as it is in ``comparison.json``, with plots, tables and files.
 
     Attributes
     ----------
     made_by
-        What made it; the page quotes it.
+        The command or call that made it; quoted in the page.
     """
 
     made_by: str = "rigsight"
 
     @classmethod
     def of(cls, found: Comparison, made_by: str = "rigsight") -> Self:
-        """Return a comparison of any origin, for instance of `run_compare`, ready to be looked at.
+        """Return a comparison of any origin, for instance of `run_compare`, with plots, tables and files.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class ComparisonResult(Comparison):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Which effect does a simulation leave out? The diagnosis as an estimator."""
+"""The diagnosis as an estimator."""
 
 from __future__ import annotations
 

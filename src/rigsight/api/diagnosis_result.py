@@ -1,4 +1,4 @@
-"""What did a diagnosis find? Its verdict and numbers, with pictures, tables and files."""
+"""Result of a diagnosis: verdict and parameters, with pictures, tables and files."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ Table = Literal["candidates", "gap", "parameters", "trust"]
 
 @dataclass(frozen=True)
 class DiagnosisResult(Diagnosis):
-    """The result of a diagnosis, as it is in ``diagnosis.json``, ready to be looked at.
+    """The result of a diagnosis, as it is in ``diagnosis.json``, with plots, tables and files.
 
     Attributes
     ----------
     made_by
-        What made it; the report quotes it.
+        The command or call that made it; quoted in the report.
     seed
         Seed of the diagnosis, None where it is not known.
     own_effects
@@ -55,7 +55,7 @@ class DiagnosisResult(Diagnosis):
         seed: int | None = None,
         own_effects: Iterable[Effect] = (),
     ) -> Self:
-        """Return a diagnosis of any origin, for instance of `run_diagnose`, ready to be looked at.
+        """Return a diagnosis of any origin, for instance of `run_diagnose`, with plots, tables and files.
 
         Parameters
         ----------
@@ -78,8 +78,8 @@ class DiagnosisResult(Diagnosis):
         Parameters
         ----------
         picture
-            ``"gap"``: how the gap shrinks, step by step. ``"candidates"``: what each of them leaves. ``"record"``: measured
-            and simulated output of one record, with the errors below. ``"trust"``: numbers as records alone have them.
+            ``"gap"``: how the gap shrinks, step by step. ``"candidates"``: the error of each. ``"record"``: measured and
+            simulated output of one record, with the errors below. ``"trust"``: parameters estimated from single records.
         record
             Name of the record, for ``"record"``; by default the first that was scored.
         output
@@ -87,7 +87,7 @@ class DiagnosisResult(Diagnosis):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
 
         Raises
         ------

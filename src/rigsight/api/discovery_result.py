@@ -1,4 +1,4 @@
-"""What did a discovery find? Equations and terms, with a picture, tables and files."""
+"""Result of a discovery: equations and terms, with a picture, tables and files."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Table = Literal["coefficients", "terms", "alternatives"]
 
 
 class DiscoveryResult(Discovery):
-    """The result of a discovery, as it is in ``discovery.json``, ready to be looked at."""
+    """The result of a discovery, as it is in ``discovery.json``, with plots, tables and files."""
 
     @classmethod
     def of(cls, found: Discovery) -> Self:
-        """Return a discovery of any origin, for instance of `run_discover`, ready to be looked at.
+        """Return a discovery of any origin, for instance of `run_discover`, with plots, tables and files.
 
         Parameters
         ----------
@@ -46,7 +46,7 @@ class DiscoveryResult(Discovery):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
         """
         return discovery_figure(self)
 
@@ -56,9 +56,9 @@ class DiscoveryResult(Discovery):
         Parameters
         ----------
         table
-            ``"coefficients"``: a row per number of the equations, with its standard error and unit. ``"terms"``: a row per
-            term that was offered, with its inclusion probability. ``"alternatives"``: a row per equation that was polished;
-            errors on the held-out records are in units of the noise floor.
+            ``"coefficients"``: a row per number of the equations, with its standard error and unit. ``"terms"``: a row per term
+            that was offered, with its inclusion probability. ``"alternatives"``: a row per fitted equation; errors on the
+            held-out records are in units of the noise floor.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Which equation do the records propose by themselves? The discovery as an estimator."""
+"""The discovery of equations as an estimator."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from rigsight.workflow.run.progress_display import listening
 
 
 class EquationDiscoverer(CampaignEstimator):
-    """Discover the governing equations by sparse regression, polished in free run and chosen by held-out records.
+    """Discover the governing equations by sparse regression, refined by output-error fits and selected on held-out records.
 
     What ``rigsight discover`` does.
 
     Parameters
     ----------
     method
-        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. ``"full"``: the whole acceleration is.
+        ``"discrepancy"``: the rig's own terms are kept and their residual is regressed. ``"full"``: the whole acceleration is
+        regressed.
     pointwise
         Regress sample by sample instead of in the weak form.
     one_by_one

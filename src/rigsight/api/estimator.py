@@ -1,4 +1,4 @@
-"""What do all estimators share? Settings in the constructor, `fit` on a campaign, a model that predicts."""
+"""Base of all estimators: settings in the constructor, `fit` on a campaign, a model that predicts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ else:
 
 
 class CampaignEstimator(BaseEstimator):
-    """What is fitted to the records of a campaign and then predicts what the rig does.
+    """Base of estimators that are fitted to the records of a campaign and then predict the outputs of the rig.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class CampaignEstimator(BaseEstimator):
         InputError
             If the record lacks the input, or initial states cannot be estimated from it.
         SimulationError
-            If the motion leaves the range of numbers.
+            If the motion diverges.
         """
         check_is_fitted(self)
         return simulate_model(self.model_, record, initial_state)

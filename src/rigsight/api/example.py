@@ -1,4 +1,4 @@
-"""On what can everything be tried at once, without files? A small campaign whose truth is known."""
+"""A small example campaign with known truth, without files."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _REST = 200
 
 
 def example_campaign(seed: int = 0) -> Campaign:
-    """Return two sweeps of a simulated stage, an axis whose spring hardens, and a simulation that does not know it.
+    """Return two sweeps of a simulated stage, an axis with a hardening spring, and a simulation without the hardening.
 
-    The stage obeys ``m x'' + d x' + k x + k_3 x^3 = u`` with m = 2 kg, d = 5 N s/m, k = 800 N/m and k_3 = 5e6 N/m^3; its
-    sensor has noise of 0.02 mm. The given simulation has the same numbers and no k_3. One sweep of 4 N may be fitted, one of
-    3 N judges; each lasts 10 s.
+    The stage obeys ``m x'' + d x' + k x + k_3 x^3 = u`` with m = 2 kg, d = 5 N s/m, k = 800 N/m and k_3 = 5e6 N/m^3; its sensor
+    has noise of 0.02 mm. The given simulation has the same numbers and no k_3. One sweep of 4 N is for estimation, one of 3 N for
+    validation; each lasts 10 s.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What did an identification find? The parameters of the linear rig, with pictures, tables and files."""
+"""Result of an identification: the parameters of the linear rig, with pictures, tables and files."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ Table = Literal["records", "joint"]
 
 
 class IdentificationResult(Identification):
-    """The result of an identification, as it is in ``identification.json``, ready to be looked at."""
+    """The result of an identification, as it is in ``identification.json``, with plots, tables and files."""
 
     @classmethod
     def of(cls, found: Identification) -> Self:
-        """Return an identification of any origin, for instance of `run_identify`, ready to be looked at.
+        """Return an identification of any origin, for instance of `run_identify`, with plots, tables and files.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class IdentificationResult(Identification):
 
         Returns
         -------
-        A matplotlib figure of its own.
+        A new matplotlib figure.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class IdentificationResult(Identification):
         Parameters
         ----------
         table
-            ``"records"``: what each record shows by itself. ``"joint"``: the one set for all records.
+            ``"records"``: the estimates from each record alone. ``"joint"``: the one set for all records.
 
         Raises
         ------

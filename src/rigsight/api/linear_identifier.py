@@ -1,4 +1,4 @@
-"""Which numbers has the linear rig behind the records? The identification as an estimator."""
+"""The identification of the linear rig as an estimator."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LinearIdentifier(CampaignEstimator):
     method
         Estimator of the frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     resolution
-        Width in frequency asked for [rad/s]; None takes what each record gives.
+        Requested frequency resolution [rad/s]; None uses that of each record.
     n_jobs
         Records identified at the same time; None for one per processor.
     verbose
@@ -87,7 +87,7 @@ class LinearIdentifier(CampaignEstimator):
         Raises
         ------
         InputError
-            If the campaign cannot be used, the method is unknown, a record is too short for the resolution asked for, or no
+            If the campaign cannot be used, the method is unknown, a record is too short for the requested resolution, or no
             record shows the motion.
         """
         options = checked_options(self.method, self.resolution)

@@ -1,4 +1,4 @@
-"""How is a single measured file read from Python? With the signals of a rig that is named."""
+"""Reading a single measured file from Python, with the signals of a given rig."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def read_record(
         Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x), ``"element"`` (t, x, force), the name
         of another built-in rig, or a rig of your own.
     columns
-        Where signals and time ``t`` stand, and how they become SI units; by default in columns of their own names. A record of a
-        closed loop may hold the ``reference`` of its controller beside them.
+        Columns of the signals and of time ``t``, and their conversion to SI units; by default the columns with the same names. A
+        record of a closed loop may hold the ``reference`` of its controller beside them.
     require_outputs
         False to simulate the record: its time and inputs suffice.
     name
@@ -67,7 +67,7 @@ def read_record(
     Raises
     ------
     InputError
-        Naming file, line or column, and the mend, for whatever makes the record unusable.
+        If the record is unusable; the message gives file, line or column, and the remedy.
 
     Examples
     --------

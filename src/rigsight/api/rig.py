@@ -1,4 +1,4 @@
-"""How is a rig of one's own declared from Python? With the words of a rig file."""
+"""Declaring a rig from Python, with the keys of a rig file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Rig(DeclaredRig):
     parameters
         Numbers to identify; ``lower``, ``upper``, ``default`` and ``log`` are optional.
     alternatives
-        Numbers that people know in the place of a parameter: ``unit``, ``gives`` and ``value``.
+        Known numbers from which a parameter follows: ``unit``, ``gives`` and ``value``.
     coordinates
         Degrees of freedom: ``{"phi": {"unit": "rad"}}``; ``prescribed_by`` names an input whose motion is imposed.
     energy

@@ -1,4 +1,4 @@
-"""How does a result become a pandas table? pandas is optional: whoever works without it never loads it."""
+"""Results as pandas tables; pandas is optional and only loaded when used."""
 
 from __future__ import annotations
 

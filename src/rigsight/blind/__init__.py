@@ -1,4 +1,4 @@
-"""Rigs whose effect is withheld: drawn, simulated by an integrator of their own, and scored by a key."""
+"""Blind trials: random rigs with hidden effects, simulated by a separate integrator and scored with a key."""
 
 from rigsight.blind.designs import Design as Design
 from rigsight.blind.designs import draw_trial as draw_trial

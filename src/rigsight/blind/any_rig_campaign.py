@@ -1,7 +1,7 @@
-"""Which experiments are done on a rig of any shape? All inputs move at once, each in a way of its own.
+"""Experiments on a rig of any shape: all inputs move at once, each with a different waveform.
 
-Their sizes come from the equations: the motion is of a drawn size, less where a control law ends or the motion is far from a
-linear one.
+Their amplitudes follow from the equations: the motion has a random size, smaller where a control law saturates or the motion is
+far from linear.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which numbers does a drawn rig of any shape have? Such that it vibrates as a rig does; its equations alone say which those are.
+"""Random parameters of a rig of any shape, such that its natural frequencies and damping are plausible.
 
-All but offsets are drawn about one SI unit (a declared default) and then moved together until the linearization has natural
-frequencies and damping ratios within bands and no two inertias are nearly one.
+All but offsets are drawn around one SI unit (or a declared default) and then adjusted together until the natural frequencies and
+damping ratios of the linearization lie within bands and no two inertias are nearly indistinguishable.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _SPREAD = 0.6
 _DAMPERS = math.exp(-3.0)
 """Size about which a number is drawn that stands in a joint's damping alone: one SI unit would leave no vibration."""
 _PULL = 0.05
-"""Weight of the distance to the first draw beside a factor e outside a band: it decides what the bands leave open."""
+"""Weight of the distance to the first draw relative to a factor e outside a band: it decides what the bands do not determine."""
 _LEAST_APART = 0.1
 """Smallest eigenvalue of the mass matrix, each coordinate in units of its own inertia; zero is a singular one."""
 _CONFIGURATIONS = 8

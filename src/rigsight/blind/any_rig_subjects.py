@@ -1,4 +1,4 @@
-"""What is hidden in which trial of design ``rigs``? Every rig with effects at every kind of its places."""
+"""Hidden effects of the trials of design ``rigs``: every rig with effects at every kind of its places."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def draw_effects(rig: Rig, subject: PlacedSubject, rng: np.random.Generator) -> 
         return (_any_of(_outside_on(rig), rng),)
     if subject.kind == "single":
         return (_drawn_kind([e for e in offered if e.place is subject.place], rng),)
-    # Two laws at one place of a motion are told apart by their forms alone; two places are the harder question.
+    # Two laws at one place differ only in their form; distinguishing two places is harder.
     first = _drawn_kind(offered, rng)
     others = [e for e in offered if kind_of(e.name) != kind_of(first.name) and _elsewhere(rig, first, e)]
     others = others or [e for e in offered if kind_of(e.name) != kind_of(first.name)]

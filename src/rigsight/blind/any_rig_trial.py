@@ -1,7 +1,7 @@
-"""What does one trial of design ``rigs`` measure, and what does its key hold? Everything follows from seed and number.
+"""Records and key of one trial of design ``rigs``; everything follows from seed and number.
 
-Unlike the trials of one mass, whose plant has an integrator of its own, a rig of any shape is moved by the accurate integrator of
-`rigsight.simulate`, at a sample time of its own and with disturbed inputs that no record holds.
+Unlike the trials of one mass, which have a separate integrator, a rig of any shape is simulated by the accurate integrator of
+`rigsight.simulate`, at a different sample time and with disturbed inputs that are not recorded.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _FINER = 4
 _ACCURACY = 1e-7
 """Relative: far below the noise."""
 _DISTURBED = (0.2, 0.5)
-"""What a disturbance leaves in the sensors, in units of their noise."""
+"""Effect of a disturbance on the sensors, in units of their noise."""
 _CORNER = 5.0
 """Angular frequency above which the disturbance falls [rad/s]."""
 _FIRST = 1e-3
@@ -222,7 +222,7 @@ class _Bench:
         return found
 
     def gap(self, records: Sequence[Record], refit: FitResult, floor: Mapping[str, float]) -> float:
-        """Return what the re-identified equations leave of the validation records, in units of the noise floor."""
+        """Return the error of the re-identified equations on the validation records, in units of the noise floor."""
         fit = GreyBoxFit(compose(self.rig), records, self.scales, self.noise).fit(refit.values, [])
         return self._left(fit, floor)
 
@@ -246,7 +246,7 @@ class _Bench:
 
 
 class _Plant:
-    """A rig with its effects and numbers; the phase of what pulsates is zero as a record begins."""
+    """A rig with its effects and parameters; periodic disturbances have phase zero at the start of a record."""
 
     def __init__(self, rig: Rig, effects: Sequence[Effect], values: Mapping[str, float]) -> None:
         self._structure = compose(rig, effects)

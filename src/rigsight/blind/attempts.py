@@ -1,4 +1,4 @@
-"""When is a trial given up? After so many draws that cannot be simulated or leave no gap of the wished size."""
+"""A trial is given up after a number of draws that cannot be simulated or have no gap of the requested size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which rig is drawn, and which experiments are done on it?"""
+"""The random rig of a trial and the experiments on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which lists of trials are there, and who draws a trial of each?"""
+"""The designs (lists of trials), and the function that draws a trial of each."""
 
 from __future__ import annotations
 

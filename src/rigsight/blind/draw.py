@@ -1,4 +1,4 @@
-"""What does one trial measure, and what does its key hold? Everything follows from seed, design and the trial's number."""
+"""Records and key of one trial; everything follows from seed, design and the number of the trial."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ class _Bench:
         return values, strengths
 
     def _gap_of(self, effects: Sequence[Effect], values: Mapping[str, float]) -> float:
-        """Return what the linear equations leave of two quiet sweeps, in units of the sensor noise."""
+        """Return the error of the linear equations on two small sweeps, in units of the sensor noise."""
         plant = self._plant(effects, values)
         records = []
         for experiment in self.experiments[1:3]:
@@ -191,7 +191,7 @@ class _Bench:
         return Plant(structure, values, np.array(sizes))
 
     def _rest(self, effects: Sequence[Effect], rng: np.random.Generator | None) -> NDArray[np.float64]:
-        """Return the states of the plant at rest; the phase of what pulsates is anything."""
+        """Return the states of the plant at rest; the phase of a periodic disturbance is random."""
         values = self.linear.values
         rig = self.linear.rig
         rest = evaluated(rig.motion.rest, values)
@@ -286,7 +286,7 @@ class _Bench:
         return [p.name for p in self.linear.rig.parameters if p.name != "force_off"]
 
     def gap(self, records: Sequence[Record], refit: FitResult) -> float:
-        """Return what the re-identified equations leave of the validation records, in units of the noise floor."""
+        """Return the error of the re-identified equations on the validation records, in units of the noise floor."""
         scored = GreyBoxFit(self.structure, records, self.scales, self.noise).fit(refit.values, [])
         left = np.concatenate(scored.residuals) / [self.floor[name] for name in self.outputs]
         return float(np.max(np.sqrt(np.mean(left**2, axis=0))))

@@ -1,11 +1,11 @@
-"""Which effects does the catalogue not hold? A diagnosis that meets one of them should say `unknown`.
+"""Effects outside the catalogue, for which a diagnosis should answer `unknown`.
 
-Four resemble nothing in the catalogue: a stiffness that pulsates, a drive that weakens as it warms up, one whose gain depends on
-the displacement, a sensor that drifts. Five resemble something: each has the sign, symmetry and loss of a catalogue effect, but
-another law. None of them becomes a catalogue equation, alone or with other linear parameters, for any value drawn here (a van
-der Pol term, for instance, is position-dependent damping beside less viscous damping, and friction of one direction is Coulomb
-friction beside an offset; a resistance that grows with the deflection is friction that goes with a spring's load: none of these
-is in). Two more are smooth laws of the deflection and of the speed, drawn anew for each trial, so that nobody chose their form.
+Four resemble nothing in the catalogue: a stiffness that varies periodically, a drive that weakens as it warms up, a drive whose
+gain depends on the displacement, a sensor that drifts. Five resemble something: each has the sign, symmetry and loss of a
+catalogue effect, but another law. None of them becomes a catalogue equation, alone or with other linear parameters, for any value
+drawn here (a van der Pol term, for instance, is position-dependent damping beside less viscous damping, and friction of one
+direction is Coulomb friction beside an offset; a resistance that grows with the deflection is friction that goes with a spring's
+load: none of these is in). Two more are smooth laws of the deflection and of the speed, drawn at random for each trial.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""How does a drawn rig move? By an integrator of its own, which shares neither code nor input samples with the simulation.
+"""Motion of a random rig, by a separate integrator that shares neither code nor input samples with the simulation.
 
-The eighth-order method of Dormand and Prince (scipy) with error control, restarted at every kink, at every end that a memory
-reaches, wherever friction catches or lets go the mass, and where the input jumps. Each such moment is found as a root along the
-method's interpolant.
+The eighth-order method of Dormand and Prince (scipy) with error control, restarted at every kink, when an internal state reaches
+its limit, when friction sticks or slips, and when the input jumps. Each such moment is found as a root along the method's
+interpolant.
 
 References
 ----------
@@ -118,7 +118,7 @@ class Plant:
         SimulationError
             If the motion has no end, or events pile up.
         """
-        late = self._equations.measured_late
+        late = self._equations.reading_delay
         grid = dt * np.arange(n_samples, dtype=np.float64)
         n_states = initial_state.size
         wanted = [_Samples(grid, np.full((n_samples, n_states), np.nan))]
@@ -284,7 +284,7 @@ class _Run:
         return broken
 
     def _enter(self, t: float, state: NDArray[np.float64]) -> None:
-        """Find out what a plant is doing that nobody has watched so far."""
+        """Determine the current modes of a plant at the start."""
         index = self._equations.velocity_sign
         if index is not None and state[self._equations.velocity] == 0.0:
             above, below = self._pushed(t, state)

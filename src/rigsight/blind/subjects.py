@@ -15,7 +15,8 @@ Kind = Literal["single", "pair", "none", "parameters", "outside"]
 Tier = Literal["faint", "clear", "strong"]
 Noise = Literal["low", "high"]
 CatalogueDesign = Literal["small", "standard", "joints"]
-"""Lists of cells on the running gear or an axis; together they hold every effect of the catalogue that is told apart there."""
+"""Lists of cells on the running gear or an axis; together they contain every effect of the catalogue that is distinguishable
+there."""
 
 OF_JOINTS = frozenset({
     "encoder_eccentricity", "load_dependent_friction", "maxwell_branch", "power_law_stiffness", "presliding_friction",
@@ -102,7 +103,7 @@ def _cells(design: CatalogueDesign) -> list[Subject]:
         for tier in tiers
         for noise in NOISES
     ]
-    # A pair is two clear effects: of a faint one beside another nobody can say more than of a faint one alone.
+    # A pair consists of two clear effects: a faint effect next to another is no easier to find than a faint one alone.
     cells += [Subject("pair", (), tiers[1 + i % 2], NOISES[i // 2 % 2]) for i in range(counts["pair"])]
     cells += [Subject("none", (), None, NOISES[i % 2]) for i in range(counts["none"])]
     cells += [Subject("parameters", (), None, NOISES[i % 2]) for i in range(counts["parameters"])]

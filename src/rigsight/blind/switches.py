@@ -45,7 +45,7 @@ class SwitchedEquations:
         Indices of the limited states, and the half-widths of their ranges.
     velocity, velocity_sign
         Index of the velocity among the states, and of its sign among the signs (None if nothing depends on it).
-    delay, measured_late
+    delay, reading_delay
         Dead times of input and of the first output's sensor [s].
     """
 
@@ -59,7 +59,7 @@ class SwitchedEquations:
     velocity: int
     velocity_sign: int | None
     delay: float
-    measured_late: float
+    reading_delay: float
 
 
 def switched_equations(structure: Structure, values: Mapping[str, float]) -> SwitchedEquations:
@@ -109,7 +109,7 @@ def switched_equations(structure: Structure, values: Mapping[str, float]) -> Swi
         velocity=structure.velocity_index,
         velocity_sign=freezer.arguments.index(velocity) if velocity in freezer.arguments else None,
         delay=0.0 if structure.delay is None else float(structure.delay.xreplace(numbers)),
-        measured_late=0.0
+        reading_delay=0.0
         if structure.first_shown_late is None
         else float(structure.first_shown_late.xreplace(numbers)),
     )

@@ -1,6 +1,6 @@
-"""How does an input run at any time, not only at samples?
+"""Waveforms of inputs as functions of continuous time.
 
-A drawn rig is driven by these functions themselves; a record holds their samples.
+A random rig is driven by these functions; a record contains their samples.
 """
 
 from __future__ import annotations

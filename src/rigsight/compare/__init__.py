@@ -1,4 +1,4 @@
-"""How well many models do on many records: responses, steps and free runs, each beside its noise floor."""
+"""Comparison of many models on many records: frequency responses, steps and free runs, each with its noise floor."""
 
 from rigsight.compare.comparison import Comparison as Comparison
 from rigsight.compare.comparison import Competitor as Competitor

@@ -1,4 +1,4 @@
-"""How well do many models do on many records, and which does best?"""
+"""Comparison of many models on many records."""
 
 from __future__ import annotations
 
@@ -353,7 +353,7 @@ def _trial(
         return trial
     if not run.estimated:
         trial.notes.append(
-            f"{competitor.name}: the initial state was guessed, not estimated: the model is too stiff for a fit."
+            f"{competitor.name}: the initial state was approximated, not estimated: the model is too stiff for a fit."
         )
     for path in paths:
         if path.name in measured:
@@ -404,5 +404,5 @@ def _score_response(
     if error.n_lines < _FEWER * measured.omega.size:
         trial.notes.append(
             f"{trial.model}: {path.name} is compared at {error.n_lines} of {measured.omega.size} lines; at the others the "
-            "simulation has no source to divide by."
+            f"simulated source is zero."
         )

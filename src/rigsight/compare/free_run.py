@@ -1,8 +1,8 @@
-"""What does a model predict for a record's input, from the state in which the record begins?
+"""Free run of a model with the input of a record, from the initial state of the record.
 
-The initial state is estimated: nothing but the states at the first sample is fitted to the measured outputs (to those of
-every window, where a rig drifts). A record cut out of a longer measurement does not begin at rest, and a memory of
-hysteresis cannot be measured; what is left over is the model's own. Offsets of the model (psi_off, y_off) stay as they are.
+The initial state is estimated: nothing but the states at the first sample is fitted to the measured outputs (to those of every
+window, where a rig drifts). A record cut out of a longer measurement does not begin at rest, and the internal state of a
+hysteresis cannot be measured; the remaining error is that of the model. Offsets of the model (psi_off, y_off) stay as they are.
 """
 
 from __future__ import annotations
@@ -84,6 +84,6 @@ def free_run(
         if signal.name in record:
             measured, simulated = (np.concatenate([r[signal.name] for r in part]) for part in (windows, runs))
             if not np.all(np.isfinite(simulated)):
-                raise SimulationError(f"The simulated {signal.name} leaves the range of numbers.")
+                raise SimulationError(f"The simulated {signal.name} diverges.")
             errors[signal.name] = nrmse(measured - simulated, measured)
     return FreeRun(whole, bool(np.isfinite(found.cost)), errors)

@@ -1,8 +1,8 @@
-"""How far is a simulated frequency response from a measured one, and how far would noise alone move it?
+"""Error of a simulated frequency response, and the error that noise alone would cause.
 
 The error is the thesis's (5.1), ``sqrt(mean(|measured - simulated|^2))`` over the lines, of the magnitude [unit of the response]
-and of the phase [rad]. Lines are equally spaced in frequency, so the upper decades weigh most; the error in dB counts a
-small magnitude as much as a large one.
+and of the phase [rad]. Lines are equally spaced in frequency, so the upper decades dominate; the error in dB weights small and
+large magnitudes equally.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from rigsight.rigs import Rig
 _CUTS = (80.0, 30.0)
 """Where the thesis cuts the response of the motion to the input, and of what follows it to the motion (4.3 and 4.5) [rad/s]."""
 _LEAST_CLEARNESS = 10.0
-"""Power over variance (10 dB) from which a measured line is compared; a fit asks for more, an error has its floor beside it."""
+"""Power over variance (10 dB) from which a measured line is compared; a fit needs more, while an error is shown with its
+floor."""
 _POLES: Mapping[Method, int] = {"local_rational": 2, "local_polynomial": 0}
 """Degree of the denominator that a local model of several inputs has."""
 _PER_NEPER = 20.0 / math.log(10.0)
@@ -153,7 +154,7 @@ def measured_responses(
 def _of_inputs(
     record: Record, paths: tuple[SignalPath, ...], method: Method
 ) -> tuple[dict[str, FrequencyResponse], list[str]]:
-    """Return the responses to each input that moves in a record; the others say nothing here."""
+    """Return the responses to each input that moves in a record."""
     found: dict[str, FrequencyResponse] = {}
     problems: list[str] = []
     moving = [path for path in paths if path.response in record and not is_constant(record[path.source])]
@@ -227,7 +228,7 @@ def _among_others(
     """Return the response to one of several inputs that move at once, of a local model that holds all of them."""
     if method not in _POLES:
         raise InputError(
-            f"'{method}' knows one input at a time, and {' and '.join(moving)} move at once; use local_rational."
+            f"'{method}' handles one input at a time, but {' and '.join(moving)} move at once; use local_rational."
         )
     smooth = () if path.is_commanded else (path.source,)
     told = responses_of_inputs([record], moving, [path.response], poles=_POLES[method], smooth=smooth)

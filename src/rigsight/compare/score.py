@@ -1,4 +1,4 @@
-"""What is one number of a comparison, and which kinds of numbers are there?"""
+"""A score of a comparison, and the kinds of scores."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ QUANTITIES: dict[Quantity, str] = {
     "magnitude_rmse": "RMSE (5.1) of the magnitude of the frequency response",
     "phase_rmse": "RMSE (5.1) of its phase",
     "magnitude_db": "RMS of the ratio of simulated to measured magnitude in dB",
-    "step_rmse": "RMSE after the step, offsets before it removed",
+    "step_rmse": "RMSE after the step, with the offset before it removed",
     "free_run_nrmse": "RMS(measured - simulated) / RMS(measured - mean) in free run",
 }
 

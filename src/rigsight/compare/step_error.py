@@ -1,4 +1,4 @@
-"""How far is a simulated step from a measured one in the seconds in which it matters?
+"""Error of a simulated step in the seconds after the step.
 
 The thesis (section 5.2.2) compares 180 to 184 s of a step of 0.6 A at 180 s, offsets before the step removed. Here: the first
 four seconds from the step (or another length), each signal less its mean over up to five seconds before it.
@@ -76,7 +76,7 @@ def step_window(record: Record, source: str, seconds: float = DEFAULT_SECONDS) -
     if start - first < _LEAST_BEFORE:
         raise InputError(
             f"Record '{record.name}': the step comes {start * record.dt:.3g} s after the first sample, so the offset before it "
-            "is not known. Record some time at rest before the step."
+            f"is unknown. Record some time at rest before the step."
         )
     stop = min(record.n_samples, start + round(seconds / record.dt) + 1)
     return StepWindow(slice(first, start), slice(start, stop))

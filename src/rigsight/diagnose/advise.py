@@ -1,4 +1,4 @@
-"""Which experiment would tell the rivals of an ambiguous verdict apart? Both are simulated on a small menu of drives.
+"""Which experiment would distinguish the rivals of an ambiguous verdict? Both are simulated for a small set of candidate inputs.
 
 References
 ----------
@@ -33,14 +33,14 @@ class _Experiment:
 
 @dataclass(frozen=True)
 class Advice:
-    """The experiment that would tell a rival from the named effects.
+    """The experiment that would distinguish a rival from the named effects.
 
     Attributes
     ----------
     rival
         Names of the rival's effects.
     waveform, source, amplitude, band
-        What to drive which input with: amplitude in the unit of the input, band [rad/s] where the waveform has one.
+        Waveform of which input: amplitude in the unit of the input, band [rad/s] where the waveform has one.
     output, separation
         Where the two differ most, and the RMS difference of their predictions there in standard deviations of the noise.
     """
@@ -57,10 +57,10 @@ class Advice:
 def advise(
     context: FitContext, chosen: Scored, rivals: Sequence[Scored], noise: Mapping[str, float]
 ) -> tuple[Advice, ...]:
-    """Return, for each rival, the experiment of the menu that would separate it most from the chosen model.
+    """Return, for each rival, the candidate experiment that would distinguish it best from the chosen model.
 
-    The separation is the RMS difference of what the two predict, in standard deviations of the noise, at the output where it is
-    largest. Both models keep the numbers that these records gave them, so that it is an upper bound: a new fit may close some.
+    The separation is the RMS difference of the two predictions, in standard deviations of the noise, at the output where it is
+    largest. Both models keep their fitted parameters, so that it is an upper bound: refitting may reduce it.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def advise(
     chosen
         The named model.
     rivals
-        The models that the records cannot tell from it.
+        The models that the records cannot distinguish from it.
     noise
         Noise floor of each output.
     """

@@ -41,8 +41,8 @@ from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
 
 _REFERENCE_USED = (
-    "It serves as instrument where the frequency responses of two amplitudes are compared, if the input answers it in both; the "
-    "responses in the report do not use it."
+    "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "
+    "the responses in the report do not use it."
 )
 
 
@@ -85,47 +85,44 @@ def diagnose(
     if not campaign.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
-    notes = [note for record in campaign.records for note in record.notes]
+    notes = [*campaign.notes, *(note for record in campaign.records for note in record.notes)]
     notes += closed_loop_notes(campaign.records, campaign.rig, _REFERENCE_USED)
     scored_on = "validation" if campaign.validation else "estimation"
-    if not campaign.validation:
-        notes.append(
-            "There is no validation record: errors are those of the records that were fitted, and too good."
-        )
     if campaign.open_factor is not None:
         notes.append(campaign.open_factor.sentence)
     rng = np.random.default_rng(seed)
     found = examine(campaign, effects, rng, n_jobs, say, prepare, memory)
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
         notes.append(
-            f"A model's error is {_least_left(found):.2g} of what the sensors show while the input rests. The rig moved there, "
-            "in its play or driven by a disturbance, and the noise floor is taken from the top of the spectrum instead."
+            f"A model's error is {_least_left(found):.2g} of the noise floor measured at rest. So the rig was moving at rest, "
+            f"within its play or driven by a disturbance; the noise floor is taken from the top of the spectrum instead."
         )
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
     if found.windowing.bandwidth is not None:
         notes.append(
-            "Nothing brings the rig back, so that every model drifts in free run. Models are compared as observers: each follows "
-            f"the measured motion up to {found.windowing.bandwidth:.3g} rad/s, and its errors are those that build up within "
+            f"The rig has no restoring force, so every model drifts in free run. Models are compared as observers: each tracks "
+            f"the measured motion up to {found.windowing.bandwidth:.3g} rad/s, so the errors are those that build up within "
             f"{1.0 / found.windowing.bandwidth:.2g} s."
         )
     if found.windowing.cycles is not None:
         notes.append(
-            "In free run a disturbance no larger than the noise would change the motion much more than the noise does: the "
-            f"records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own initial state."
+            "In free run the motion is sensitive to small disturbances: one as small as the noise would change it by much more "
+            "than the noise. The records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own "
+            "initial state."
         )
     elif found.judgement.verdict == "unknown":
         growth = growth_of_disturbances(found.context, found.reidentified, found.judgement.model, rng)
         if growth > VERDICT.sensitive:
             notes.append(
-                f"In the nearest model a disturbance no larger than the noise changes the motion by {growth:.2g} times the "
-                "noise: what it leaves may be chance. Records with more motion or shorter ones would tell."
+                f"The motion of the best model is sensitive to small disturbances: one as small as the noise changes it by "
+                f"{growth:.2g} times the noise, so its error may be chance. Record more motion or shorter records to find out."
             )
     notes += [*found.quality.notes, found.judgement.reason, *found.doubts]
     if found.judgement.verdict == "unknown" and found.imitations:
         nearest = min(found.imitations, key=lambda pair: pair.error_over_noise)
         notes.append(
-            f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act "
-            "as one law, and other laws of its kind fit equally well: they are not named."
+            f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act as "
+            f"a single law, and other laws of this kind fit equally well, so they are not named."
         )
     diagnosis = _assembled(campaign, found, notes, scored_on, rng)
     diagnosis = replace(diagnosis, data_quality=found.quality)
@@ -144,13 +141,13 @@ def diagnose(
     forces = forces_at_joints(found.context, found.reidentified)
     if forces:
         say("missing force at each joint")
-    # A push that takes most of the gap away says more than a force of any course.
+    # A push that explains most of the gap is stronger evidence than a force of any shape.
     pushed = max((place.share for place in found.places), default=0.0) >= VERDICT.larger_part
     return replace(
         diagnosis,
         where=diagnosis.where if pushed else traced_to(campaign.rig, forces) or diagnosis.where,
         missing_force=force_of_one_motion(
-            found.context, found.reidentified, campaign.absent_spring is not None, rng
+            found.context, found.reidentified, campaign.absent_spring is None, rng
         ),
         joint_forces=forces,
     )
@@ -247,7 +244,7 @@ def _assembled(
 
 
 def _situation(found: Examination) -> Situation:
-    """Return what the probability of the verdict is told from."""
+    """Return the figures from which the probability of the verdict is computed."""
     ranking, judgement = found.ranking, found.judgement
     first = ranking.order[0] if ranking.order else None
     return Situation(
@@ -263,7 +260,7 @@ def _situation(found: Examination) -> Situation:
 
 
 def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
-    """Return the causes that are at least so probable; the likeliest always."""
+    """Return the causes with at least the required probability, and always the most probable one."""
     outside = max(0.0, 1.0 - math.fsum(candidate.probability for candidate in candidates))
     most = max(outside, *(candidate.probability for candidate in candidates))
     enough = min(least, most)
@@ -274,7 +271,7 @@ def _likely(candidates: Sequence[Candidate], least: float) -> LikelyCauses:
 def _with_disturbance(
     context: FitContext, model: Scored, floors: Sequence[NoiseFloor], bandwidth: float | None
 ) -> tuple[NoiseFloor, ...]:
-    """Return the floors, that of the first output with the force that would leave what a model leaves above it."""
+    """Return the floors, that of the first output with the disturbance force that would cause the error of a model above it."""
     first = context.rig.outputs[0].name
     if not all(first in record for record in context.scoring):
         return tuple(floors)
@@ -300,9 +297,10 @@ def _up_to(floor: NoiseFloor, left: NDArray[np.float64]) -> NoiseFloor:
 
 
 def _evidence(found: Examination) -> tuple[str, ...]:
-    """Return the places to which a gap without a cause is traced.
+    """Return the places to which the evidence points if the cause is unknown.
 
-    Where a push takes most of it away; on a rig with one motion that with whose signals it goes, else the best effect's.
+    The place of the push that explains most; on a rig with one motion the place whose signals correlate with the residual, else
+    the place of the best effect.
     """
     if found.places:
         return tuple(place.name for place in found.places if place.looked_at and place.share > 0.0)

@@ -1,4 +1,4 @@
-"""What does every model leave of the same records, and what is judged from that?"""
+"""Errors of all models on the same records, and the judgement that follows from them."""
 
 from __future__ import annotations
 
@@ -61,23 +61,23 @@ class Examination:
     windowing
         How records were cut.
     before, linear
-        The simulation in question, and its equations with the numbers that fit best.
+        The given simulation, and its equations with refitted parameters.
     ranking
         The candidates.
     judgement
         The verdict.
     quality
-        What the data are good for.
+        Quality of the data.
     imitations
-        Pairs that came near and do not compete, as many another law would come as near.
+        Pairs with a low error that do not compete, because other laws fit equally well.
     places
-        Where a push takes away how much of the gap; empty on a rig with one motion.
+        Share of the gap that a push explains, by place; empty on a rig with one motion.
     adequacy
-        Whether what the model of the verdict leaves goes with anything; None where that model could not be scored.
+        Whether the residual of the diagnosed model is correlated with anything; None where that model could not be scored.
     doubts
-        What is implausible about the numbers of the model of the verdict.
+        Implausible parameters of the diagnosed model.
     gap_at
-        For an unknown cause the joint, drive or sensor with whose signals the gap goes most; empty where none is known.
+        For an unknown cause the joint, drive or sensor whose signals correlate most with the gap; empty where none is known.
     """
 
     floors: tuple[NoiseFloor, ...]
@@ -105,7 +105,7 @@ def examine(
     memory: FitMemory | None,
     at_rest: bool = True,
 ) -> Examination:
-    """Fit the simulation in question, its equations and every candidate; rank and judge them.
+    """Fit the given simulation, its equations and every candidate; rank and judge them.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def examine(
     Raises
     ------
     InputError
-        If the simulation in question cannot be run.
+        If the given simulation cannot be run.
     SimulationError
         If the rig's own equations cannot be simulated near the records.
     """
@@ -188,7 +188,7 @@ def examine(
     vector = noise_vector([signal.name for signal in campaign.rig.outputs], noise)
     candidates = [*models.singles, *pairs]
     likeliest = min(contenders(candidates), key=evidence.criterion, default=None)
-    # A likelihood takes what is left for noise: it counts where the likeliest model leaves no more than that.
+    # A likelihood treats the residual as noise: it is used only if the residual of the most likely model is noise.
     counts = likeliest is not None and checks.is_adequate(likeliest)
     ranking = rank(candidates, vector, rng, reidentified.error_over_noise, evidence.criterion, counts)
     if ranking.order and ranking.order[0].residuals:
@@ -250,7 +250,7 @@ def _places(rig: Rig, ranking: Ranking) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class _Singly:
-    """What every effect explains by itself."""
+    """Results of every effect by itself."""
 
     windowing: Windowing
     context: FitContext
@@ -279,7 +279,7 @@ def _singly(
         )
     bent = bool(campaign.given) and context.leaves_numbers_open(reidentified.fit)
     if bent or not campaign.rig.has_one_motion:
-        # What moves between the sensors, and which forces do it, is known once the equations fit, or from the given simulation.
+        # Motion and forces between the sensors are known once the equations fit, or from the given simulation.
         known = {**campaign.constants, **reidentified.fit.values, **(campaign.given if bent else {})}
         context = replace(context, scales=characteristic_scales(campaign.rig, campaign.estimation, known))
     say("re-identified")
@@ -296,7 +296,7 @@ def _singly(
         search.others
         and min((model.error_over_noise for model in singles), default=np.inf) > VERDICT.at_floor
     ):
-        # Nothing right may be lost where places or effects were ranked wrongly.
+        # A right model must not be lost because places or effects were ranked wrongly.
         if prepare is not None:
             prepare([context.simplest((effect,)) for effect in search.others])
         singles = fit_candidates(context, reidentified, search.others, say, singles)
@@ -339,8 +339,8 @@ def _why_not_run(context: FitContext, structure: Structure, values: Mapping[str,
     told = ", ".join(f"'{record.name}' (sample time {record.dt:.3g} s)" for record in failing[:5])
     where = f" in {told}" if told else ""
     return (
-        f"The given simulation cannot be run: with the given parameters the motion{where} leaves the range of numbers, or is too "
-        "fast for the sample time. Check the units of time and input, and the given parameters."
+        f"The given simulation cannot be run: with the given parameters the motion{where} diverges or is too fast for the sample "
+        f"time. Check the units of time and input, and the given parameters."
     )
 
 

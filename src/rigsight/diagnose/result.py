@@ -1,4 +1,4 @@
-"""What a diagnosis found, as data: verdict, ranking, gap budget, traces; no pictures and no files."""
+"""Result of a diagnosis as data: verdict, ranking, gap budget, traces; no pictures and no files."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ class OutputGap:
     before
         The simulation as given; what was not given is identified.
     reidentified
-        The same equations with the best numbers.
+        The same equations with refitted parameters.
     after
         With the effects of the verdict added.
     noise_floor
-        What a perfect model would leave.
+        Error of a perfect model.
     intervals
         95 % limits by stage and of ``"closed"``, see `quantify.gap_intervals`.
     """
@@ -61,7 +61,7 @@ class OutputGap:
 
     @property
     def closed(self) -> float:
-        """Share of the gap that is gone, 1 at the noise floor; 1 where there was none."""
+        """Share of the gap that is closed, 1 at the noise floor; 1 where there was none."""
         gap = self.before - self.noise_floor
         return 1.0 if gap <= 0.0 else (self.before - self.after) / gap
 
@@ -86,9 +86,9 @@ class Candidate:
     parameters
         Every fitted parameter of rig and effects.
     success, message
-        Whether the fit converged, and the optimizer's words.
+        Whether the fit converged, and the message of the optimizer.
     grounds
-        What the probability rests on; None for the equations without an effect.
+        Basis of the probability; None for the equations without an effect.
     std_method
         Where the standard errors come from: ``"bootstrap"`` for the diagnosed simulation (`uncertainty/bootstrap.py`), else
         ``"formula"``, that of the fit.
@@ -109,14 +109,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class LikelyCauses:
-    """The smallest set of causes that holds the true one in nine trials of ten.
+    """The smallest set of causes that contains the true one in nine trials of ten.
 
     Attributes
     ----------
     sets
         Names of the effects of each; empty names are the equations without an effect.
     outside
-        True if a cause that is none of the candidates belongs to the set.
+        True if a cause outside the candidates belongs to the set.
     """
 
     sets: tuple[tuple[str, ...], ...] = ()
@@ -143,42 +143,42 @@ class Diagnosis:
     model
         The diagnosed simulation, ready for ``model.json``.
     notes
-        What was noticed on the way, one sentence each.
+        Notes, one sentence each.
     windows
-        Length [s] of the windows scored with their own initial states, None where whole records are.
+        Length [s] of the windows scored with their own initial states, None for whole records.
     window_cycles
-        Cycles of motion in such a window where chance has a part in longer ones, else None.
+        Cycles of motion in such a window if the motion is sensitive to small disturbances, else None.
     bandwidth
-        Angular frequency [rad/s] up to which an observer follows the measured motion of a rig that drifts, else None.
+        Angular frequency [rad/s] up to which an observer tracks the measured motion of a rig that drifts, else None.
     scored_on
         ``"validation"``, or ``"estimation"`` where the campaign has no validation records.
     data_quality
-        What the records themselves say; None where they were not asked.
+        Findings in the records themselves; None where they were not checked.
     advice
-        For each rival that the records cannot tell apart, the experiment that would.
+        For each rival that the records cannot distinguish, the experiment that would.
     localization
         The gap split by record, amplitude, band, state, time and signal path.
     effect_shares
         Effect -> output -> share of the closed gap that it explains, where the verdict names several.
     places
-        Share of the squared gap of the re-identified equations that the best push at each joint, drive and sensor takes away, the
+        Share of the squared gap of the re-identified equations that the best push at each joint, drive and sensor explains, the
         largest first; empty on a rig with one motion.
     missing_force
-        What sparse regression makes of the missing force on a rig with one motion, where no effect explains the gap.
+        The missing force on a rig with one motion, from sparse regression, if no effect explains the gap.
     joint_forces
-        The force that would have to be missing at each joint of any other rig then, the likeliest first.
+        On any other rig, the force that would have to be missing at each joint then, the most likely first.
     adequate
-        Whether what the diagnosed simulation leaves is noise and disturbance; None where that could not be asked.
+        Whether the residual of the diagnosed simulation is noise and disturbance; None where that could not be tested.
     remainder
-        What it leaves above them; None as above.
+        Its error above them; None as above.
     likely
-        The causes that the records leave open.
+        The causes that the records do not exclude.
     error_of_choice
-        What a model that was chosen on part of the scored records leaves of the rest, in units of the noise floor; None where no
-        model with an effect was chosen by its errors.
+        Error, on the rest of the scored records, of a model selected on part of them, in units of the noise floor; None where no
+        model with an effect was selected by its errors.
     trust
-        Whether the numbers of the verdict's model are the same in every record, at every amplitude and in shorter windows; None
-        where that was not asked.
+        Whether the parameters of the diagnosed model are the same in every record, at every amplitude and in shorter windows;
+        None where that was not tested.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""Governing equations from records by sparse regression; pysindy stays in here."""
+"""Governing equations from records by sparse regression; only this package uses pysindy."""
 
 from rigsight.discover.discovery import METHODS as METHODS
 from rigsight.discover.discovery import discover as discover

@@ -1,4 +1,4 @@
-"""How does what the stages found become one result?"""
+"""Assembly of the results of all stages."""
 
 from __future__ import annotations
 

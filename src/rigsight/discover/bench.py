@@ -1,4 +1,4 @@
-"""What does a support of terms explain? It is polished by output error and scored by free runs of records it has not seen."""
+"""Fit and score of a set of terms (a support): output-error fit, then free runs on held-out records."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ class Attempt:
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """The first evaluations of a fit."""
+class _Screening:
+    """The first evaluations of a fit, by which attempts that are far behind are dropped."""
 
     attempt: Attempt
     problem: GreyBoxFit
@@ -257,14 +257,16 @@ class Bench:
         It is far behind what was done before or what all of these came to at the same stage, so that the order in which threads
         do them changes nothing.
         """
-        looks = self._first_looks(attempts)
-        costs = [trial.fit.cost for trial in self.trials.values()] + [look.fit.cost for look in looks]
+        screenings = self._screened(attempts)
+        costs = [trial.fit.cost for trial in self.trials.values()] + [
+            screening.fit.cost for screening in screenings
+        ]
         hopeless = HOPELESS**2 * min(costs, default=float("inf"))
 
-        def further(look: _Look) -> _RoughTrial:
-            fit = look.fit
+        def further(screening: _Screening) -> _RoughTrial:
+            fit = screening.fit
             if not fit.success and fit.cost < hopeless:
-                fit = look.problem.fit(
+                fit = screening.problem.fit(
                     fit.values,
                     fit.free,
                     fit.initial_states,
@@ -273,12 +275,12 @@ class Bench:
                     finish=False,
                     substeps=fit.substeps,
                 )
-            attempt = look.attempt
+            attempt = screening.attempt
             worth = float("inf") if attempt.to_beat is None else min(attempt.to_beat, hopeless)
             return self._roughly_scored(attempt.support, fit, worth)
 
         rough = []
-        for trial in self.threads.side_by_side(further, looks):
+        for trial in self.threads.side_by_side(further, screenings):
             progress(trial.support)
             rough.append(trial)
         errors = [trial.error_over_noise for trial in self.trials.values()] + [
@@ -291,7 +293,7 @@ class Bench:
 
         return list(self.threads.side_by_side(finished, rough))
 
-    def _first_looks(self, attempts: Sequence[Attempt]) -> list[_Look]:
+    def _screened(self, attempts: Sequence[Attempt]) -> list[_Screening]:
         """Return for each attempt the better one of the fits from its starts."""
         structures = [self.structure(attempt.support, attempt.release) for attempt in attempts]
         problems = [
@@ -302,7 +304,7 @@ class Bench:
             [attempt.start] if attempt.start is not None else self._own_starts(attempt, structure)
             for attempt, structure in zip(attempts, structures, strict=True)
         ]
-        # Second starts come last: beside the first one they would only wait for the same kernel to be compiled.
+        # Second starts come last: next to the first one they would only wait for the same kernel to be compiled.
         begun = [
             (number, own[rank])
             for rank in range(max(map(len, starts), default=0))
@@ -321,7 +323,7 @@ class Bench:
         for (number, _), fit in zip(begun, self.threads.side_by_side(looked, begun), strict=True):
             if number not in best or fit.cost < best[number].cost:
                 best[number] = fit
-        return [_Look(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
+        return [_Screening(attempt, problems[i], best[i]) for i, attempt in enumerate(attempts)]
 
     def _own_starts(self, attempt: Attempt, structure: Structure) -> list[dict[str, float]]:
         """Return the regression's values, and beside them those of the lowest cost that a contained support came to.

@@ -1,4 +1,4 @@
-"""The whole discovery: records and a rig -> library, sparse regression, held-out selection, polished equations."""
+"""The whole discovery: records and a rig -> library, sparse regression, held-out selection, refitted equations."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def discover(
     data
         Records and rig.
     method
-        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term.
-        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. A rig of several joints has no other.
+        ``"full"``: the whole acceleration is regressed, the rig's damper competes with every other term. ``"discrepancy"``: the
+        rig's own terms are kept and their residual is regressed; the only form for a rig of several joints.
     pointwise
         Regress sample by sample instead of in the weak form; not for a rig of several joints.
     seed
@@ -83,8 +83,8 @@ def discover(
     if not data.rig.has_one_motion:
         if method != "discrepancy" or pointwise:
             raise InputError(
-                f"The rig '{data.rig.name}' has several joints: its missing forces are regressed through its responses, in the "
-                "discrepancy form. Leave the form and the point-wise rows to rigs of one motion."
+                f"The rig '{data.rig.name}' has several joints: missing forces are found by regression on its responses, in the "
+                f"discrepancy form. The full form and point-wise rows are available only for rigs with one motion."
             )
         return discover_at_joints(data, seed, progress, n_jobs)
     say = progress or (lambda _: None)
@@ -94,7 +94,7 @@ def discover(
     values = _linear_values(data, estimation)
     scales = characteristic_scales(data.rig, estimation, values)
     output = data.rig.outputs[0].name
-    # What the motion knows nothing of would be simulated in every fit.
+    # Outputs that do not affect the motion would otherwise be simulated in every fit.
     alone = tuple(_without_downstream(data.rig, record) for record in estimation)
     swallowed, centered = _offsets_found(data, alone, values, scales, _held(data))
     motions = threads.results(
@@ -103,7 +103,7 @@ def discover(
     )
     say("motion smoothed")
     rows = rows_of(motions, scales["time"], pointwise)
-    projected = own_regression(data.rig, data.no_spring, motions, rows)
+    projected = own_regression(data.rig, data.has_stiffness, motions, rows)
     library = _library(data, motions, rows, projected, scales, threads)
     library, same = _distinct(library, projected)
     say("library")
@@ -117,7 +117,7 @@ def discover(
         held=_held(data) | swallowed,
         candidates={candidate.name: candidate for candidate in library},
         projected=projected,
-        own_terms=own_terms(data.rig, data.no_spring, projected) if method == "full" else {},
+        own_terms=own_terms(data.rig, data.has_stiffness, projected) if method == "full" else {},
         threads=threads,
     )
     selection = select(bench, say)
@@ -127,10 +127,10 @@ def discover(
         )
     chosen = _without_damper(bench, selection, say)
     final, held = _polished(data, bench, chosen)
-    # A record that was set aside is fitted by the polish as well: only the equation before it has not seen it.
+    # A record that was set aside is used in the final fit too: it is unseen only for the selection of the equation.
     judged = chosen if how else bench.scored(chosen.support, final)
     if not math.isfinite(judged.error_over_noise):
-        raise SimulationError("The polished equations cannot be simulated on the held-out records.")
+        raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     say("polished")
     included = inclusion(data, bench, selection, final, motions, rows, rng)
     force = regressed_force(bench, final, motions, rows, rng)
@@ -140,7 +140,7 @@ def discover(
 
 
 def _linear_values(data: RegressionData, estimation: Sequence[Record]) -> dict[str, float]:
-    known = {"k": 0.0} if data.no_spring else {}
+    known = {} if data.has_stiffness else {"k": 0.0}
     return {
         **data.campaign.constants,
         **linear_start(data.rig, estimation, data.campaign.constants, {**known, **data.held}),
@@ -154,8 +154,8 @@ def _held(data: RegressionData) -> frozenset[str]:
     if data.rig.is_driven:
         # A linear spring cannot tell a constant force from a shifted rest position.
         rest, bias = motion.rest.free_symbols, motion.bias.free_symbols
-        held |= {symbol.name for symbol in (rest if data.no_spring else bias)}
-    if data.no_spring:
+        held |= {symbol.name for symbol in (bias if data.has_stiffness else rest)}
+    if not data.has_stiffness:
         held.add(motion.stiffness.name)
     return frozenset(held)
 
@@ -193,7 +193,7 @@ def _library(
     scales: Mapping[str, float],
     threads: IdleThreads,
 ) -> list[Candidate]:
-    effects = offered_effects(data.rig, not data.no_spring)
+    effects = offered_effects(data.rig, data.has_stiffness)
     if all(is_constant(motion.u) for motion in motions):
         effects = [effect for effect in effects if effect.place is not Place.ACTUATOR]
     found = candidates(effects, motions, rows, projected, scales, data.rig.is_driven, threads)
@@ -210,7 +210,7 @@ def _distinct(
     stands_for: dict[str, list[str]] = {}
     dropped: set[int] = set()
     for i, j, _ in alike(projected, columns, _SAME_COLUMN):
-        # A loop may turn into friction or damping, not the other way round: the simpler term stands for it.
+        # A loop may degenerate to friction or damping, but not vice versa: the simpler term represents it.
         loops = [is_loop(library[k].effect) for k in (i, j)]
         first, second = (j, i) if loops == [True, False] else (i, j)
         if first not in dropped and second not in dropped:
@@ -280,4 +280,7 @@ def _polished(data: RegressionData, bench: Bench, chosen: Trial) -> tuple[FitRes
         return fit, ""
     told = ", ".join(f"{name} = {value:.4g} +/- {error:.2g}" for name, (value, error) in known.items())
     kept = ", ".join(f"{name} = {value:g}" for name, value in special.items())
-    return held, f"{kept} is held; released, the fit says {told}, and the other coefficients move with it."
+    return (
+        held,
+        f"{kept} is held; if released, the fit gives {told}, and the other coefficients change with it.",
+    )

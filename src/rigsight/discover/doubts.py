@@ -1,4 +1,4 @@
-"""What should a user know before using the equations? Doubts about a term, and about the records, in words."""
+"""Warnings before the equations are used: doubts about terms and about the records."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ def doubts(effect: Effect, own: Mapping[str, Coefficient], inclusion: float, sam
         if not math.isfinite(coefficient.std):
             found.append(f"{name} is not determined by these records")
         elif name not in effect.special_cases and coefficient.std > size / _ZERO:
-            found.append(f"{name} cannot be told from zero")
+            found.append(f"{name} is not significantly different from zero")
         elif coefficient.std > _VAGUE * size:
             found.append(f"{name} is known to {100.0 * coefficient.std / size:.0f} % only")
     if inclusion < _SURE:
-        found.append(f"sparse regression takes it in {100.0 * inclusion:.0f} % of the draws")
+        found.append(f"sparse regression selects it in {100.0 * inclusion:.0f} % of the draws")
     if same:
-        found.append(f"{' and '.join(same)} would do as well on these records")
+        found.append(f"{' and '.join(same)} would fit equally well on these records")
     return "; ".join(found)
 
 
@@ -96,23 +96,22 @@ def warnings_of(
     if rivals:
         listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in rivals[:3])
         found.append(
-            f"The noise is too high, or the records too short, to decide the terms: as good is {listed}. "
-            "Add records of other amplitudes, or average repeated ones."
+            f"The noise is too high, or the records too short, to select the terms: {listed} fits equally well. Add records at "
+            f"other amplitudes, or average repeated ones."
         )
     extra = sorted({name for trial in richer for name in trial.support - chosen.support})
     if extra:
-        found.append(
-            f"In doubt: {', '.join(extra)}. With it the held-out error is lower, but not by enough to tell it from chance."
-        )
+        found.append(f"In doubt: {', '.join(extra)}. It lowers the held-out error, but not significantly.")
     if floor > _NOISY and likeliest:
         found.append(
-            f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change it by less: "
-            f"every term left out is in doubt. Regression would take {likeliest} next, which in such noise proves nothing."
+            f"The noise is {100.0 * floor:.0f} % of the held-out motion, too high to decide on terms that change the motion by "
+            f"less: every omitted term is in doubt. Regression would select {likeliest} next, which proves nothing at this noise "
+            f"level."
         )
     if error_over_noise > _FLOOR:
         found.append(
             f"The equations leave {error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-            "something is still missing, or disturbances are larger than the floor says."
+            "an effect is still missing, or disturbances are larger than the noise floor."
         )
     found += [f"{term.name}: {term.doubt}." for term in terms if term.kept and term.doubt]
     if force is not None:
@@ -144,13 +143,13 @@ def _same_input(source: str, estimation: Sequence[Record], held_out: Sequence[Re
         return []
     listed = "; ".join(f"'{name}' as '{fitted}'" for name, fitted in list(twins.items())[:_MOST_NAMED])
     return [
-        f"Held-out records have the input of fitted ones: {listed}. There even wrong terms may fit; the error says little about "
-        "other motion. Add a validation record of another waveform or amplitude."
+        f"Held-out records have the input of fitted ones: {listed}. With the same input even wrong terms may fit, so the error "
+        f"says little about other motion. Add a validation record with another waveform or amplitude."
     ]
 
 
 def _one_amplitude(selection: Selection, chosen: Trial) -> str:
-    """Return what records of a single amplitude tell apart, and what they do not."""
+    """Return what records of a single amplitude distinguish, and what they do not."""
     others = sorted(
         (
             t
@@ -161,14 +160,20 @@ def _one_amplitude(selection: Selection, chosen: Trial) -> str:
     )
     near = [t for t in others if t.error_over_noise < _NEAR * chosen.error_over_noise]
     if not others:
-        told = "Softening, hardening, friction or hysteresis may look like other numbers of the same equation there"
+        told = (
+            "Softening, hardening, friction or hysteresis may look like other parameters of the same equation at this "
+            "amplitude"
+        )
     elif near:
         listed = "; ".join(", ".join(sorted(trial.support)) or "no term at all" for trial in near[:3])
-        told = f"Nearly as good there is {listed}"
+        told = f"At this amplitude {listed} is nearly as good"
     else:
         ratio = others[0].error_over_noise / chosen.error_over_noise
-        told = f"There the terms are told apart (the next equation leaves {ratio:.3g} times as much), elsewhere they are untested"
+        told = (
+            f"At this amplitude the terms are distinguished (the error of the next equation is {ratio:.3g} times as large), "
+            f"at others they are untested"
+        )
     return (
-        f"The records have one amplitude: how a force grows with it has not been seen. {told}. "
+        f"The records have only one amplitude, so they do not show how a force grows with amplitude. {told}. "
         "Add a record at half or twice the amplitude."
     )

@@ -1,4 +1,4 @@
-"""How surely does each term belong? Regressions of resampled rows about the rest position of the polished equation."""
+"""Inclusion probability of each term: regressions of resampled rows about the rest position of the refitted equation."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def inclusion(
     shares = {n: bench.projected.explained(c.column[:, None])[1] for n, c in bench.candidates.items()}
     ranked = sorted(shares, key=lambda name: -shares[name])
     kept = set(final.structure.effect_names)
-    # An effect that contains a kept one as a special case explains whatever that does, and would only share its draws.
+    # An effect that contains a selected one as a special case explains everything that this does, and would only share its draws.
     offered_terms = [
         name
         for name in dict.fromkeys((*polished, *proposed, *ranked))
@@ -54,8 +54,8 @@ def inclusion(
     if abs(shift) < _SAME_REST * bench.scales["x"]:
         shift = 0.0
     moved = [replace(m, x=m.x - shift, measured=m.measured - shift) for m in motions] if shift else motions
-    projected = own_regression(data.rig, data.no_spring, moved, rows) if shift else bench.projected
-    own_columns = own_terms(data.rig, data.no_spring, projected) if bench.own_terms else {}
+    projected = own_regression(data.rig, data.has_stiffness, moved, rows) if shift else bench.projected
+    own_columns = own_terms(data.rig, data.has_stiffness, projected) if bench.own_terms else {}
     library = [bench.candidates[name] for name in names]
     if shift:
         # The loop does not know where rest is.
@@ -96,8 +96,8 @@ def regressed_force(
         return float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
 
     own_values = final.structure.values_of(law.effect, values)
-    assert law.effect.elastic_share is not None
-    without_memory = own_values[law.effect.elastic_share] * number(motion.stiffness)
+    assert law.effect.post_yield_stiffness_ratio is not None
+    without_memory = own_values[law.effect.post_yield_stiffness_ratio] * number(motion.stiffness)
     shift = _rest_shift(bench, final)
     forces = []
     for own in motions:

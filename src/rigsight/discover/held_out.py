@@ -1,4 +1,4 @@
-"""Which records choose between equations, and which are they fitted to?"""
+"""Split of the records into those that are fitted and those that select the equations."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def split(data: RegressionData) -> tuple[tuple[Record, ...], tuple[Record, ...],
         return (
             rest,
             (middle,),
-            f"No record is for validation; '{middle.name}' was set aside to choose the terms.",
+            f"There is no validation record; '{middle.name}' was set aside to select the terms.",
         )
     cut = int((1.0 - _HELD_BACK) * estimation[0].n_samples)
     return (
         (estimation[0].slice(0, cut),),
         (replace(estimation[0].slice(cut, None), name=f"{estimation[0].name} (end)"),),
-        "There is a single record; its last part was set aside to choose the terms, which judges no other amplitude.",
+        "There is a single record; its last part was set aside to select the terms, so no other amplitude is tested.",
     )

@@ -1,6 +1,6 @@
-"""What does the force look like that an equation lacks? A quick sparse regression on products of displacement and velocity.
+"""Shape of the force missing in an equation: a quick sparse regression on products of displacement and velocity.
 
-No cause is named and nothing is simulated: the terms describe what any cause must look like along these records.
+No cause is named and nothing is simulated: the terms describe the missing force in these records, whatever causes it.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class MissingForce:
     terms
         The terms that sparse regression takes, the surest first; may be empty.
     share
-        Share of what the equation leaves of the acceleration (or force, as power) that they explain; noise counts as left.
+        Share of the residual of the acceleration (or force, as power) that they explain, including noise.
     """
 
     terms: tuple[ShapeTerm, ...]
@@ -70,8 +70,8 @@ class MissingForce:
             return "No product of displacement x and velocity v describes the missing force."
         told = " and ".join(f"{t.coefficient:.3g} {t.term} ({t.unit})" for t in self.terms)
         return (
-            f"Along these records the missing force is about {told}, with the displacement x and the velocity v: "
-            f"that explains {self.share:.0%} of what the equations leave."
+            f"In these records the missing force is about {told}, with displacement x and velocity v; this explains "
+            f"{self.share:.0%} of the error of the equations."
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -90,9 +90,9 @@ def missing_force(
     scales: Mapping[str, float],
     noise: float,
     rng: np.random.Generator,
-    no_spring: bool = False,
+    has_stiffness: bool = True,
 ) -> MissingForce:
-    """Regress what the rig's own terms leave of the motion.
+    """Regression of the residual of the rig's own terms.
 
     Parameters
     ----------
@@ -108,18 +108,18 @@ def missing_force(
         Noise floor of the first output.
     rng
         Source of the ensemble.
-    no_spring
-        True for an axis that has none.
+    has_stiffness
+        False for an axis without a spring.
     """
     motions = [motion_of(rig, record, values, noise) for record in records]
     rows = rows_of(motions, scales["time"])
-    projected = own_regression(rig, no_spring, motions, rows)
-    library = candidates(plain_terms(rig, not no_spring), motions, rows, projected, scales, rig.is_driven)
+    projected = own_regression(rig, has_stiffness, motions, rows)
+    library = candidates(plain_terms(rig, has_stiffness), motions, rows, projected, scales, rig.is_driven)
     library = [c for c in library if np.all(np.isfinite(c.column)) and np.any(c.column)]
     if not library:
         return MissingForce((), 0.0)
     columns = np.column_stack([candidate.column for candidate in library])
-    # Of terms that these records cannot tell apart the first stands for both: a pendulum's sine is a cube until it swings far.
+    # Of indistinguishable terms only the first is kept: the sine of a pendulum looks like a cubic term unless the swing is large.
     doubles = {second for _, second, _ in alike(projected, columns, _SAME_COLUMN)}
     library = [candidate for i, candidate in enumerate(library) if i not in doubles]
     columns = columns[:, [i for i in range(columns.shape[1]) if i not in doubles]]
@@ -131,7 +131,7 @@ def missing_force(
     coefficients, share = projected.explained(columns[:, taken])
     force = 1.0
     if rig.is_driven:
-        # The drive's force is known: per unit of acceleration it gives the inertia that goes with these terms.
+        # The force of the drive is known: its ratio to the acceleration gives the inertia for these terms.
         gain = evaluated(rig.motion.drive_gain, values)
         drive, *_ = projected.solved(columns[:, taken])[0]
         force = gain / drive if gain * drive > 0.0 else evaluated(rig.motion.inertia, values)

@@ -1,7 +1,7 @@
-"""What did the mass do, and which force is missing? Kalman filter and Rauch-Tung-Striebel smoother with the known input.
+"""Motion of the mass and the missing force: Kalman filter and Rauch-Tung-Striebel smoother with the known input.
 
-The rig's linear equations carry the estimate; the force that they leave over is a state of its own, an integrated random walk.
-Its intensity is the one that makes the record most likely, so that the records decide how fast it may change.
+The linear equations of the rig are the model; the missing force is an additional state, an integrated random walk. Its intensity
+is estimated by maximum likelihood, so that the records decide how fast the force may change.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What do the rig's own terms explain? The regression that every further term is added to."""
+"""Regression on the rig's own terms, to which every further term is added."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def rows_of(motions: Sequence[Motion], time: float, pointwise: bool = False) -> 
     return Rows.weak(_WINDOW * 2.0 * np.pi * time, motions[0].dt)
 
 
-def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
+def own_regression(rig: Rig, has_stiffness: bool, motions: Sequence[Motion], rows: Rows) -> Projected:
     """Return the regression of acceleration (or force, where the motion is prescribed) on the rig's own terms.
 
     Parameters
     ----------
     rig
         The rig.
-    no_spring
-        True for an axis that has none.
+    has_stiffness
+        False for an axis without a spring.
     motions
         Of all records.
     rows
@@ -51,7 +51,7 @@ def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: R
             continue
         # A constant drive is part of the constant term; its column stays, so that the others keep their places.
         drive = np.zeros_like(one) if rests else rows.of(motion.u)
-        own = (drive, -velocity, one) if no_spring else (drive, -velocity, -displacement, one)
+        own = (drive, -velocity, -displacement, one) if has_stiffness else (drive, -velocity, one)
         blocks.append(np.column_stack(own))
         targets.append(rows.acceleration(motion))
     target = np.concatenate(targets)
@@ -59,11 +59,11 @@ def own_regression(rig: Rig, no_spring: bool, motions: Sequence[Motion], rows: R
     return Projected(np.concatenate(blocks), target, independent)
 
 
-def own_terms(rig: Rig, no_spring: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:
+def own_terms(rig: Rig, has_stiffness: bool, projected: Projected) -> dict[str, NDArray[np.float64]]:
     """Return the columns of the rig's damper and spring, which compete in the full form."""
     motion = rig.motion
     first = 1 if rig.is_driven else 0
     own = {motion.damping.name: projected.base[:, first]}
-    if not no_spring:
+    if has_stiffness:
         own[motion.stiffness.name] = projected.base[:, first + 1]
     return own

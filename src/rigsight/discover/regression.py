@@ -1,8 +1,7 @@
-"""Which terms does sparse regression take, in which order, and how surely? pysindy's optimizers on columns without units.
+"""Which terms sparse regression selects, in which order, and how often: pysindy's optimizers on dimensionless columns.
 
-What the rig has anyway (its drive, its rest position, and in the discrepancy form its damper and spring too) is projected out
-first, so that it never competes. Rows are kept as a triangular factor, which has the same normal equations as all rows and a
-few hundred times fewer of them.
+The rig's own terms (its drive, its rest position and, in the discrepancy form, its damper and spring) are projected out first, so
+that they never compete. Rows are stored as a triangular factor with the same normal equations and a few hundred times fewer rows.
 
 References
 ----------
@@ -24,7 +23,8 @@ N_ENSEMBLE = 40
 N_BLOCKS = 40
 """Contiguous stretches of rows that an ensemble draws from: neighboring rows share their noise."""
 _CLEARLY = 1.1
-"""Factor by which a larger support must lower what is left: the columns, made of a smoothed motion, are no better."""
+"""Factor by which a larger support must lower the residual: the columns, from a smoothed motion, are not more accurate than
+this."""
 _TINY = 1e-10
 _RIDGE = 1e-12
 
@@ -62,7 +62,7 @@ class Projected:
         return np.asarray(columns - self._directions @ (self._directions.T @ columns))
 
     def explained(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Return coefficients of further columns and the share of what the base leaves that they explain."""
+        """Return coefficients of further columns and the share of the residual of the base that they explain."""
         left, added = self.rest, self.rest_of(columns)
         size = np.linalg.norm(added, axis=0)
         if np.any(size <= _TINY * np.linalg.norm(columns, axis=0)):
@@ -72,7 +72,7 @@ class Projected:
         return solution / size, float(1.0 - (rest @ rest) / (left @ left))
 
     def solved(self, columns: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of what is left."""
+        """Return coefficients of base and further columns, shape (n_base + n_columns,), and the RMS of the residual."""
         matrix = np.column_stack([self.base, columns])
         size = np.linalg.norm(matrix, axis=0) + 1e-300
         solution = np.linalg.lstsq(matrix / size, self.target, rcond=1e-12)[0]

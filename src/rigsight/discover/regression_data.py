@@ -39,9 +39,9 @@ class RegressionData:
         return self.campaign.records if self.windows is None else self.windows
 
     @property
-    def no_spring(self) -> bool:
-        """True for an axis that has none."""
-        return has_no_spring(self.campaign)
+    def has_stiffness(self) -> bool:
+        """False for an axis that is given without a spring."""
+        return has_stiffness(self.campaign)
 
     @property
     def held(self) -> dict[str, float]:
@@ -50,12 +50,12 @@ class RegressionData:
         return {} if factor is None else {factor.held: factor.value}
 
 
-def has_no_spring(campaign: Campaign) -> bool:
-    """Return True for one motion that is given without a spring.
+def has_stiffness(campaign: Campaign) -> bool:
+    """Return False for one motion that is given without a spring.
 
     Parameters
     ----------
     campaign
         The campaign.
     """
-    return campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0
+    return not (campaign.rig.has_one_motion and campaign.parameters.get("k") == 0.0)

@@ -1,4 +1,4 @@
-"""What did a discovery find? Equations, terms with intervals and inclusion probabilities, and the model, as data."""
+"""Result of a discovery as data: equations, terms with intervals and inclusion probabilities, and the model."""
 
 from __future__ import annotations
 

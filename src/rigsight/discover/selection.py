@@ -1,7 +1,7 @@
-"""Which terms stay? Every support is polished by output error and judged by free-run simulation of records it has not seen.
+"""Selection of terms: every support is fitted by output error and judged by free-run simulation of held-out records.
 
-Regression proposes and this decides. A term must earn its place on the held-out records by more than the Bayesian information
-criterion of their independent samples; of two models that those cannot tell apart the one with fewer terms is kept.
+Regression proposes terms, this selects. A term must improve the fit to the held-out records by more than the penalty of the
+Bayesian information criterion for their independent samples; of two indistinguishable models the one with fewer terms is kept.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def independent_samples(residuals: NDArray[np.float64]) -> float:
     centered = residuals - np.mean(residuals)
     power = np.abs(np.fft.rfft(centered, 2 * n)) ** 2
     correlation = np.fft.irfft(power)[: n // 2] / max(float(centered @ centered), 1e-300)
-    # Beyond a tenth of the record, what is left of the correlation is chance.
+    # Beyond a tenth of the record the remaining correlation is random.
     lags = correlation[1 : max(2, n // 10)]
     return float(max(n / (1.0 + 2.0 * np.sum(lags**2)), 10.0))
 
@@ -118,7 +118,8 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
             break
         pool += tried(list(as_long))
     if not any(at_floor(trial) for trial in pool):
-        # A rich term may stand for a simple one in the regression, and its fit stop where that of the simple one does not.
+        # A complex term may replace a simple one in the regression, and its fit may get stuck where that of the simple one does
+        # not.
         pool += tried(_special_cases(bench, [trial.support for trial in pool]))
     independent = independent_samples(min(pool, key=lambda t: t.error_over_noise).residuals)
 
@@ -126,14 +127,14 @@ def select(bench: Bench, progress: Callable[[str], None]) -> Selection:
         return criterion(trial, independent)
 
     best = _fewest(pool, cost)
-    # A term that another one has made needless goes, however late that one came.
+    # A term that another one has made unnecessary is removed, even if that one was added later.
     for number in range(_ROUNDS + _MOST_TERMS):
         shorter = _simpler(bench, best.support)
         longer = [best.support | {name} for name in next_terms(bench, best.support)]
         if number >= _ROUNDS or len(best.support) >= _MOST_TERMS or at_floor(best):
             longer = []
         pool += tried([*shorter, *longer])
-        # What stopped short from the regression's values may go on from those of the longer equation.
+        # A fit that stopped too early from the values of the regression may continue from those of the longer equation.
         pool += bench.shortened([support for support in shorter if support], best)
         finest = min(pool, key=lambda t: t.error_over_noise)
         independent = independent_samples(finest.residuals)
@@ -189,7 +190,7 @@ def proposals(bench: Bench) -> list[Support]:
     def cost(support: tuple[int, ...]) -> float:
         return information_criterion(left(support), len(support), bench.projected.independent)
 
-    # Short ones first: what reaches the noise floor with one term needs no look at two.
+    # Short ones first: if one term reaches the noise floor, two need not be tried.
     ordered = sorted(sorted(short, key=cost)[:_SEEDS], key=lambda support: (len(support), cost(support)))
     return [frozenset(names[i] for i in support) for support in ordered]
 
@@ -213,7 +214,7 @@ def _special_cases(bench: Bench, supports: Sequence[Support]) -> list[Support]:
 
 
 def next_terms(bench: Bench, support: Support) -> list[str]:
-    """Return the terms that explain most of what a support leaves of the regression, the first one first."""
+    """Return the terms that explain most of the regression residual of a support, the best first."""
     inside = [bench.candidates[name].column for name in sorted(support)]
     projected = replace(bench.projected, base=np.column_stack([bench.projected.base, *inside]))
     left = [name for name in bench.candidates if name not in support]

@@ -1,4 +1,4 @@
-"""Where does the fit of a support start? At the values of the regression, or where the fit of a shorter support ended."""
+"""Start values of the fit of a support: those of the regression, or the result of a shorter support."""
 
 from __future__ import annotations
 
@@ -99,15 +99,15 @@ class SupportStarts:
         own |= {name: share * coefficient for name, share in candidate.linear.items()}
         found: dict[str, float] = {}
         if is_loop(effect):
-            assert effect.elastic_share is not None
+            assert effect.post_yield_stiffness_ratio is not None
             stiffness = self.rig.motion.stiffness.name
             without = max(values[stiffness], _SMALL * coefficient)
             total = without + max(coefficient, _SMALL * without)
             found[stiffness] = total
-            own[effect.elastic_share] = without / total
+            own[effect.post_yield_stiffness_ratio] = without / total
         for parameter in effect.parameters:
             if parameter.name in candidate.linear and parameter.lower == 0.0:
-                # A resisting force that the regression turns round is one that is hardly there.
+                # A resisting force with the wrong sign in the regression is negligible.
                 own[parameter.name] = max(own[parameter.name], _SMALL * abs(own[parameter.name]))
             if parameter.name in own:
                 found[structure.parameter_name(effect, parameter.name)] = own[parameter.name]

@@ -1,7 +1,7 @@
-"""How does a record become rows of a regression? Against smooth test functions (the weak form), or point by point.
+"""Rows of a regression from a record: integrals with smooth test functions (the weak form), or single points.
 
-In the weak form every row is an integral over a window. Derivatives move to the test function, so that the measured
-displacement itself gives acceleration and velocity and nothing is differentiated.
+In the weak form every row is an integral over a window. Derivatives are moved to the test function by integration by parts, so
+that measured signals are not differentiated.
 
 References
 ----------

@@ -6,7 +6,7 @@ Equation
 
 k_2: quadratic stiffness [force per displacement squared]; the effect vanishes at 0.
 
-Applies to springs that are stiffer to one side and to symmetric hardening springs that work off their center. Valid while
+Applies to springs that are stiffer on one side and to symmetric hardening springs that operate off their center. Valid while
 ``|k_2 x| < k``; beyond that the spring pushes away from rest.
 
 Signature: even harmonics and a mean that shifts with amplitude.
@@ -25,7 +25,7 @@ k_2 = sp.Symbol("k_2", real=True)
 ASYMMETRIC_STIFFNESS = Effect(
     name="asymmetric_stiffness",
     place=Place.DYNAMICS,
-    summary="The spring is stiffer to one side than to the other.",
+    summary="The spring is stiffer on one side than on the other.",
     parameters=(
         Parameter(
             "k_2",

@@ -9,9 +9,8 @@ g: half-width of the play; the effect vanishes at 0. w rests until x has crossed
 Applies to gears, keyways and loose joints whose far side is held by friction, so that it stays where it was left. Play whose
 far side returns by itself is free play.
 
-Signature: at small amplitude the spring is missing altogether, at large amplitude it is softer and less damped, because its
-torque lags the motion and so gives energy back that it never took (a lightly damped rig hunts); odd harmonics; loops at any
-speed, as wide at every amplitude.
+Signature: at small amplitude the spring has no effect; at large amplitude it is softer, and damping is lower, because its torque
+lags the motion and adds energy (a lightly damped rig hunts); odd harmonics; loops at any speed, equally wide at every amplitude.
 
 References: M. A. Krasnosel'skii and A. V. Pokrovskii, *Systems with Hysteresis* (Springer 1989), the play operator;
 M. Nordin and P.-O. Gutman, Automatica 38 (2002) 1633.
@@ -28,7 +27,7 @@ g, z = sp.symbols("g z", real=True)
 BACKLASH = Effect(
     name="backlash",
     place=Place.DYNAMICS,
-    summary="The spring follows the motion only after the motion has crossed a play.",
+    summary="There is play between the displacement and the spring; the play moves along with the motion.",
     parameters=(
         Parameter(
             "g",

@@ -4,13 +4,11 @@ Equation
 --------
 ``spring torque = a k x + (1 - a) k z``,  ``z' = A x' - beta |x'| |z|^(n-1) z - gamma x' |z|^n``
 
-=========  ==================================================================================
-A          scale of z; redundant (z -> c z changes nothing), kept at 1
-a          share of the stiffness without memory, 0 to 1; the effect vanishes at 1
-beta       with gamma: loading branch saturates at z_max = (1/(beta + gamma))^(1/n)
-gamma      with beta: unloading branch, slope set by beta - gamma
-n          sharpness of the transition, 1 or more
-=========  ==================================================================================
+=========  ================================================================================== A          scale of z; redundant (z
+-> c z changes nothing), kept at 1 a          ratio of the post-yield stiffness to k, 0 to 1; the effect vanishes at 1 beta
+with gamma: loading branch saturates at z_max = (1/(beta + gamma))^(1/n) gamma      with beta: unloading branch, slope set by beta
+- gamma n          sharpness of the transition, 1 or more =========
+==================================================================================
 
 Applies to rubber, dry-friction dampers, rolling contact and magnetorheological elements with rounded, rate-independent
 loops. Does not describe viscous losses, nor pinched or creeping loops.
@@ -74,12 +72,12 @@ _FROM_PRESLIDING = Start(
 BOUC_WEN_HYSTERESIS = Effect(
     name="bouc_wen_hysteresis",
     place=Place.DYNAMICS,
-    summary="Part of the spring torque lags behind the deflection and depends on its history (rounded loops).",
+    summary="Part of the spring torque depends on the history of the deflection (rounded hysteresis loops).",
     parameters=(
         Parameter("A", "scale of z, redundant", "", lower=1e-6, upper=1e6, default=1.0, fitted=False),
         Parameter(
             "a",
-            "share of the stiffness without memory",
+            "ratio of post-yield to initial stiffness",
             "",
             lower=0.0,
             upper=1.0,
@@ -117,7 +115,7 @@ BOUC_WEN_HYSTERESIS = Effect(
         ),
     ),
     energy=Energy.DISSIPATIVE,
-    elastic_share="a",
+    post_yield_stiffness_ratio="a",
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque + (1 - a) * k * z,
     states=(

@@ -1,4 +1,4 @@
-"""Conicity variation: the wheel's profile steepens away from the middle.
+"""Conicity variation: the wheel profile steepens away from the center.
 
 Equation
 --------
@@ -8,7 +8,7 @@ y_n: lateral displacement at which the restoring part has doubled; the effect va
 
 Applies to worn or curved wheel profiles. Does not describe a contact that saturates.
 
-Signature: y is held back at large displacement, most where it is slow; odd harmonics in y alone.
+Signature: y is reduced at large displacement, most at low frequency; odd harmonics in y alone.
 
 References: A. H. Wickens, *Fundamentals of Rail Vehicle Dynamics* (Swets & Zeitlinger 2003), on equivalent conicity.
 """
@@ -24,7 +24,7 @@ y_n = sp.Symbol("y_n", real=True)
 CONICITY_VARIATION = Effect(
     name="conicity_variation",
     place=Place.LATERAL_DYNAMICS,
-    summary="The wheel profile steepens away from the middle and holds the axle back.",
+    summary="The wheel profile steepens away from the center, so that the restoring effect on the axle grows with displacement.",
     parameters=(
         Parameter(
             "y_n",

@@ -26,7 +26,7 @@ T_c = sp.Symbol("T_c", real=True)
 COULOMB_FRICTION = Effect(
     name="coulomb_friction",
     place=Place.DYNAMICS,
-    summary="Dry friction of constant size opposes the motion and holds the mass when the torque is small.",
+    summary="Dry friction of constant size opposes the motion; the mass sticks while the torque is small.",
     parameters=(
         Parameter(
             "T_c",

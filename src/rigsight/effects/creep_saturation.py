@@ -25,7 +25,7 @@ s = sp.Symbol("s", real=True)
 CREEP_SATURATION = Effect(
     name="creep_saturation",
     place=Place.LATERAL_DYNAMICS,
-    summary="The rolling contact saturates: large creepage moves the axle less than in proportion.",
+    summary="The rolling contact saturates: at large creepage the lateral rate grows less than the creepage.",
     parameters=(
         Parameter(
             "s",

@@ -1,4 +1,4 @@
-"""Directional friction: dry friction of another size each way.
+"""Directional friction: dry friction that differs between the two directions.
 
 Equation
 --------
@@ -10,11 +10,11 @@ T_fwd  friction while x' is positive [force]
 T_bwd  friction while x' is negative [force]; vanishes with T_fwd
 =====  ==========================================================
 
-Applies to lip seals, worm and screw drives, wipers and brushes, whose contact is not the same both ways. It obeys the equation
-of Coulomb friction (T_fwd + T_bwd) / 2 beside a constant force (T_fwd - T_bwd) / 2: it is told from that only where the constant
+Applies to lip seals, worm and screw drives, wipers and brushes, whose contact depends on the direction. The equation is that of
+Coulomb friction (T_fwd + T_bwd) / 2 plus a constant force (T_fwd - T_bwd) / 2; the two can be distinguished only if the constant
 force at the joint, or the rest position of its spring, is known.
 
-Signature: as Coulomb friction, and a mean that shifts with the motion; even harmonics.
+Signature: like Coulomb friction, and the mean position shifts with the motion; even harmonics.
 
 References: B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994) 1083, on friction that depends on the
 direction.
@@ -31,7 +31,7 @@ T_fwd, T_bwd, T_c = sp.symbols("T_fwd T_bwd T_c", real=True)
 DIRECTIONAL_FRICTION = Effect(
     name="directional_friction",
     place=Place.DYNAMICS,
-    summary="Dry friction is larger one way than the other.",
+    summary="Dry friction is larger in one direction than in the other.",
     parameters=(
         Parameter(
             "T_fwd",

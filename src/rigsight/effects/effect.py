@@ -129,48 +129,48 @@ class Effect:
     place
         Where in the signal path it acts.
     summary
-        One plain sentence for people.
+        One sentence that describes the effect.
     parameters
         Its parameters; setting all those with a null value to it removes the effect exactly.
     energy
         What it does to mechanical energy over a closed cycle.
     signature
-        How it shows itself in sine tests.
+        How it shows in sine tests.
     torque
         Torque (force) that resists the motion, subtracted from the drive, of x, v, t.
     spring
         The spring torque in terms of ``spring_torque``, ``k``, ``deflection`` and states.
     deflection
-        What the spring sees of the displacement, of ``x`` and states.
+        Deflection of the spring as a function of ``x`` and states.
     drive
-        What leaves the actuator in terms of ``u`` and states.
+        Output of the actuator in terms of ``u`` and states.
     delay
         Time by which the input arrives late [s].
     lateral
         Rate of the lateral displacement, of ``creepage``, ``creep_gain``, ``lateral_displacement`` and ``lateral_feedback``.
     measured
-        What the sensor of the displacement shows, of ``reading`` and states.
-    measured_late
-        Time by which that sensor is late [s].
+        Reading of the sensor as a function of ``reading`` and states.
+    reading_delay
+        Delay of the sensor reading [s].
     states
         States added, with their rates.
-    elastic_share
-        Parameter that is the share of the spring's stiffness without memory; a fit moves that stiffness and the rest of it, with
-        memory, because records determine those apart.
+    post_yield_stiffness_ratio
+        Parameter that is the ratio of the post-yield stiffness to the initial stiffness. A fit varies the post-yield stiffness
+        and the hysteretic remainder, because records determine these two independently.
     pulsation
-        Parameter that is the angular frequency of what pulsates by itself; a fit starts at the line that the records show.
+        Parameter that is the angular frequency of a periodic disturbance; a fit starts at a spectral line of the records.
     wave_number
-        Parameter that is the wave number of what comes back with the position; a fit starts at the line over the position that
-        the records show.
+        Parameter that is the wave number of an effect periodic in the position; a fit starts at a line of the spectrum over
+        position.
     searched_as
         Parameters that a fit moves as sum and difference.
     ordered
-        Pairs of parameters of the same dimension of which the first is never smaller; a fit moves by how much it is larger.
+        Pairs of parameters of the same dimension of which the first is never smaller; a fit varies the difference.
     starts
         Start values worth trying; default are the combinations of the parameters' own starts. A parent named there is a
         special or limiting case of this effect, and wins a tie.
     special_cases
-        Parameter values that simplify the equations (an exponent of 1): tried first, released later.
+        Parameter values that simplify the equations (such as an exponent of 1): held first, released later.
     needs_inertia
         True if it makes no sense where the motion is prescribed.
     at
@@ -190,9 +190,9 @@ class Effect:
     delay: sp.Expr | None = None
     lateral: sp.Expr | None = None
     measured: sp.Expr | None = None
-    measured_late: sp.Expr | None = None
+    reading_delay: sp.Expr | None = None
     states: tuple[State, ...] = ()
-    elastic_share: str | None = None
+    post_yield_stiffness_ratio: str | None = None
     pulsation: str | None = None
     wave_number: str | None = None
     searched_as: tuple[SumAndDifference, ...] = ()
@@ -211,11 +211,11 @@ class Effect:
     @property
     def shifts_the_record(self) -> bool:
         """True for a reading whose time base stands off, either way: what is recorded, not what a control law reads."""
-        return self.measured_late is not None and any(p.lower < 0.0 for p in self.parameters)
+        return self.reading_delay is not None and any(p.lower < 0.0 for p in self.parameters)
 
     @property
     def holds_constant_force(self) -> bool:
-        """True for a force with a mean that goes with the direction: no record tells the mean from a constant force."""
+        """True for a force whose mean depends on the direction: no record distinguishes this mean from a constant force."""
         lopsided = self.torque is not None and self.signature.even_harmonics
         return lopsided and not (self.reads(symbols.x) or self.reads(symbols.position))
 
@@ -233,7 +233,7 @@ class Effect:
             One of `rigsight.effects.symbols`.
         """
         equations = (
-            self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.measured_late,
+            self.torque, self.spring, self.deflection, self.drive, self.delay, self.lateral, self.measured, self.reading_delay,
             *(part for state in self.states for part in (state.rate, state.limit)),
         )  # fmt: skip
         return any(part is not None and signal in part.free_symbols for part in equations)

@@ -1,4 +1,4 @@
-"""Encoder eccentricity: the reading is wrong by an error that comes back with the position.
+"""Encoder eccentricity: the reading has an error that is periodic in the position.
 
 Equation
 --------
@@ -15,7 +15,7 @@ The amplitude is ``sqrt(e_sin^2 + e_cos^2)``, the phase ``atan2(e_cos, e_sin)``.
 Applies to disks and magnets that sit off the center of the shaft, and to the interpolation between the lines of an encoder. A
 torque ripple moves the mass; this error moves only the reading, as much at rest as at any speed.
 
-Signature: an error that is the same at every speed and drive; gain that goes with the place about which the rig moves; even
+Signature: an error that is the same at every speed and drive; the gain depends on the position about which the rig moves; even
 harmonics.
 
 References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on shaft encoders.
@@ -32,7 +32,7 @@ e_sin, e_cos, kappa = sp.symbols("e_sin e_cos kappa", real=True)
 ENCODER_ECCENTRICITY = Effect(
     name="encoder_eccentricity",
     place=Place.SENSOR,
-    summary="The reading is wrong by an error that repeats with the position.",
+    summary="The reading has an error that is periodic in the position.",
     parameters=(
         Parameter(
             "e_sin",

@@ -1,14 +1,12 @@
-"""Flexible mode: a further mass on a spring and a damper rides on the moving one.
+"""Flexible mode: a second mass is attached to the moving mass by a spring and a damper.
 
 Equation
 --------
 ``torque = m_a (w_a^2 (x - q) + 2 zeta_a w_a (x' - q'))``,  ``q'' = w_a^2 (x - q) + 2 zeta_a w_a (x' - q')``
 
-======  ==================================================
-m_a     inertia of the further mass; the effect vanishes at 0
-w_a     its angular frequency where the main mass is held
-zeta_a  its damping ratio there
-======  ==================================================
+======  ================================================== m_a     inertia of the second mass; the effect vanishes at 0 w_a
+its angular frequency where the main mass is held zeta_a  its damping ratio there ======
+==================================================
 
 Applies to compliant couplings, frames, cables and sensors' brackets that ring. The rig's own inertia is that of the main mass
 alone.
@@ -38,11 +36,11 @@ def _at(ratio: float, share: float) -> Start:
 FLEXIBLE_MODE = Effect(
     name="flexible_mode",
     place=Place.DYNAMICS,
-    summary="A further mass on a spring rides on the moving one and adds a resonance.",
+    summary="A second mass is attached to the moving mass by a spring and adds a resonance.",
     parameters=(
         Parameter(
             "m_a",
-            "inertia of the further mass",
+            "inertia of the second mass",
             "force time^2 x^-1",
             lower=0.0,
             upper=1e9,

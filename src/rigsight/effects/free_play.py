@@ -6,7 +6,8 @@ Equation
 
 g: half-width of the play; the effect vanishes at 0.
 
-Applies to worn joints and loose couplings in series with the spring, without memory. Play that is carried along is backlash.
+Applies to worn joints and loose couplings in series with the spring, without memory. Play that moves along with the motion is
+backlash.
 
 Signature: soft at small amplitude, stiffening towards the full stiffness; odd harmonics.
 
@@ -24,7 +25,7 @@ g = sp.Symbol("g", real=True)
 FREE_PLAY = Effect(
     name="free_play",
     place=Place.DYNAMICS,
-    summary="The spring is loose around its rest position.",
+    summary="The spring has a gap around its rest position in which it does not act.",
     parameters=(
         Parameter(
             "g",

@@ -26,7 +26,7 @@ m_e = sp.Symbol("m_e", real=True)
 INERTIA = Effect(
     name="inertia",
     place=Place.DYNAMICS,
-    summary="A mass moves with the element and takes its share of the measured force.",
+    summary="A mass moves with the element, and its inertia force is part of the measured force.",
     parameters=(
         Parameter(
             "m_e",

@@ -24,7 +24,7 @@ T_d = sp.Symbol("T_d", real=True)
 INPUT_DELAY = Effect(
     name="input_delay",
     place=Place.ACTUATOR,
-    summary="The drive acts later than it was commanded.",
+    summary="The drive acts later than commanded.",
     parameters=(
         Parameter(
             "T_d", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)

@@ -1,15 +1,14 @@
-"""Iwan hysteresis of the spring: many small sliders behind springs, which let go one after the other.
+"""Iwan hysteresis of the spring: many spring-slider elements in parallel, which slip one after the other.
 
 Equation
 --------
 ``spring torque = a k x + (1 - a) k sum_i w_i z_i``,  ``z_i' = x'`` within ``-s_i <= z_i <= s_i`` (held at the ends),
 ``s_i = x_s 10^(-2.7 (11 - 2 i) / 12)``, i = 0 to 5,  ``w_i = s_i^q / sum_j s_j^q``
 
-===  =====================================================================================
-a    share of the stiffness without memory, 0 to 1; the effect vanishes at 1
-x_s  deflection at which (nearly) all elements slip
-q    which elements are stiff: below 0 those that slip early, above 0 those that slip late
-===  =====================================================================================
+===  ===================================================================================== a    ratio of the post-yield stiffness
+to k, 0 to 1; the effect vanishes at 1 x_s  deflection at which (nearly) all elements slip q    which elements are stiff: below 0
+those that slip early, above 0 those that slip late ===
+=====================================================================================
 
 k is the stiffness at very small motion, where nothing slips.
 
@@ -71,11 +70,11 @@ _AGAIN = tuple(
 IWAN_HYSTERESIS = Effect(
     name="iwan_hysteresis",
     place=Place.DYNAMICS,
-    summary="Part of the spring torque comes from many small sliders that let go one after the other.",
+    summary="Part of the spring torque comes from many small friction sliders that slip one after the other.",
     parameters=(
         Parameter(
             "a",
-            "share of the stiffness without memory",
+            "ratio of post-yield to initial stiffness",
             "",
             lower=0.0,
             upper=1.0,
@@ -104,7 +103,7 @@ IWAN_HYSTERESIS = Effect(
         ),
     ),
     energy=Energy.DISSIPATIVE,
-    elastic_share="a",
+    post_yield_stiffness_ratio="a",
     signature=Signature(gain_trend=GainTrend.RISES),
     spring=a * spring_torque
     + (1 - a) * k * sum(w * z for w, z in zip(_weights, elements, strict=True)) / sum(_weights),

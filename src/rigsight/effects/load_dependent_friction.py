@@ -1,4 +1,4 @@
-"""Load-dependent friction: dry friction that grows with what the joint carries.
+"""Load-dependent friction: dry friction that grows with the load of the joint.
 
 Equation
 --------
@@ -15,10 +15,11 @@ is twice the weight, as the gears are pressed from both sides. Forces of inertia
 the drive's force and the external torque that of the spring; on a bench that prescribes the motion the load is the spring's
 force.
 
-Applies to geared servos, worm drives and screws. Told from Coulomb friction only where the load varies: by several payloads, or
-by a weight or spring that pushes with and against the motion. Friction that also falls with speed is Stribeck friction.
+Applies to geared servos, worm drives and screws. Can be distinguished from Coulomb friction only if the load varies: by several
+payloads, or by a weight or spring that acts with and against the motion. Friction that also falls with speed is Stribeck
+friction.
 
-Signature: as Coulomb friction, but what is lost at a reversal grows with the drive.
+Signature: like Coulomb friction, but the jump of the force at a reversal grows with the drive.
 
 References: M. Duclusaud et al., *Extended Friction Models for the Physics Simulation of Servo Actuators* (arXiv 2410.08650),
 model M3; P. Hamon, M. Gautier and P. Garrec, IEEE/RSJ IROS (2010) 6187, on friction of robot joints over load and speed.

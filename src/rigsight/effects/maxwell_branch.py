@@ -1,4 +1,4 @@
-"""Maxwell branch: beside the spring another one, in series with a damper, which relaxes.
+"""Maxwell branch: a second spring in series with a damper, parallel to the spring.
 
 Equation
 --------
@@ -13,10 +13,9 @@ q is the deflection of the branch's own spring. With it the rig's own spring is 
 the standard linear solid (Zener's model).
 
 Applies to rubber, belts, ropes, hydraulic bushings and gears with plastic teeth, whose stiffness grows with frequency. Loops
-that are as wide at every speed are hysteresis, a further resonance is a flexible mode.
+whose width does not depend on speed are hysteresis; an additional resonance is a flexible mode.
 
-Signature: stiffness that rises and damping that falls about the frequency 1 / tau_m, at every amplitude; a step creeps to its
-end.
+Signature: stiffness that rises and damping that falls about the frequency 1 / tau_m, at every amplitude; creep after a step.
 
 References: J. D. Ferry, *Viscoelastic Properties of Polymers* (Wiley 1980), chapter 1.
 """
@@ -38,7 +37,7 @@ def _at(ratio: float) -> Start:
 MAXWELL_BRANCH = Effect(
     name="maxwell_branch",
     place=Place.DYNAMICS,
-    summary="Beside the spring another one relaxes through a damper.",
+    summary="A second spring in series with a damper acts in parallel to the spring and relaxes.",
     parameters=(
         Parameter(
             "k_m",

@@ -1,4 +1,4 @@
-"""Periodic disturbance: a torque that comes back with its own period, whatever the drive does.
+"""Periodic disturbance: an external torque that is periodic in time, independent of the drive.
 
 Equation
 --------
@@ -12,7 +12,7 @@ w_p  angular frequency
 Applies to eccentric rollers, unbalance at constant speed, cogging and mains hum. Does not describe a disturbance whose speed
 follows the motion.
 
-Signature: a line in the response that stays where it is when the excitation changes or rests.
+Signature: a spectral line in the response that stays at its frequency when the excitation changes or stops.
 
 References: L. Ljung, *System Identification* (Prentice Hall 1999), on periodic disturbances.
 """
@@ -27,7 +27,7 @@ T_p, w_p, phi = sp.symbols("T_p w_p phi", real=True)
 PERIODIC_DISTURBANCE = Effect(
     name="periodic_disturbance",
     place=Place.DISTURBANCE,
-    summary="A torque from outside repeats with its own period.",
+    summary="An external torque is periodic in time, independent of the drive.",
     parameters=(
         Parameter(
             "T_p",

@@ -1,4 +1,4 @@
-"""Position-dependent damping: the damper grips harder away from rest.
+"""Position-dependent damping: damping increases away from the rest position.
 
 Equation
 --------

@@ -1,4 +1,4 @@
-"""Power-law stiffness: beside the spring another one whose force grows with a power of the deflection.
+"""Power-law stiffness: a second spring in parallel whose force grows with a power of the deflection.
 
 Equation
 --------
@@ -29,7 +29,7 @@ k_p, n, x_r, k_3 = sp.symbols("k_p n x_r k_3", real=True)
 POWER_LAW_STIFFNESS = Effect(
     name="power_law_stiffness",
     place=Place.DYNAMICS,
-    summary="Beside the spring a force grows with a power of the deflection.",
+    summary="A force parallel to the spring grows with a power of the deflection.",
     parameters=(
         Parameter(
             "k_p",

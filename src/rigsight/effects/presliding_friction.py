@@ -1,4 +1,4 @@
-"""Presliding friction (Dahl): dry friction that builds up over a small displacement, like a spring that yields.
+"""Presliding friction (Dahl): dry friction that builds up over a small displacement, like a yielding spring.
 
 Equation
 --------
@@ -9,15 +9,15 @@ T_c  friction once it slides [force]; the effect vanishes at 0
 x_p  displacement over which the friction builds up; T_c / x_p is its stiffness
 ===  ============================================================================
 
-This is the Bouc-Wen element with n = 1 and gamma = 0, without a spring of its own, and so the LuGre model without its bristle
-damping and its friction that falls with speed. It is preferred to LuGre because records of drives that move by more than x_p do
-not determine these two beside the viscous damping; where friction falls with speed, see Stribeck friction.
+This is the Bouc-Wen element with n = 1 and gamma = 0 and without a parallel spring, or the LuGre model without bristle damping
+and without friction that falls with speed. It is preferred to LuGre because records with motion larger than x_p do not determine
+these two in addition to the viscous damping. For friction that falls with speed, see Stribeck friction.
 
-Applies to ball bearings, guides and gears that turn back often, or that rest under a small torque: they give way and come back
-before they slide. As x_p goes to 0 this is Coulomb friction.
+Applies to ball bearings, guides and gears that reverse often or stand still under a small torque: they deflect elastically before
+they slide. As x_p goes to 0 this is Coulomb friction.
 
-Signature: stiffer at small amplitude, as if a spring were there that large motions do not know; rounded loops at any speed; odd
-harmonics.
+Signature: stiffer at small amplitude, like an additional spring that has no effect in large motions; rounded loops at any speed;
+odd harmonics.
 
 References: P. R. Dahl, *A Solid Friction Model* (Aerospace Corporation TOR-0158, 1968); C. Canudas de Wit et al., IEEE TAC 40
 (1995) 419 (LuGre).
@@ -34,7 +34,7 @@ T_c, x_p, z = sp.symbols("T_c x_p z", real=True)
 PRESLIDING_FRICTION = Effect(
     name="presliding_friction",
     place=Place.DYNAMICS,
-    summary="Dry friction gives way like a spring before it slides.",
+    summary="Dry friction deflects like a spring before it slides.",
     parameters=(
         Parameter(
             "T_c",

@@ -1,4 +1,4 @@
-"""Sensor delay: the displacement is measured later than it happens.
+"""Sensor delay: the displacement is measured with a delay.
 
 Equation
 --------
@@ -6,10 +6,11 @@ Equation
 
 T_s: dead time of the sensor; the effect vanishes at 0.
 
-Applies to sensors that average, filter digitally or are polled. On a rig whose displacement drives nothing else that is
-measured, it cannot be told from a delay of the input.
+Applies to sensors that average, filter digitally or are polled. If no other measured signal depends on the displacement, it
+cannot be distinguished from an input delay.
 
-Signature: phase that falls in proportion to frequency, in the displacement alone; what follows from it is early.
+Signature: phase that falls in proportion to frequency, in the displacement alone; signals that depend on the displacement appear
+early.
 
 References: K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems* (Prentice Hall 1997), on time delays.
 """
@@ -24,7 +25,7 @@ T_s = sp.Symbol("T_s", real=True)
 SENSOR_DELAY = Effect(
     name="sensor_delay",
     place=Place.SENSOR,
-    summary="The displacement is measured later than it happens.",
+    summary="The displacement is measured with a delay.",
     parameters=(
         Parameter(
             "T_s", "dead time", "time", lower=0.0, upper=1e6, null=0.0, starts=(0.05, 0.2), search=(0.0, 3.0)
@@ -32,5 +33,5 @@ SENSOR_DELAY = Effect(
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
-    measured_late=T_s,
+    reading_delay=T_s,
 )

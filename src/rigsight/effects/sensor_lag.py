@@ -6,10 +6,10 @@ Equation
 
 T_m: time constant of the sensor; the effect vanishes at 0.
 
-Applies to sensors with an analogue filter or slow electronics. On a rig whose displacement drives nothing else that is
-measured, it cannot be told from a lag of the actuator.
+Applies to sensors with an analogue filter or slow electronics. If no other measured signal depends on the displacement, it cannot
+be distinguished from a lag of the actuator.
 
-Signature: the displacement loses gain and phase above 1 / T_m; what follows from it does not.
+Signature: the displacement loses gain and phase above 1 / T_m; signals that depend on the displacement do not.
 
 References: E. O. Doebelin, *Measurement Systems* (McGraw-Hill 2004), on first-order instruments.
 """

@@ -4,16 +4,15 @@ Equation
 --------
 ``drive = u`` limited from above to ``u_s - c_u x'`` and from below to ``-u_s - c_u x'``
 
-===  ===============================================================================================
-u_s  largest drive input at standstill (stall); the effect vanishes where it is beyond all inputs
-c_u  drive input that is lost per speed (back-EMF); ``u_s / c_u`` is the speed at which nothing is left
-===  ===============================================================================================
+===  =============================================================================================== u_s  largest drive input at
+standstill (stall); the effect vanishes where it is beyond all inputs c_u  drive input that is lost per speed (back-EMF); ``u_s /
+c_u`` is the no-load speed ===  ===============================================================================================
 
 Applies to motors under current or torque control whose supply voltage is used up by back-EMF, and to hydraulic drives at full
-flow. At c_u = 0 this is input saturation. Back-EMF of a motor that is driven by its voltage takes torque at every input; that is
-viscous damping, and not told from it.
+flow. At c_u = 0 this is input saturation. The back-EMF of a voltage-driven motor reduces the torque at every input; that is the
+same as viscous damping.
 
-Signature: gain falls above one input amplitude, sooner where the motion is fast and along with the input; odd harmonics.
+Signature: gain falls above an input amplitude, which is lower where velocity is high and in phase with the input; odd harmonics.
 
 References: A. Hughes and B. Drury, *Electric Motors and Drives* (Newnes 2013), on the torque-speed curve of DC motors.
 """
@@ -29,7 +28,7 @@ u_s, c_u, u_max = sp.symbols("u_s c_u u_max", real=True)
 SPEED_LIMIT = Effect(
     name="speed_limit",
     place=Place.ACTUATOR,
-    summary="What the drive can give at most falls with speed.",
+    summary="The largest drive input falls with speed.",
     parameters=(
         Parameter(
             "u_s",

@@ -10,12 +10,12 @@ T_s        level at standstill [force]
 w_s        Stribeck velocity
 =========  =========================================
 
-T_s is at least T_c: dry friction that rises with speed has a law of another form, such as a sign that is rounded.
+T_s is at least T_c: dry friction that rises with speed follows another law, such as a smoothed sign function.
 
-Applies to lubricated contacts that pass slowly through standstill. Not told from Coulomb friction unless the records hold
-slow passes through w_s.
+Applies to lubricated contacts that pass slowly through standstill. Cannot be distinguished from Coulomb friction unless the
+records contain slow motion around w_s.
 
-Signature: as Coulomb friction, with stick-slip at low speed.
+Signature: like Coulomb friction, with stick-slip at low speed.
 
 References: B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083.
 """

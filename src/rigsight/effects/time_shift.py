@@ -1,4 +1,4 @@
-"""Time shift: one signal's time base stands off from that of the others.
+"""Time shift: the time base of one signal is offset from that of the others.
 
 Equation
 --------
@@ -6,12 +6,13 @@ Equation
 
 T_x: time by which the signal is recorded late, below 0 where it is early; the effect vanishes at 0.
 
-Applies to channels of two loggers, to interfaces that buffer, and to columns that were aligned by hand. It shifts the record and
-not what a control loop reads; a sensor that is late for the loop as well is a sensor delay, a drive that acts late an input
-delay. On a rig that moves freely a late signal is called by these names, an early one by this: no rig answers before it is asked.
+Applies to channels of two loggers, to interfaces that buffer, and to columns that were aligned by hand. Only the record is
+shifted, not the signal that a control loop reads; if the loop also sees the late signal, the effect is a sensor delay, and if the
+drive acts late, an input delay. On a rig with a driven mass a late signal is called a sensor or input delay and only an early
+signal a time shift, because the output cannot precede the input.
 
-Signature: phase in proportion to frequency, magnitude untouched, at every amplitude; on an element loops that open with frequency
-like damping, but in every force alike, that of friction too.
+Signature: phase in proportion to frequency, magnitude untouched, at every amplitude; on an element the loops open with frequency,
+like damping, but equally for every part of the force, including friction.
 
 References: L. Ljung, *System Identification* (Prentice Hall 1999), section 4.2.
 """
@@ -27,7 +28,7 @@ T_x = sp.Symbol("T_x", real=True)
 TIME_SHIFT = Effect(
     name="time_shift",
     place=Place.SENSOR,
-    summary="A signal is recorded early or late against the others.",
+    summary="The time stamps of one signal are early or late relative to the others.",
     parameters=(
         Parameter(
             "T_x",
@@ -42,7 +43,7 @@ TIME_SHIFT = Effect(
     ),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),
-    measured_late=T_x,
+    reading_delay=T_x,
     # A fit finds from one wave of the record to the next one only.
     starts=tuple(Start({"T_x": share * time_size}) for share in (-0.6, -0.1, 0.1, 0.6)),
 )

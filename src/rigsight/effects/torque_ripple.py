@@ -1,4 +1,4 @@
-"""Torque ripple: a torque that comes back with the position.
+"""Torque ripple: a torque that is periodic in the position.
 
 Equation
 --------
@@ -13,11 +13,11 @@ kappa  wave number: periods per turn of an angle in rad, 2 pi over the period of
 The amplitude is ``sqrt(T_sin^2 + T_cos^2)``, the phase ``atan2(T_cos, T_sin)``. The position counts from the origin of its own
 sensor, wherever the spring rests.
 
-Applies to the cogging of motors with magnets, to gear teeth, ball screws and eccentric pulleys. A torque that comes back with
-time, whatever the motion does, is a periodic disturbance.
+Applies to the cogging of motors with magnets, to gear teeth, ball screws and eccentric pulleys. A torque that is periodic in
+time, independent of the motion, is a periodic disturbance.
 
-Signature: lines whose frequency goes with the speed; a mass at rest is drawn into the nearest valley; even harmonics where that
-is not the middle of the motion.
+Signature: spectral lines whose frequency is proportional to speed; a mass at rest settles in the nearest stable position; even
+harmonics where that is not the center of the motion.
 
 References: T. M. Jahns and W. L. Soong, IEEE Trans. Ind. Electron. 43 (1996) 321, on pulsating torque and cogging.
 """
@@ -33,7 +33,7 @@ T_sin, T_cos, kappa = sp.symbols("T_sin T_cos kappa", real=True)
 TORQUE_RIPPLE = Effect(
     name="torque_ripple",
     place=Place.DYNAMICS,
-    summary="A torque repeats with the position: cogging, gear teeth, an eccentric pulley.",
+    summary="A torque is periodic in the position: cogging, gear teeth, an eccentric pulley.",
     parameters=(
         Parameter(
             "T_sin",

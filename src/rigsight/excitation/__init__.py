@@ -1,4 +1,4 @@
-"""Which inputs to drive a rig with: sweeps, steps, stepped sines and multisines."""
+"""Input signals for experiments: sweeps, steps, stepped sines and multisines."""
 
 from rigsight.excitation.measures import crest_factor as crest_factor
 from rigsight.excitation.measures import time_bandwidth_product as time_bandwidth_product

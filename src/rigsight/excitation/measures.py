@@ -1,4 +1,4 @@
-"""How well an input uses its amplitude and its time."""
+"""Measures of how well an input uses its amplitude and its time."""
 
 from __future__ import annotations
 

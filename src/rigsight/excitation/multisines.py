@@ -1,4 +1,4 @@
-"""Which periodic inputs excite chosen lines: multisines with random phases.
+"""Periodic inputs that excite chosen spectral lines: multisines with random phases.
 
 References
 ----------

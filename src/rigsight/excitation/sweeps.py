@@ -1,4 +1,4 @@
-"""Which inputs change their frequency or level in time: sweeps, stepped sines and steps, as samples over given times."""
+"""Inputs whose frequency or level changes over time: sweeps, stepped sines and steps, as samples at given times."""
 
 from __future__ import annotations
 
@@ -119,8 +119,8 @@ def stepped_sine(
     # The last period ends one sample after the last one, as the last sample of a period is not its first.
     if ends[-1] > (duration + tau[1]) * (1.0 + 1e-9):
         raise InputError(
-            f"{cycles} periods of {wished.size} frequencies last {ends[-1]:.4g} s, and the times {duration:.4g} s: give more "
-            "time, fewer periods or fewer low frequencies."
+            f"{cycles} periods of {wished.size} frequencies last {ends[-1]:.4g} s, and the times {duration:.4g} s: give a longer "
+            f"duration, fewer periods or fewer low frequencies."
         )
     phase = np.interp(tau, ends, 2.0 * np.pi * cycles * np.arange(ends.size))
     return np.where(tau < ends[-1], amplitude * np.sin(phase), 0.0)

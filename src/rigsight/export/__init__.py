@@ -1,4 +1,4 @@
-"""A model -> code and text for other tools, all of it printed from the one symbolic declaration."""
+"""Export of a model as code and text for other tools, printed from the symbolic declaration."""
 
 from rigsight.export.targets import TARGETS as TARGETS
 from rigsight.export.targets import Target as Target

@@ -1,4 +1,4 @@
-"""Where does a model rest at zero input?"""
+"""Equilibrium of a model at zero input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How does a model become one C99 file without dependencies? Its kernel is the engine's; what calls it stands here."""
+"""How does a model become one C99 file without dependencies? The kernel is that of the engine; the code that calls it is here."""
 
 from __future__ import annotations
 

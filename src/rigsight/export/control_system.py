@@ -18,7 +18,10 @@ from rigsight.export.python_function import (
 )
 from rigsight.simulate.printing.python import PYTHON
 
-_KINKS = "Its equations have kinks, which a solver of variable step crosses unseen: keep max_step short of the events."
+_KINKS = (
+    "Its equations have kinks, which a variable-step solver does not detect: choose max_step smaller than the time between "
+    "them."
+)
 _SMOOTH = "Its equations are smooth."
 
 

@@ -1,4 +1,4 @@
-"""What does an exported file say of itself: source, equations, numbers with units, and how to feed it?"""
+"""Header of an exported file: source, equations, parameters with units, and how to supply inputs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ def equation_lines(exported: Exported) -> list[str]:
     for state, equation in zip(exported.states, structure.equations, strict=True):
         line = f"{state.name}' = {text(equation.rate, names)}"
         if equation.limit is not None:
-            line += f", abs({state.name}) <= {text(equation.limit, names)}: it rests at the end it is driven against"
+            line += (
+                f", abs({state.name}) <= {text(equation.limit, names)}: it stays at the end of its range while driven "
+                f"against it"
+            )
         lines.append(line)
     for i, (output, expression) in enumerate(zip(exported.outputs, structure.outputs, strict=True)):
         line = f"output {output.name} [{output.unit}] = {text(expression, names)}"
@@ -60,7 +63,7 @@ def equation_lines(exported: Exported) -> list[str]:
 
 
 def _as_shown(exported: Exported) -> list[str]:
-    """Return the equations as people are shown them: solved for the accelerations nobody would read them."""
+    """Return the equations as displayed: solved for the accelerations they would be unreadable."""
     shown, own = shown_equations(exported.structure), exported.names()
     names = {symbol: name.plain.replace(" ", "_") for symbol, name in shown.names.items()}
     names |= {rate_symbol(state): f"{own[state]}'" for state in exported.structure.states}

@@ -1,4 +1,4 @@
-"""Which equations, numbers and names does every export write down, whatever its language?"""
+"""Equations, parameters and names that every export contains, independent of its language."""
 
 from __future__ import annotations
 
@@ -162,8 +162,8 @@ def _check_delays(structure: Structure) -> None:
     ]
     if late:
         raise InputError(
-            f"A delay at {', '.join(late)} cannot be exported: that of the only input and that of the first sensor can. "
-            "Simulate the model here, or leave the delay out."
+            f"A delay at {', '.join(late)} cannot be exported: only delays of a single input and of the first sensor can. "
+            f"Simulate the model here, or leave the delay out."
         )
 
 

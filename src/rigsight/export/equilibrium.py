@@ -1,4 +1,4 @@
-"""Where does a rig of several motions rest? The equations that an export solves for it, as the engine does."""
+"""Equilibrium of a rig with several motions: the equations that an export solves for it, like the engine."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from rigsight.simulate.compiled.linear_forms import slope
 from rigsight.simulate.kinks import freeze, is_zero
 from rigsight.simulate.structure import TIME, Structure, input_symbols
 
-NO_START = "with friction or hysteresis the start is known for inputs of zero alone: begin with these, or give initial_state"
-"""What a file says that is asked for another one."""
+NO_START = "with friction or hysteresis the equilibrium is known only for zero inputs: begin with these, or give initial_state"
+"""Message of a file if another equilibrium is requested."""
 
 
 @dataclass(frozen=True)

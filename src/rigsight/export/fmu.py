@@ -94,7 +94,7 @@ def _binary(sources: Mapping[str, str]) -> bytes:
         return first_library(sources, OPTIONS)[1]
     except InputError as error:
         raise type(error)(
-            f"{error} Or write an FMU of sources alone, which the importing tool compiles: --source-only."
+            f"{error} Or write an FMU with source code only, which the importing tool compiles: --source-only."
         ) from error
 
 

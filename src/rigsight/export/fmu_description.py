@@ -1,4 +1,4 @@
-"""What does the ``modelDescription.xml`` of an FMU say, by FMI 2.0 and 3.0?"""
+"""Content of the ``modelDescription.xml`` of an FMU, for FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 

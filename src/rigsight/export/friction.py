@@ -1,4 +1,4 @@
-"""What do exports with an integrator of their own read of dry friction: which joint slides, and how fast that changes?"""
+"""Dry friction in exports with their own integrator: which joint slides, and the rate of change of its velocity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which fixed step follows a model's own motion to the accuracy of the engine?"""
+"""Fixed step size that reproduces the motion of a model with the accuracy of the engine."""
 
 from __future__ import annotations
 

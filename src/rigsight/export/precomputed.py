@@ -1,4 +1,4 @@
-"""Which parts of the equations depend on parameters alone and are too costly to be computed anew at every step?"""
+"""Parts of the equations that depend only on parameters and are too costly to compute at every step."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from rigsight.simulate.structure import TIME, input_symbols
 MIN_STEPS = 4
 """Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
 MIN_STEPS_PRESCRIBED = 32
-"""The same where the motion is prescribed: the model has no time scale of its own that says more."""
+"""The same if the motion is prescribed: the model has no time scale that requires more."""
 
 _PIECES = {
     "zoh": "_steps({name})",

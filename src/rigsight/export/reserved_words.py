@@ -1,4 +1,4 @@
-"""Which names can no parameter, state or model have, because a language or a template uses them itself?"""
+"""Names that parameters, states and models cannot have, because a language or a template uses them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Into which languages can a model be written, and what can each of them not say?"""
+"""Target languages of an export, and what each cannot represent."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def unsaid(content: Exported) -> dict[str, str]:
     for effect in structure.effects:
         if effect.delay is not None:
             found[DELAY] = effect.name
-        if effect.measured_late is not None:
+        if effect.reading_delay is not None:
             found[SENSOR_DELAY] = effect.name
     return found
 

@@ -1,4 +1,4 @@
-"""How a record looks over frequency: estimators of frequency responses, their noise and their distortion."""
+"""Estimators of frequency responses, their noise and their distortion."""
 
 from rigsight.frequency.best_linear_approximation import BestLinearApproximation as BestLinearApproximation
 from rigsight.frequency.best_linear_approximation import DetectedDistortion as DetectedDistortion

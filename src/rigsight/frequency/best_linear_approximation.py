@@ -1,4 +1,4 @@
-"""What part of a periodic response is linear, what is noise, and what is nonlinear distortion.
+"""Linear part, noise and nonlinear distortion of a periodic response.
 
 The best linear approximation of a nonlinear system depends on the power spectrum of the excitation, not on its phases. What
 changes between periods is noise; what changes only between realisations of the random phases is distortion.
@@ -214,8 +214,8 @@ def fast_best_linear_approximation(
     odd, even = silent[silent % 2 == 0], silent[silent % 2 == 1]
     if odd.size == 0:
         raise InputError(
-            f"Record '{record.name}': '{source}' leaves out no odd line in the band, so odd distortion cannot be told from "
-            "the response: use an odd multisine with random detection lines."
+            f"Record '{record.name}': '{source}' leaves out no odd line in the band, so odd distortion cannot be distinguished "
+            f"from the response: use an odd multisine with random detection lines."
         )
     omega = periods.omega
     sampled = periods.Y[lines] / periods.U[lines]

@@ -1,12 +1,12 @@
-"""Which harmonics a response has along a sweep: odd ones tell of symmetric, even ones of asymmetric nonlinearity.
+"""Harmonics of a response along a sweep: odd ones indicate a symmetric, even ones an asymmetric nonlinearity.
 
 The phase of the source is read off its zero crossings; within a few periods, fundamental and harmonics of that phase are
 fitted to the response by least squares.
 
 References
 ----------
-A. Novak, L. Simon, F. Kadlec and P. Lotton, IEEE Trans. Instrumentation and Measurement 59 (2010) 2220, for what harmonics
-along a sweep tell. K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics* (IOP 2001), chapter 2.
+A. Novak, L. Simon, F. Kadlec and P. Lotton, IEEE Trans. Instrumentation and Measurement 59 (2010) 2220, for the interpretation of
+harmonics along a sweep. K. Worden and G. R. Tomlinson, *Nonlinearity in Structural Dynamics* (IOP 2001), chapter 2.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ def _crossings(record: Record, source: str) -> NDArray[np.float64]:
     if ratio > _JUMP:
         raise InputError(
             f"Record '{record.name}': half periods of '{source}' change by a factor of {ratio:.3g} from one to the next: it is "
-            "no sweep, has an offset, or is noisy around zero. Cut the record to the sweep, or use the commanded input."
+            f"not a sweep, has an offset, or is noisy around zero. Cut the record to the sweep, or use the commanded input."
         )
     return np.asarray(crossings)
 

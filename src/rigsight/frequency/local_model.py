@@ -1,8 +1,8 @@
 """How one record without periods gives a frequency response: local polynomial and local rational models.
 
-In a narrow band the response and the transient (the difference of begin and end state of the record, which a window can
-only smear) are both smooth functions of frequency, while the source's spectrum is rough. Both are fitted there by least
-squares; what is left over is the noise.
+In a narrow band the response and the transient (from the difference between initial and final state of the record, which a window
+only smears) are both smooth functions of frequency, while the spectrum of the source is rough. Both are fitted there by least
+squares; the residual is the noise.
 
 References
 ----------
@@ -33,7 +33,7 @@ from rigsight.frequency.signal_pair import (
 from rigsight.records.record import Hold, Record
 
 SPARE = 6
-"""Equations beyond the unknowns in the narrowest band chosen by itself: a variance from fewer is a lottery."""
+"""Equations in excess of the unknowns in the narrowest automatic band: with fewer, the variance is unreliable."""
 _CHUNK = 4096
 _RANK = 1e-11
 """Relative singular value below which two terms of a local model are the same."""
@@ -77,7 +77,7 @@ def local_polynomial_response(
     band
         Limits [rad/s]; None takes all that the source excites.
     wanted
-        Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
+        Required frequencies [rad/s], ascending: other lines are skipped. None takes all of the band.
     instrument
         A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
         is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
@@ -91,7 +91,8 @@ def local_polynomial_response(
     Raises
     ------
     InputError
-        If the record is too short for `bandwidth`, or does not excite the band, or the source does not answer the instrument.
+        If the record is too short for `bandwidth`, or does not excite the band, or the source is not correlated with the
+        instrument.
 
     Notes
     -----
@@ -151,7 +152,7 @@ def local_rational_response(
     band
         Limits [rad/s]; None takes all that the source excites.
     wanted
-        Frequencies [rad/s], ascending, that somebody reads: the other lines are left out. None takes all of the band.
+        Required frequencies [rad/s], ascending: other lines are skipped. None takes all of the band.
     instrument
         A signal that drives source and response from outside, free of their noise: the reference of a closed loop. The response
         is then the ratio of their responses to it, which noise on the source, fed back or not, does not bias.
@@ -164,7 +165,8 @@ def local_rational_response(
     Raises
     ------
     InputError
-        If the record is too short for `bandwidth`, or does not excite the band, or the source does not answer the instrument.
+        If the record is too short for `bandwidth`, or does not excite the band, or the source is not correlated with the
+        instrument.
 
     Notes
     -----
@@ -191,7 +193,7 @@ def local_rational_response(
 
 @dataclass(frozen=True)
 class _LocalModel:
-    """Lines on each side of one, degree of the polynomials and of the denominator, and whether a transient is told apart."""
+    """Lines on each side of one, degree of the polynomials and of the denominator, and whether a transient is modelled."""
 
     half: int
     order: int
@@ -244,9 +246,7 @@ def _local_response(
     if wanted is not None:
         lines = lines[among(omega[lines], wanted)]
         if not lines.size:
-            raise InputError(
-                f"{what} does not excite any of the frequencies at which its response is wanted."
-            )
+            raise InputError(f"{what} does not excite any of the requested frequencies.")
     chunks = [lines[start : start + _CHUNK] for start in range(0, lines.size, _CHUNK)]
     if instrument is None:
         parts = [_solve(U, Y, chunk, model) for chunk in chunks]
@@ -255,7 +255,9 @@ def _local_response(
         answers = np.concatenate([clearness for *_, clearness in ratios]) >= _ANSWERS
         power = np.abs(R[lines]) ** 2
         if power @ answers < 0.5 * np.sum(power):
-            raise InputError(f"{what}: the source '{source}' does not answer the instrument '{instrument}'.")
+            raise InputError(
+                f"{what}: the source '{source}' is not correlated with the instrument '{instrument}'."
+            )
         parts = [(values, shares, near) for values, shares, near, _ in ratios]
         method = f"{method} by {instrument}"
     values, shares, near = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

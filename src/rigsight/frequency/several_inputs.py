@@ -1,8 +1,7 @@
-"""How do records in which several inputs move, at once or one at a time, give the response of a signal to each of them?
+"""Responses of a signal to each of several inputs, from records in which they move together or one at a time.
 
-Close to a frequency every record says ``A(r) Y(k + r) = sum_i B_i(r) U_i(k + r) + T(r)``: the responses are shared by all
-records, the transient T is each one's own. Inputs that are smooth multiples of each other there say the same, and are not told
-apart.
+Close to a frequency, for every record ``A(r) Y(k + r) = sum_i B_i(r) U_i(k + r) + T(r)``: the responses are common to all
+records, the transient T differs. Inputs that are smooth multiples of each other there cannot be distinguished.
 
 References
 ----------
@@ -30,7 +29,7 @@ from rigsight.records.record import Hold, Record
 _OWN_SHARE = 1e-4
 """Share of an input's power that no other input explains, from which its response is its own: 40 dB, as for silence."""
 _MOSTLY = 0.5
-"""Share of its frequencies at which an input must be told apart to be worth a response."""
+"""Share of its frequencies at which an input must be distinguishable to get a response."""
 _SHORT = 0.5
 """Duration over that of the longest record below which a record would blur what the longest resolves."""
 _MOST_FREQUENCIES = 400
@@ -56,7 +55,7 @@ class ResponsesOfInputs:
     problems
         Why it is not, a sentence by (source, response).
     together
-        Inputs that move together in these records, so that nobody can tell their responses apart.
+        Inputs that change together in these records, so that their responses cannot be separated.
     """
 
     found: Mapping[tuple[str, str], FrequencyResponse]
@@ -147,25 +146,25 @@ def responses_of_inputs(
                 problems[source, response] = _inseparable(source, rivals)
             else:
                 problems[source, response] = (
-                    f"the response of '{response}' to '{source}' does not stand out of its noise. Drive '{source}' more "
-                    "strongly, or for longer."
+                    f"the response of '{response}' to '{source}' does not exceed its noise. Excite '{source}' more strongly, or "
+                    f"for longer."
                 )
     return ResponsesOfInputs(found, problems, tuple(together))
 
 
 def _unmoved(source: str, response: str, records: Sequence[Record]) -> str:
     if not any(response in record for record in records):
-        return f"no record holds '{response}'."
+        return f"no record contains '{response}'."
     if any(r.kind == "step" and response in r and _moves(r, source) for r in records):
-        return f"'{source}' moves in steps alone, which give no frequency response. Record a sweep or a multisine of it."
-    return f"'{source}' does not move in any record that holds '{response}'. Record one in which it does."
+        return f"'{source}' only has steps, which give no frequency response. Record a sweep or a multisine of it."
+    return f"'{source}' does not change in any record with '{response}'. Record one in which it does."
 
 
 def _inseparable(source: str, rivals: Sequence[str]) -> str:
     others = " and ".join(f"'{rival}'" for rival in rivals)
     return (
-        f"'{source}' moves together with {others}: their responses cannot be told apart. Record one in which '{source}' moves "
-        "alone, or with phases of its own."
+        f"'{source}' changes together with {others}, so their responses cannot be separated. Record one in which '{source}' "
+        f"changes alone, or with different phases."
     )
 
 
@@ -300,7 +299,7 @@ class _LocalModels:
             picked = np.clip(center - width // 2, 0, s.omega.size - width)[:, None] + np.arange(width)
             r = (s.omega[picked] - omega[:, None]) / reach
             powers = r[..., None] ** np.arange(max(n_terms, self._poles + 1))
-            # Beyond its last line a record says nothing.
+            # A record has no information beyond its last line.
             heard = (omega <= s.omega[-1])[:, None, None]
             near_inputs = np.moveaxis(s.inputs[self._moving][:, picked], 0, 2)
             near = np.where(heard, lines[picked][..., None], 0.0)

@@ -1,4 +1,4 @@
-"""Which two signals of a record an estimator reads, and at which frequencies the source says anything."""
+"""The two signals of a record that an estimator reads, and the frequencies at which the source is excited."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def excited(
     if silent.any():
         heard_omega = omega[heard]
         raise InputError(
-            f"{what} does not excite {omega[silent][0]:.4g} to {omega[silent][-1]:.4g} rad/s of the band wished for, "
+            f"{what} does not excite {omega[silent][0]:.4g} to {omega[silent][-1]:.4g} rad/s of the requested band, "
             f"{lower:g} to {upper:g} rad/s. It excites {heard_omega[0]:.4g} to {heard_omega[-1]:.4g} rad/s: choose a band "
             "within, or record with a wider excitation."
         )

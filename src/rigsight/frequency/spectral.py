@@ -97,14 +97,14 @@ def averaged_response(
     counts = np.array([1 + (record.n_samples - length) // step for record in several])
     if counts.sum() < 2:
         raise InputError(
-            f"{what} holds one segment of {length * dt:.4g} s, and one segment has no coherence: allow a resolution of "
+            f"{what} holds one segment of {length * dt:.4g} s, and a single segment has no coherence: allow a resolution of "
             f"{2.0 * resolution:.4g} rad/s, or give more records."
         )
     try:
         weights = scipy.signal.get_window(window, length)
     except ValueError:
         raise InputError(
-            f"The window '{window}' is none of scipy.signal.get_window, such as 'hann'."
+            f"The window '{window}' is not known to scipy.signal.get_window; use one such as 'hann'."
         ) from None
     omega = line_frequencies(length, dt)
     spectra = _spectra(several, source, response, weights, length - step, counts)[:, 1 : omega.size + 1]
@@ -112,7 +112,7 @@ def averaged_response(
     omega, cross = omega[kept], spectra[2, kept]
     power_source, power_response = spectra[0, kept].real, spectra[1, kept].real
     if not (np.abs(cross) > 0.0).all():
-        raise InputError(f"{what}: the response '{response}' does not answer '{source}' at all.")
+        raise InputError(f"{what}: the response '{response}' does not respond to '{source}'.")
     coherence = np.minimum(np.abs(cross) ** 2 / (power_source * power_response), 1.0)
     values = cross / power_source
     if estimator != "H1":

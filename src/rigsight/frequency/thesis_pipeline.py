@@ -1,4 +1,4 @@
-"""How the thesis makes a frequency response of a sweep; kept to reproduce its figures, not to identify from.
+"""Frequency response of a sweep as in the thesis; kept to reproduce its figures, not for identification.
 
 References
 ----------
@@ -70,7 +70,7 @@ def thesis_response(
     if fallen <= 0.0:
         raise InputError(
             f"Record '{record.name}': the unwrapped phase of '{source}' -> '{response}' rises by {-fallen:.3g} rad between "
-            "the cuts, so the thesis's rescaling would turn it over: cut lower, or use another estimator."
+            "the cuts, so the rescaling of the thesis would invert it: reduce the upper cut, or use another estimator."
         )
     phase = phase * (phase_drop / fallen)
     phase -= phase[0]

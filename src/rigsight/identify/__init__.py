@@ -43,10 +43,10 @@ from rigsight.identify.transfer.conicity import ConicityEstimate as ConicityEsti
 from rigsight.identify.transfer.conicity import creep_error_of_sine as creep_error_of_sine
 from rigsight.identify.transfer.conicity import estimate_conicity as estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets as driven_offsets
-from rigsight.identify.transfer.physical import PhysicalEstimates as PhysicalEstimates
-from rigsight.identify.transfer.physical import lateral_parameters as lateral_parameters
-from rigsight.identify.transfer.physical import offsets as offsets
-from rigsight.identify.transfer.physical import yaw_parameters as yaw_parameters
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates as PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import lateral_parameters as lateral_parameters
+from rigsight.identify.transfer.running_gear_parameters import offsets as offsets
+from rigsight.identify.transfer.running_gear_parameters import yaw_parameters as yaw_parameters
 from rigsight.identify.transfer.transfer_fit import TransferFit as TransferFit
 from rigsight.identify.transfer.transfer_form import TransferForm as TransferForm
 from rigsight.identify.transfer.transfer_function import fit_frequency_response as fit_frequency_response

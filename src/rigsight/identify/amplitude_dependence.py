@@ -1,4 +1,4 @@
-"""Do the parameters that records show by themselves change with the amplitude, beyond their intervals?"""
+"""Do the parameters of single records change with the amplitude, beyond their intervals?"""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rigsight.identify.identification import RecordIdentification
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 
 _CHANCE = 1e-3
 """Probability of a difference as large by chance, over all parameters, below which a parameter counts as changing."""
@@ -41,12 +41,13 @@ def amplitude_dependence(
     if len(compared) < 2:
         if len({tuple(path.source for path in found.paths) for found in records}) > 1:
             return (
-                "No two records drive the same inputs at different amplitudes, so they cannot tell whether the parameters change "
+                "No two records drive the same inputs at different amplitudes, so they cannot show whether the parameters change "
                 "with it. Record one of them at another amplitude.",
                 (),
             )
         return (
-            "The records have one amplitude, so they cannot tell whether the parameters change with it. Record another one.",
+            "The records have only one amplitude, so they cannot show whether the parameters change with it. Record another "
+            "amplitude.",
             (),
         )
     parts = ([*(path.physical for path in r.paths), r.own] for _, group in compared for r in group)
@@ -75,8 +76,9 @@ def amplitude_dependence(
         text = f"No parameter changes with the amplitude ({span.removeprefix('from ')}) beyond its interval."
         return text + _moving_resonance(compared), ()
     return (
-        f"With amplitudes {span}, {'; '.join(text.strip() for text in told)}: beyond their intervals, the sign of a nonlinear "
-        "effect. 'rigsight diagnose' looks for it." + _no_single_inertia(compared, units, changing)
+        f"With amplitudes {span}, {'; '.join(text.strip() for text in told)}. These changes exceed the confidence intervals, "
+        "which indicates a nonlinear effect; 'rigsight diagnose' looks for it."
+        + _no_single_inertia(compared, units, changing)
     ), tuple(changing)
 
 
@@ -97,8 +99,8 @@ def _no_single_inertia(
         first = f", first of record {off.record.name}" if len(records) > 2 else ""
         ratio = np.max(values) / np.min(values)
         return (
-            f" But {name} differs by a factor of {ratio:.3g}, and no amplitude changes an inertia so much: "
-            f"check units and scales of input and output{first}."
+            f" But {name} differs by a factor of {ratio:.3g}, which is implausible for an inertia: check units and scales of "
+            f"input and output{first}."
         )
     return ""
 
@@ -109,8 +111,8 @@ def _moving_resonance(compared: Sequence[tuple[float, Sequence[RecordIdentificat
     if len(found) < 2 or max(found) <= _MOVED * min(found):
         return ""
     return (
-        f" The resonance, though, lies between {min(found):.3g} and {max(found):.3g} rad/s: the intervals are too wide to tell, "
-        "and a nonlinear effect is likely. 'rigsight diagnose' looks for it."
+        f" However, the resonance is between {min(found):.3g} and {max(found):.3g} rad/s: the intervals are too wide to show a "
+        f"change, but a nonlinear effect is likely. 'rigsight diagnose' looks for it."
     )
 
 

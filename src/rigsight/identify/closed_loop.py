@@ -1,4 +1,4 @@
-"""What is a user told of records that hold the reference of a closed loop?"""
+"""Notes on records that contain the reference of a closed loop."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def closed_loop_notes(records: Sequence[Record], rig: Rig, used: str) -> list[st
     if moving:
         inputs = " and ".join(signal.name for signal in rig.inputs)
         notes.append(
-            f"A {REFERENCE} is recorded in {_listed(moving)}: taken as records of a closed loop. {used} Fits over time and "
-            f"simulations take {inputs} as measured, its noise included."
+            f"A {REFERENCE} is recorded in {_listed(moving)}: the records are treated as closed-loop records. {used} Time-domain "
+            f"fits and simulations use {inputs} as measured, including its noise."
         )
     if still:
         notes.append(f"The {REFERENCE} never changes in {_listed(still)}, so it was not used there.")

@@ -1,4 +1,4 @@
-"""How are combinations of parameters, lists of them and relative errors written?"""
+"""Text of parameter combinations, lists of them and relative errors."""
 
 from __future__ import annotations
 

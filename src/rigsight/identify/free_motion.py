@@ -1,7 +1,7 @@
-"""Which numbers does a free motion leave open? Nothing in it tells the unit of force: inertias and forces grow together.
+"""Parameters that a free motion leaves undetermined: inertias and forces are known only up to a common factor.
 
-Where no input moves and no known constant takes part, all inertias, stiffnesses, dampings and forces may be multiplied by one
-factor without a trace. One of them is held then, so that a fit of the others does not wander along that direction.
+If no input moves and no known constant is involved, all inertias, stiffnesses, dampings and forces can be multiplied by one
+factor without changing the motion. One of them is then held, so that the fit does not drift along that direction.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ class OpenFactor:
     @property
     def sentence(self) -> str:
         """What it means, for people."""
-        source = "as given" if self.is_given else "for want of a given one"
+        source = "as given" if self.is_given else "because no value was given"
         return (
-            f"No input moves in the records that are fitted: they tell {listed(self.names)}, and every force of an effect, only "
-            f"up to a common factor. {self.held} = {self.value:g} {self.unit} is held, {source}; what it really is multiplies "
-            "all the others."
+            f"No input moves in the records that are fitted: they determine {listed(self.names)}, and every force of an effect, "
+            f"only up to a common factor. {self.held} = {self.value:g} {self.unit} is held, {source}; all others are "
+            f"proportional to its true value."
         )
 
 

@@ -1,4 +1,4 @@
-"""Which sensors of the rig that nobody recorded would tell parameters apart? Asked of the fitted model itself."""
+"""Unrecorded sensors of the rig that would make more parameters identifiable, computed with the fitted model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rigsight.records.record import Record
 from rigsight.simulate import Structure, record_values, simulate
 
 _NOISE = 0.01
-"""Noise of a sensor that nobody has seen, over the RMS of what it would show: an assumption, of no good sensor."""
+"""Assumed noise of an unrecorded sensor, relative to the RMS of its reading: that of a mediocre sensor."""
 
 
 def helpful_sensors(
@@ -59,5 +59,5 @@ def helpful_sensors(
         left = free_directions(information(fit, result))
         if left < before:
             much = "all parameters" if left == 0 else "more of them"
-            told.append(f"With '{name}' recorded as well these inputs would determine {much}.")
+            told.append(f"If '{name}' were also recorded, these inputs would determine {much}.")
     return tuple(told)

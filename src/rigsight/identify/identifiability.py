@@ -1,7 +1,7 @@
-"""Which parameters do the records determine, and which only in combinations with others? Said in words.
+"""Which parameters do the records determine, and which only in combination with others? In words.
 
-Directions of the information matrix along which nothing moves are parameters that follow each other. A combination is named when
-a finite step along it leaves the outputs as they are: derivatives at one place cannot tell a ratio from a difference.
+Null directions of the information matrix are parameters that compensate each other. A combination is named if a finite step along
+it does not change the outputs, because derivatives at one point cannot distinguish a ratio from a difference.
 
 References
 ----------
@@ -97,13 +97,13 @@ class Identifiability:
         """All in one: what is determined, and what is not."""
         names = list(self.relative_errors)
         if not names:
-            return "Nothing was left to be identified."
+            return "There was nothing to identify."
         if len(self.determined) == len(names):
             worst = max(names, key=lambda name: self.relative_errors[name])
             error = percent(self.relative_errors[worst])
             return f"The records determine all parameters; the least certain is {worst} ({error})."
         known = f"The records determine {listed(self.determined)}." if self.determined else ""
-        first = known or "The records determine no parameter by itself."
+        first = known or "The records determine no single parameter."
         return " ".join([first, *self.statements, *self.remedies])
 
 
@@ -140,7 +140,7 @@ def relative_errors(found: Information) -> dict[str, float]:
         What the records say.
     """
     errors = conditional_errors(found.root)
-    # What does next to nothing is held: that it may be anything is no reason to doubt the others.
+    # A parameter with almost no influence is held, so that its uncertainty does not affect the others.
     held = errors >= POORLY_KNOWN
     errors[~held] = marginal_errors(found.root[:, ~held])
     return dict(zip(found.names, map(float, errors), strict=True))
@@ -176,7 +176,7 @@ class _Quantity:
 
 
 class _Search:
-    """Puts parameters together until what is left is determined or named."""
+    """Combines parameters until the rest is determined or named."""
 
     def __init__(self, found: Information) -> None:
         self._found = found
@@ -286,7 +286,7 @@ class _Search:
             return self._sums(members, along)
         held = max(zip(members, along, strict=True), key=lambda pair: abs(pair[1]))[0]
         self._quantities.remove(held)
-        return f"{listed([q.text for q in members])} are not told apart: a change of one is made up for by the others."
+        return f"{listed([q.text for q in members])} cannot be separated: the others compensate for a change of one."
 
     def _factor(self, members: Sequence[_Quantity], powers: Sequence[Fraction]) -> str:
         """Name quantities that may all be multiplied without a trace, and hold the first."""
@@ -295,9 +295,12 @@ class _Search:
         names = listed([q.text for q in members])
         if len(set(powers)) > 1:
             moved = ", ".join(f"{q.text} x 2^{power}" for q, power in zip(members, powers, strict=True))
-            return f"{names} change together without a trace ({moved}): one of them must be known for the others."
+            return (
+                f"{names} can change together without any change of the outputs ({moved}): one must be known to determine the "
+                f"others."
+            )
         self._held |= {q.text: held for q in members if q is not held}
-        return f"{names} only up to a common factor: their ratios are determined, and one of them must be known for the others."
+        return f"{names} only up to a common factor: their ratios are determined, and one must be known to determine the others."
 
     def _sums(self, members: Sequence[_Quantity], along: Sequence[float]) -> str:
         """Put quantities together of which one stands in sums with each of the others."""

@@ -1,4 +1,4 @@
-"""What an identification of a campaign holds: each record alone, all of them together, and what the user must know."""
+"""Result of the identification of a campaign: each record alone, all of them together, and warnings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigsight.identify.identifiability import Identifiability
 from rigsight.identify.joint import JointFit
 from rigsight.identify.linear_view import LinearView
 from rigsight.identify.transfer.conicity import ConicityEstimate
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Record
 
@@ -46,7 +46,7 @@ class PathIdentification:
 
 @dataclass(frozen=True, eq=False)
 class RecordIdentification:
-    """What one estimation record shows by itself.
+    """Results of one estimation record alone.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What do fitted records say of each parameter, and of their combinations? The information matrix in relative units."""
+"""Information of fitted records on each parameter and their combinations: the information matrix in relative units."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Information:
 
 
 def information(fit: GreyBoxFit, result: FitResult) -> Information:
-    """Return what the records of a fit say of its parameters.
+    """Return the information of the records of a fit on its parameters.
 
     Parameters
     ----------

@@ -13,19 +13,19 @@ from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.grey_box import GreyBoxFit
 from rigsight.identify.start.linear_start import linear_start
 from rigsight.identify.start.scales import characteristic_scales
-from rigsight.identify.transfer.physical import LEVEL
+from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.records.record import Record
 from rigsight.simulate import Structure
 
 _NOISE_ROUNDS = 3
 _SETTLED = 0.02
 _DIFFERENT = 0.01
-"""Probability of a difference as large by chance, below which two parameter sets are told apart."""
+"""Probability of such a difference by chance, below which two parameter sets count as different."""
 
 
 @dataclass(frozen=True)
 class RecordResidual:
-    """What a parameter set leaves of one record.
+    """Error of a parameter set on one record.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class JointFit:
     noise
         Standard deviation by which residuals of each output were divided.
     residuals
-        What it leaves of every record.
+        Its error on every record.
     kinds
         The fits of each kind alone.
     probability
@@ -200,7 +200,8 @@ def _check_moves(structure: Structure, records: Sequence[Record]) -> None:
     for record, source in ((record, name) for record in records for name in structure.rig.moving_inputs):
         if np.ptp(record[source]) <= 1e-12 * np.max(np.abs(record[source])):
             raise InputError(
-                f"Record '{record.name}': '{source}' never moves, so this {record.kind} tells nothing. Leave the record out."
+                f"Record '{record.name}': '{source}' never moves, so this {record.kind} contains no information. Leave the "
+                f"record out."
             )
 
 
@@ -280,13 +281,13 @@ def _same_set(kinds: Sequence[KindFit]) -> tuple[float, tuple[str, ...]]:
 
 def _statement(names: str, probability: float, differing: Sequence[str], fit: FitResult) -> str:
     if not np.isfinite(probability):
-        return f"{names} have no parameter in common that each of them determines; nothing can be compared."
+        return f"{names} have no common parameter that each of them determines; nothing can be compared."
     if not fit.success:
         return f"The joint fit did not converge: {fit.message}"
     if probability >= _DIFFERENT:
-        return f"One parameter set serves {names}: differences as large arise by chance with probability {probability:.2g}."
+        return f"One parameter set fits {names}: differences this large arise by chance with probability {probability:.2g}."
     which = f" They differ in {', '.join(differing)}." if differing else ""
     return (
         f"{names} have different parameters under this model (probability of chance {probability:.1g}).{which} The model lacks "
-        "something that changes with amplitude or frequency."
+        f"an effect that depends on amplitude or frequency."
     )

@@ -1,4 +1,4 @@
-"""What are the poles and frequency responses of a fitted rig close to its rest, how sure are they, and what was measured?"""
+"""Poles and frequency responses of a fitted rig linearized at equilibrium, with uncertainty, and the measured responses."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def linear_view(
     measured
         Their frequency responses.
     known
-        What the records say of the parameters.
+        Information of the records on the parameters.
 
     Raises
     ------

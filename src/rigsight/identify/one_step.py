@@ -1,10 +1,10 @@
-"""By how much would a fit have ended elsewhere, had its records been a little different? One Gauss-Newton step tells.
+"""Change of a fit for slightly different records, by one Gauss-Newton step.
 
 References
 ----------
 A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application* (Cambridge 1997), section 2.7 and chapter 7, for steps
-from the estimate instead of new fits. R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for columns without what the initial
-states can follow.
+from the estimate instead of new fits. R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for projecting out the initial
+states.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class OneStep:
         self._rows, self._followed = [], []
         for _, derivative in central_sensitivities(problem, theta):
             if not np.all(np.isfinite(derivative)):
-                raise SimulationError("The derivatives of the fit leave the range of numbers.")
+                raise SimulationError("The derivatives of the fit overflow.")
             basis = _basis(derivative[:, n_free:])
             own = derivative[:, :n_free]
             self._followed.append(basis)
@@ -94,7 +94,7 @@ class OneStep:
         return propagated_covariance(found, self._chain)
 
     def left(self, changes: Sequence[Floats]) -> list[Floats]:
-        """Return what is left of such changes after the step, in units of the noise, shape as given; 0 where not measured."""
+        """Return such changes after the step, in units of the noise, shape as given; 0 where not measured."""
         stacked = self._stacked(changes)
         steps = self._inverse @ self._gradients(stacked)
         found = []

@@ -1,4 +1,4 @@
-"""What does one estimation record show by itself: transfer functions, physical parameters, offsets, and what it cannot tell?"""
+"""Results of a single estimation record: transfer functions, physical parameters, offsets, and what it does not determine."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from rigsight.identify.identification import PathIdentification, RecordIdentific
 from rigsight.identify.transfer.axis_parameters import axis_parameters, springless_parameters
 from rigsight.identify.transfer.conicity import ConicityEstimate, estimate_conicity
 from rigsight.identify.transfer.driven_offsets import driven_offsets
-from rigsight.identify.transfer.physical import (
+from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
+from rigsight.identify.transfer.running_gear_parameters import (
     PhysicalEstimates,
     lateral_parameters,
     static_lateral,
     yaw_parameters,
 )
-from rigsight.identify.transfer.record_response import Method, RecordResponse, record_response
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.identify.transfer.transfer_form import Order
 from rigsight.identify.transfer.transfer_function import fit_frequency_response
@@ -64,7 +64,7 @@ class EstimationOptions:
 
 
 def identify_record(
-    record: Record, rig: Rig, constants: Mapping[str, float], no_spring: bool, options: EstimationOptions
+    record: Record, rig: Rig, constants: Mapping[str, float], has_stiffness: bool, options: EstimationOptions
 ) -> RecordIdentification:
     """Identify what one record shows.
 
@@ -76,8 +76,8 @@ def identify_record(
         Its rig. The parameters of an element follow from its motion over time, so only its dynamic stiffness is found here.
     constants
         The rig's constants by name.
-    no_spring
-        True for an axis without a spring: it is identified from its velocity.
+    has_stiffness
+        False for an axis without a spring: it is identified from its velocity.
     options
         How to read it.
 
@@ -91,7 +91,7 @@ def identify_record(
         return RecordIdentification(record, amplitude, (_dynamic_stiffness(record, rig, options),))
     forward = _driven_forward(record, constants.get("gain", 1.0))
     instrument = instrument_of(record, [signal.name for signal in (*rig.inputs, *rig.outputs)])
-    motion, seen = _motion(forward, rig, constants, no_spring, options, instrument)
+    motion, seen = _motion(forward, rig, constants, has_stiffness, options, instrument)
     unused = "" if seen is None else seen.unused_instrument
     paths, warnings = [motion], _resolution_warning(motion, seen, record)
     warnings += [f"{motion.source} -> {motion.response}: read without the reference. {unused}"] * bool(unused)
@@ -102,9 +102,9 @@ def identify_record(
         record=record,
         amplitude=amplitude,
         paths=tuple(paths),
-        offsets=None if no_spring else _offsets(forward, rig, paths),
+        offsets=_offsets(forward, rig, paths) if has_stiffness else None,
         conicity=_conicity(paths[1:], constants),
-        resonance=None if no_spring else _resonance(motion),
+        resonance=_resonance(motion) if has_stiffness else None,
         warnings=tuple(warnings),
     )
 
@@ -133,7 +133,7 @@ def _motion(
     record: Record,
     rig: Rig,
     constants: Mapping[str, float],
-    no_spring: bool,
+    has_stiffness: bool,
     options: EstimationOptions,
     instrument: str | None,
 ) -> tuple[PathIdentification, RecordResponse | None]:
@@ -143,14 +143,14 @@ def _motion(
         if rig.downstream:
             return yaw_parameters(fit, constants)
         gain = abs(evaluated(rig.motion.drive_gain, constants))
-        return springless_parameters(fit, gain) if no_spring else axis_parameters(fit, gain)
+        return axis_parameters(fit, gain) if has_stiffness else springless_parameters(fit, gain)
 
-    order: Order = "pt1" if no_spring else "pt2"
+    order: Order = "pt2" if has_stiffness else "pt1"
     path = PathIdentification(source, response)
     seen = None
     try:
         if record.kind == "step":
-            fit = _step_fit(record, source, response, order, no_spring)
+            fit = _step_fit(record, source, response, order, has_stiffness)
         else:
             seen = record_response(
                 record,
@@ -163,7 +163,7 @@ def _motion(
                 instrument=instrument,
             )
             path = replace(path, measured=seen.response, coherence=seen.coherence)
-            fit = _fit(_velocity(seen.response) if no_spring else seen.response, order, seen, options)
+            fit = _fit(seen.response if has_stiffness else _velocity(seen.response), order, seen, options)
         return _judged(path, fit, physical), seen
     except InputError as error:
         if options.resolution is not None and "too short for a resolution" in str(error):
@@ -181,7 +181,7 @@ def _lateral(
         )
     band = None
     if motion.measured is not None:
-        # Where psi itself drowns, its noise would pass for a source.
+        # Where psi is below its noise, the noise would act as a source.
         band = (float(motion.measured.omega[0]), float(motion.measured.omega[-1]))
     # psi is measured: it is smooth between its samples, whatever the current does.
     smooth: Hold = "band_limited"
@@ -251,10 +251,10 @@ def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> Tr
         )
         if fit.misfit <= 1.0:
             break
-    read = " The fit reads magnitudes only." if order == "pt2" else ""
+    read = " The fit uses magnitudes only." if order == "pt2" else ""
     note = (
-        f"The residuals are {misfit:.0f} times what the noise explains: this form is not the whole of the rig.{read} An error of "
-        f"{100.0 * share:.0f} % of the magnitude was allowed for at every line."
+        f"The residuals are {misfit:.0f} times larger than the noise explains: the model order is too low.{read} An error of "
+        f"{100.0 * share:.0f} % of the magnitude was assumed at every line."
     )
     return replace(fit, values=_with_sign(fit, response), misfit=misfit, message=f"{fit.message} {note}")
 
@@ -268,8 +268,8 @@ def _with_sign(fit: TransferFit, response: FrequencyResponse) -> dict[str, float
     return {**fit.values, "gain": -fit.values["gain"]} if is_turned else fit.values
 
 
-def _step_fit(record: Record, source: str, response: str, order: Order, no_spring: bool) -> TransferFit:
-    if not no_spring:
+def _step_fit(record: Record, source: str, response: str, order: Order, has_stiffness: bool) -> TransferFit:
+    if has_stiffness:
         return fit_step(record, source, response, order)
     moved = record.with_signals(**{response: np.gradient(record[response], record.dt)})
     moved = replace(moved, units={**moved.units, response: f"{moved.units.get(response, '1')}/s"})
@@ -307,7 +307,7 @@ def _judged(
         return replace(path, problem=fit.message)
     gain = fit.values["gain"]
     if not of_velocity and not fit.standard_errors["gain"] < POORLY_KNOWN * abs(gain):
-        # Its sign would be blamed on a sensor.
+        # Its sign would wrongly be attributed to a sensor.
         return replace(path, problem=_undetermined(["the gain"]))
     # The break frequency of a velocity is often too low to be seen; mass and damping show in the slope all the same.
     found = physical(fit)
@@ -321,8 +321,8 @@ def _judged(
 
 def _undetermined(names: list[str]) -> str:
     return (
-        f"the record does not determine {', '.join(names)}: it is too short, or its input leaves out the frequencies around the "
-        "break. Record for longer, over a wider band, or at a larger amplitude."
+        f"the record does not determine {', '.join(names)}: it is too short, or its input does not excite the frequencies around "
+        f"the break. Record for longer, over a wider band, or at a larger amplitude."
     )
 
 
@@ -335,8 +335,9 @@ def _resolution_warning(motion: PathIdentification, seen: RecordResponse | None,
         return []
     longer = record.n_samples * record.dt * seen.narrowest / width
     return [
-        f"{motion.source} -> {motion.response}: the peak at {omega_0:.3g} rad/s is {width:.2g} rad/s wide (half power), and this "
-        f"record follows peaks from {seen.narrowest:.2g} rad/s on. Damping and height of the peak are doubtful; record at least "
+        f"{motion.source} -> {motion.response}: the peak at {omega_0:.3g} rad/s is {width:.2g} rad/s wide (half power), but this "
+        f"record resolves only peaks of at least {seen.narrowest:.2g} rad/s. Damping and height of the peak are unreliable; "
+        f"record at least "
         f"{longer:.3g} s."
     ]
 

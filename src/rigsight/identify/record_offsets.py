@@ -1,4 +1,4 @@
-"""Does an offset differ from record to record, and which numbers of a rig say the same as offsets that do?"""
+"""Offsets that differ from record to record, and the parameters of a rig that are equivalent to such offsets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _CHANCE = 1e-3
 """Probability of means as far apart by chance below which they are said to differ: with ten outputs one campaign in a hundred."""
 _WORTH_TELLING = 0.1
-"""Share of what is left, as power, from which differing means are what keeps a model from the records, and not a trifle of it."""
+"""Share of the residual, as power, above which differing means are the main error of a model."""
 _LEAST_TOLD = 1e-6
 _NOTHING = 1e-6
 """Share of what records say of a parameter that is rounding: squares of derivatives that are known to a thousandth of this."""
@@ -28,7 +28,7 @@ _NOTHING = 1e-6
 
 @dataclass(frozen=True)
 class DifferingMeans:
-    """Means of what a model leaves that differ from record to record.
+    """Mean residuals of a model that differ from record to record.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class DifferingMeans:
     means
         Record -> mean of measured minus simulated.
     share
-        Share of what is left, as power, that goes with the means.
+        Share of the residual, as power, that the means explain.
     probability
         Chance of means as far apart if the offset is the same everywhere.
     """
@@ -58,15 +58,15 @@ class DifferingMeans:
         lowest, highest = (choose(self.means, key=self.means.__getitem__) for choose in (min, max))
         chance = f"{self.probability:.1g}" if self.probability > _LEAST_TOLD else f"below {_LEAST_TOLD:g}"
         return (
-            f"What the model leaves of {self.output} lies at another mean in each record, from {self.means[lowest]:.3g} {unit} "
-            f"in '{lowest}' to {self.means[highest]:.3g} {unit} in '{highest}': {self.share:.0%} of all that it leaves, and "
-            f"further apart than chance makes them (probability {chance}), as if the offset of the sensor, or a constant force, "
+            f"The mean residual of {self.output} differs between records, from {self.means[lowest]:.3g} {unit} "
+            f"in '{lowest}' to {self.means[highest]:.3g} {unit} in '{highest}': {self.share:.0%} of the whole residual, and more "
+            f"than by chance (probability {chance}), as if the offset of the sensor, or a constant force, "
             "differed from record to record."
         )
 
 
 OFFSETS_MEND = (
-    'If the sensor was zeroed anew in between, write offsets = "per_record" at the top of campaign.toml.'
+    'If the sensor was zeroed between records, write offsets = "per_record" at the top of campaign.toml.'
 )
 
 

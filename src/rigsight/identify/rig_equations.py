@@ -1,4 +1,4 @@
-"""What do a rig's equations, without effects, say in numbers? Its rates, its readings and its forces as functions of arrays."""
+"""The equations of a rig without effects in numbers: rates, readings and forces as functions of arrays."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class RigEquations:
         """Return True if these sensors alone give all coordinates and own states, whatever the parameters are."""
         coordinates = [c.symbol for c in self.rig.mechanism.free]
         own = [state.symbol for state in self.rig.mechanism.states]
-        # Rates follow from the slopes of readings, and those of own states hang on the parameters.
+        # Rates follow from the slopes of readings, and those of own states depend on the parameters.
         return self._show(measured, coordinates) and self._show(measured, [*coordinates, *own])
 
     def _show(self, measured: set[str], wanted: Sequence[sp.Symbol]) -> bool:
@@ -99,7 +99,7 @@ class RigEquations:
 
     @cached_property
     def of_own_states(self) -> frozenset[str]:
-        """Sensors that read a state beside the motion: how fast it changes hangs on the parameters."""
+        """Sensors that read a state besides the motion: its rate depends on the parameters."""
         own = {state.symbol for state in self.rig.mechanism.states}
         return frozenset(s.name for s in self.rig.mechanism.sensors if s.reads.free_symbols & own)
 

@@ -1,4 +1,4 @@
-"""How large is a signal, apart from its middle and its rarest values?"""
+"""Typical size of a signal about its center, without its rarest values."""
 
 from __future__ import annotations
 

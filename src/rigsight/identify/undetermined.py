@@ -1,4 +1,4 @@
-"""Which directions of the coordinates do records not determine? From a square root of their information matrix."""
+"""Directions of the coordinates that records do not determine, from a square root of their information matrix."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 
 
 def marginal_errors(root: Floats) -> Floats:
-    """Return the standard error of each coordinate, infinite where it takes part in what nothing is known of."""
+    """Return the standard error of each coordinate, infinite if it has a component in an undetermined direction."""
     _, singular, right = np.linalg.svd(root, full_matrices=True)
     sizes = np.zeros(root.shape[1])
     sizes[: singular.size] = singular

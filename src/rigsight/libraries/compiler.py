@@ -1,4 +1,4 @@
-"""Which C compiler does this machine have, and how does it make a library of a C text?"""
+"""The C compiler of this machine, and how it builds a library from C source."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _SHARED = {
     "Windows": (".dll", ("-shared",)),
 }
 NO_COMPILER = (
-    "No C compiler was found, and simulations are compiled. Install one: 'pip install rigsight[compiler]' (nothing else is "
+    "No C compiler was found, but simulations are compiled. Install one: 'pip install rigsight[compiler]' (nothing else is "
     f"needed), or Debian's gcc with 'apt-get install gcc', or name one in the variable {VARIABLE}."
 )
 
@@ -74,7 +74,7 @@ def _found(named: str, path: str) -> tuple[Compiler, ...]:
         try:
             words = shlex.split(named)
         except ValueError as error:
-            raise InputError(f"The variable {VARIABLE} is no command ({error}): {named!r}.") from None
+            raise InputError(f"The variable {VARIABLE} is not a command ({error}): {named!r}.") from None
         program = shutil.which(words[0], path=path)
         if program is None:
             raise InputError(
@@ -112,7 +112,7 @@ def library_suffix() -> str:
 def _system() -> tuple[str, tuple[str, ...]]:
     system = platform.system()
     if system not in _SHARED:
-        raise InputError(f"No library can be made for {system}; rigsight runs on {', '.join(_SHARED)}.")
+        raise InputError(f"Libraries cannot be built for {system}; rigsight runs on {', '.join(_SHARED)}.")
     return _SHARED[system]
 
 
@@ -179,7 +179,7 @@ def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]
     except OSError as error:
         raise MachineError(
             f"The C compiler {compiler.name} cannot be run in {tempfile.gettempdir()} ({error.strerror or error}). "
-            "Make room there, or set TMPDIR to a folder with room."
+            "Free some space there, or set TMPDIR to a folder with enough space."
         ) from error
     raise MachineError(
         f"The C compiler {compiler.name} failed: {first.strip()}. "

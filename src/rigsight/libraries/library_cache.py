@@ -1,7 +1,7 @@
-"""C text -> library, kept on disk under the hash of all that its machine code depends on.
+"""Cache of libraries on disk, under the hash of everything on which the machine code depends.
 
-A stale one is impossible: the name of a library is the hash of its C text, the compiler, its options and the processor. A
-damaged one is found by a checksum before it is loaded, and made anew.
+A stale library is impossible, because its name is the hash of its C source, the compiler, its options and the processor. A
+damaged one is detected by a checksum before it is loaded, and rebuilt.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def cache_folder() -> Path:
     Raises
     ------
     InputError
-        If the variable is not set and nobody knows a home folder.
+        If the variable is not set and there is no home folder.
     """
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
@@ -62,7 +62,7 @@ def _caches_at_home() -> Path:
     except RuntimeError:
         # A container that runs under a number without a name.
         raise InputError(
-            f"There is no home folder to keep compiled kernels in. Set {CACHE_VARIABLE} to a folder that can be written."
+            f"There is no home folder for the cache of compiled kernels. Set {CACHE_VARIABLE} to a writable folder."
         ) from None
 
 
@@ -161,6 +161,5 @@ def _write(path: Path, content: bytes) -> None:
         if _sound(path):
             return
         raise MachineError(
-            f"Cannot keep compiled kernels in {path.parent} ({error.strerror}). "
-            f"Set {CACHE_VARIABLE} to a folder that can be written."
+            f"Cannot write compiled kernels to {path.parent} ({error.strerror}). Set {CACHE_VARIABLE} to a writable folder."
         ) from error

@@ -1,4 +1,4 @@
-"""How figures are drawn that the report, the commands and notebooks share; every function returns a figure of its own."""
+"""Figures that the report, the commands and notebooks share; every function returns a new figure."""
 
 from typing import TYPE_CHECKING
 

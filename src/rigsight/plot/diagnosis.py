@@ -182,7 +182,7 @@ def _waterfall_step(
 
 @in_style
 def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figure:
-    """Draw what each candidate leaves of the validation records, in units of the noise floor on a logarithmic axis.
+    """Draw the error of each candidate on the validation records, in units of the noise floor on a logarithmic axis.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How does a discovery look? The terms with their intervals and inclusion probabilities, and the free run against the records."""
+"""Figures of a discovery: the terms with their intervals and inclusion probabilities, and the free run against the records."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
     axes[0].set_ylabel(f"force [{unit}]")
     axes[0].legend(loc="upper left", fontsize=8, markerscale=6.0)
     axes[0].set_title(
-        f"Missing at {_spoken(joint.joint)}: explains {100.0 * joint.share:.4g} % of the sensors' errors"
+        f"Missing at {_spoken(joint.joint)}: explains {100.0 * joint.share:.4g} % of the sensor errors"
     )
 
 

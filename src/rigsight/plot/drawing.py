@@ -1,4 +1,4 @@
-"""How is every figure drawn: its style, its colors, the units shown, lines of many samples.
+"""Style of all figures: colors, units shown, lines of many samples.
 
 Nothing here touches pyplot: figures carry their own canvas, so that they can be drawn in any thread and are freed with
 their last reference.
@@ -31,7 +31,7 @@ REIDENTIFIED = "#cc79a7"
 WITH_EFFECT = "#0072b2"
 FLOOR = "#1d2126"
 OTHER = "#9aa4ae"
-"""Okabe and Ito's palette: told apart by color-blind readers, and in gray by line style."""
+"""Okabe and Ito's palette: distinguishable for color-blind readers, and in gray by line style."""
 STAGE_STYLES: Mapping[Stage, Mapping[str, Any]] = {
     "before": {"color": GIVEN, "linestyle": (0, (5, 1.6))},
     "reidentified": {"color": REIDENTIFIED, "linestyle": (0, (2, 1))},

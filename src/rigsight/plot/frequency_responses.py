@@ -158,7 +158,7 @@ def overlaid_responses(columns: Sequence[Sequence[Panel]], fitted_label: str = "
 
 
 def thinned(measured: FrequencyResponse, most_lines: int = _MOST_LINES) -> FrequencyResponse:
-    """Return at most this many lines, by default about as many as the eye can tell apart on a logarithmic axis."""
+    """Return at most this many lines, by default about as many as the eye can resolve on a logarithmic axis."""
     if measured.omega.size <= most_lines:
         return measured
     wished = np.geomspace(measured.omega[0], measured.omega[-1], most_lines)

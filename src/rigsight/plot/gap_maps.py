@@ -116,7 +116,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
 
 @in_style
 def gap_bands(parts: Sequence[BandPart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw what each stage leaves in each band of frequency; squares add up to that of the whole gap.
+    """Draw the error of each stage in each frequency band; squares add up to that of the whole gap.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _band_label(part: BandPart) -> str:
 
 @in_style
 def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapping[Stage, str]) -> Figure:
-    """Draw what each stage leaves of each record, relative to the record's own motion.
+    """Draw the error of each stage on each record, relative to the record's own motion.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def gap_records(parts: Sequence[RecordPart], labels: Sequence[str], stages: Mapp
 def gap_amplitudes(
     parts: Sequence[AmplitudePart], labels: Sequence[str], stages: Mapping[Stage, str]
 ) -> Figure:
-    """Draw what each stage leaves at each amplitude of the input, relative to the motion there.
+    """Draw the error of each stage at each amplitude of the input, relative to the motion there.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def gap_amplitudes(
 
 @in_style
 def gap_times(parts: Sequence[TimePart], stages: Mapping[Stage, str]) -> Figure:
-    """Draw what each stage leaves over time, one panel per scored record, with the noise floor.
+    """Draw the error of each stage over time, one panel per scored record, with the noise floor.
 
     Parameters
     ----------

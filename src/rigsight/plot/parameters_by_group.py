@@ -1,4 +1,4 @@
-"""Which figure shows whether a number is the same in every record?"""
+"""Which figure shows whether a parameter is the same in every record?"""
 
 from __future__ import annotations
 

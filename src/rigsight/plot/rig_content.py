@@ -1,4 +1,4 @@
-"""What does the picture of a rig show? Its bodies and states in rows, and what joins, drives and reads them."""
+"""Content of the picture of a rig: bodies and states in rows, and the joints, drives and sensors that connect to them."""
 
 from __future__ import annotations
 

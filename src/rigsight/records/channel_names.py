@@ -1,4 +1,4 @@
-"""What does the name of a channel give away: which signal it may be, and in which unit?"""
+"""Signal and unit suggested by the name of a channel."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def closeness(name: str, signal: str) -> float:
         return 3.0
     known = NAMES_OF.get(signal)
     if known is None:
-        # A name that a rig's file gives: nobody knows others for it, but its words may stand in another order or among more.
+        # A name from a rig file: no other names are known for it, but its words may be in another order or among others.
         own = set(asked.split())
         shared = own & set(words.split())
         return 2.0 if own and shared == own else _IN_PART * len(shared) / max(1, len(own))

@@ -1,4 +1,4 @@
-"""What is in a channel, at a glance: how long, how fast, how large, and what is missing?"""
+"""Summary of a channel: length, sample rate, range, and missing samples."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _GAP = 1.5
 
 @dataclass(frozen=True)
 class ChannelSummary:
-    """What `rigsight inspect` tells of a channel.
+    """Summary of a channel in `rigsight inspect`.
 
     Attributes
     ----------
     name, unit
-        As the file states them; None for no unit.
+        As stated in the file; None for no unit.
     n_samples
         Number of samples.
     dt, t0, t1
@@ -32,7 +32,7 @@ class ChannelSummary:
     n_gaps
         Places where its own time jumps; None where it has none.
     n_stands
-        Steps on which the value does not change.
+        Number of steps without a change of the value.
     """
 
     name: str

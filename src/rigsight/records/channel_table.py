@@ -1,4 +1,4 @@
-"""Which channels of a measurement file are the signals that were asked for, and which time belongs to them?"""
+"""Selection of the channels of a measurement file for the requested signals, with their time axis."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def read_channels(
     Parameters
     ----------
     path
-        A measurement file that is no delimited text.
+        A measurement file other than delimited text.
     columns
-        Signal name, or `time`, -> where it stands.
+        Signal name, or `time`, -> its column.
     time
         Name of the time among them.
     time_is_mapped
-        True if a user said where it stands, so that it has to stand there.
+        True if the user mapped it, so that the column must exist.
     optional
         Signals that may be missing.
     dt
@@ -49,7 +49,7 @@ def read_channels(
     Raises
     ------
     InputError
-        Naming file and channel, and the mend.
+        If a channel cannot be used; the message gives file, channel and the remedy.
     """
     with open_channels(path) as file:
         found = {
@@ -83,13 +83,13 @@ def read_channels(
 def _find(
     path: Path, file: ChannelFile, signal: str, mapping: ColumnMapping, optional: bool
 ) -> Channel | None:
-    """Return the channel that a mapping names, by full name, by name without group, or by number."""
+    """Return the channel of a mapping, by full name, by name without group, or by number."""
     channels = file.channels
     if isinstance(mapping.name, int):
         if 1 <= mapping.name <= len(channels):
             return channels[mapping.name - 1]
         raise InputError(
-            f"{path.name}: signal '{signal}' is to be channel {mapping.name}, but there are {len(channels)}: {_listed(file)}."
+            f"{path.name}: signal '{signal}' is mapped to channel {mapping.name}, but there are {len(channels)}: {_listed(file)}."
         )
     matches = _named(channels, mapping.name)
     if len(matches) == 1:
@@ -112,7 +112,7 @@ def _find(
     )
     raise InputError(
         f"{path.name} has no channel '{mapping.name}' for signal '{signal}'.{hint} Its channels: {_listed(file)}. "
-        f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). rigsight inspect tells more.'
+        f'Map it under columns: {signal} = "..." (on a command line --column {signal}=...). See rigsight inspect for details.'
     )
 
 
@@ -127,7 +127,7 @@ def _listed(file: ChannelFile) -> str:
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     if not names:
         refused = [f"'{one.name}' {one.reason}" for one in file.refused[:3]]
-        return "none that is a signal over time" + (f" ({'; '.join(refused)})" if refused else "")
+        return "no channel is a signal over time" + (f" ({'; '.join(refused)})" if refused else "")
     return ", ".join(names[:_LISTED]) + more
 
 
@@ -162,7 +162,7 @@ def _axes(
     elif matches or time_is_mapped or all(channel.axis is None for channel in found.values()):
         if not matches and not time_is_mapped:
             raise InputError(
-                f"{path.name} has no channel '{time}', and its channels have no time of their own. Map time under columns "
+                f"{path.name} has no channel '{time}', and its channels have no time axis. Map time under columns "
                 f'({time} = "..."), or give the sample time in seconds with the record: dt = 0.001. '
                 f"Its channels: {_listed(file)}."
             )
@@ -184,9 +184,7 @@ def _axes(
             )
     units = {channel.unit for channel in chosen.values()}
     if len(units) > 1:
-        raise InputError(
-            f"{path.name}: the times of the groups stand in different units; export them in seconds."
-        )
+        raise InputError(f"{path.name}: the groups have times in different units; export them in seconds.")
     return {s: stamps[c.name] for s, c in chosen.items()}, (next(iter(chosen.values())).name, units.pop())
 
 
@@ -197,7 +195,7 @@ def _own_axes(path: Path, found: Mapping[str, Channel]) -> dict[str, NDArray[np.
     for signal, channel in found.items():
         if channel.axis is None:
             raise InputError(
-                f"{path.name}: channel '{channel.name}' has no time of its own, unlike others. Map time under columns."
+                f"{path.name}: channel '{channel.name}' has no time axis, unlike others. Map time under columns."
             )
         if id(channel.axis) not in read:
             read[id(channel.axis)] = _finite(path, channel, _in_seconds(path, channel, channel.axis))

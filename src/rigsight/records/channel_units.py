@@ -1,4 +1,4 @@
-"""What makes SI of a unit as files and people write it? The only place that knows pint."""
+"""Conversion of units as written in files to SI; the only module that uses pint."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ _MISLEADING = {"Grad": "deg", "grad": "deg, or gon"}
 
 
 class UnknownUnitError(ValueError):
-    """A unit that nobody knows, or that is no unit of the quantity; the text says which."""
+    """A unit that is unknown or does not fit the quantity; the text says which."""
 
 
 def factor(unit: str, si: str) -> float:
-    """Return what one `unit` is in the unit `si`, an angle never taken for a plain number.
+    """Return the factor from `unit` to `si`; angles are not treated as dimensionless.
 
     Raises
     ------
     UnknownUnitError
-        If the unit is not known or measures something else.
+        If the unit is unknown or of another quantity.
     """
     unit = unit.strip()
     if unit == si:
@@ -92,12 +92,12 @@ def _registry() -> Any:
 
 
 def has_si(unit: str) -> bool:
-    """Return True if a rig's signal has a unit of its own; some take their input in any."""
+    """Return True if a rig's signal has a fixed unit; some accept their input in any unit."""
     return unit != INPUT_UNIT
 
 
 def in_drive_unit(unit: str) -> tuple[float, str] | None:
-    """Return what one `unit` of a drive is in its SI unit, and that unit: kN is 1000 N. None where it is no unit of a drive."""
+    """Return the factor from a unit of a drive to its SI unit, and that unit; None if it is not a unit of a drive."""
     for si in DRIVES:
         with contextlib.suppress(UnknownUnitError):
             return factor(unit, si), si
@@ -111,7 +111,7 @@ def _drive_of(unit: str | None) -> str | None:
 
 
 def is_a(unit: str, si: str) -> bool:
-    """Return True if a unit as a file states it measures the same as `si`."""
+    """Return True if a unit stated in a file has the same dimension as `si`."""
     try:
         factor(unit, si)
     except UnknownUnitError:
@@ -120,7 +120,7 @@ def is_a(unit: str, si: str) -> bool:
 
 
 def is_unit(text: str) -> bool:
-    """Return True if a text is a unit, of whatever."""
+    """Return True if a text is a unit of any quantity."""
     try:
         _ratio(text, text)
     except UnknownUnitError:
@@ -131,7 +131,7 @@ def is_unit(text: str) -> bool:
 def si_mapping(
     file: str, signal: str, si: str, mapping: ColumnMapping, label: str, stated: str | None
 ) -> tuple[ColumnMapping, tuple[str, ...]]:
-    """Return a mapping with the scale that makes SI of a column, and notes on what was converted.
+    """Return a mapping with the scale from a column to SI, and notes on the conversion.
 
     Parameters
     ----------
@@ -140,9 +140,9 @@ def si_mapping(
     signal, si
         The rig's signal and its unit.
     mapping
-        What the campaign says: scale and offset win, then its unit, then the file's.
+        Mapping in the campaign: scale and offset take precedence, then its unit, then the unit of the file.
     stated
-        Unit that the file states, None where it states none.
+        Unit stated in the file, None if there is none.
 
     Raises
     ------
@@ -159,7 +159,8 @@ def si_mapping(
         if named is None or taken is None or named == taken or not is_a(named, taken):
             return mapping, ()
         return mapping, (
-            f"{where}: taken in {taken} as it stands, though its name ends with {named}. If it is in {named}, write "
+            f"{where}: values taken as {taken} without conversion, although the name ends with {named}. If it is in {named}, "
+            f"write "
             f'{signal} = {{ name = "{label}", unit = "{named}" }} (on a command line --unit {signal}={named}); if not, '
             "scale = 1.0.",
         )
@@ -168,20 +169,21 @@ def si_mapping(
             found = in_drive_unit(mapping.unit)
             if found is None:
                 raise InputError(
-                    f'{where}: unit = "{unit}" cannot be converted: {signal} has no unit of its own on this rig, and this is '
-                    f"no unit of a drive ({', '.join(DRIVES)}). Give scale and offset instead."
+                    f'{where}: unit = "{unit}" cannot be converted: {signal} has no fixed unit on this rig, and this is '
+                    f"not a unit of a drive ({', '.join(DRIVES)}). Give scale and offset instead."
                 )
             return ColumnMapping(mapping.name, scale=found[0]), ()
         return mapping, (
-            f"{where}: {signal} has no unit of its own on this rig; values were taken as they stand, in {unit}.",
+            f"{where}: {signal} has no fixed unit on this rig; values were taken without conversion, in {unit}.",
         )
     try:
         scale = factor(unit, si)
     except UnknownUnitError as error:
-        by = "" if mapping.unit is not None else ", which the file states,"
+        by = "" if mapping.unit is not None else ", stated in the file,"
         raise InputError(
             f"{where}: the unit '{unit}'{by} {error}; {signal} is in {si}. Write "
-            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 for the values as they stand.'
+            f'{signal} = {{ name = "{label}", unit = "..." }} with the right unit, or scale = 1.0 to take the '
+            "values without conversion."
         ) from None
     converted = ColumnMapping(mapping.name, scale=scale)
     if mapping.unit is not None:
@@ -189,7 +191,7 @@ def si_mapping(
         if said is None or not is_a(said, si) or factor(said, si) == scale:
             return converted, ()
         by = "its name ends with" if stated is None else "the file states"
-        return converted, (f"{where}: taken in {unit}, as the campaign says, though {by} {said}.",)
+        return converted, (f"{where}: taken in {unit}, as stated in the campaign, although {by} {said}.",)
     if scale == 1.0:
         return converted, ()
-    return converted, (f"{where}: converted from {unit}, the unit that the file states, to {si}.",)
+    return converted, (f"{where}: converted from {unit}, the unit stated in the file, to {si}.",)

@@ -1,4 +1,4 @@
-"""Where does a signal stand in a file, and what makes SI of its numbers?"""
+"""Column of a signal in a file, and its conversion to SI."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from rigsight.errors import InputError
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """Where a signal stands in a file: ``value in SI = scale * column + offset``.
+    """Column of a signal in a file: ``value in SI = scale * column + offset``.
 
     Attributes
     ----------
     name
         Name of the column or channel, or its number, counted from 1.
     scale
-        SI unit per unit of the column. None here and for `offset` leaves it to the unit, or takes the values as they stand.
+        SI unit per unit of the column. None here and for `offset` uses the unit, or takes the values without conversion.
     offset
-        What is added after scaling, in the SI unit.
+        Value added after scaling, in the SI unit.
     unit
         Unit of the column, instead of scale and offset: ``"deg"``.
 
@@ -47,8 +47,8 @@ class ColumnMapping:
             raise InputError(f"Column '{self.name}': offset must be a finite number, got {self.offset}.")
         if self.unit is not None and self.is_converted:
             raise InputError(
-                f"Column '{self.name}': unit = \"{self.unit}\" stands beside scale or offset, which convert as well; "
-                "give one of the two."
+                f"Column '{self.name}': unit = \"{self.unit}\" is combined with scale or offset, which also convert; give one of "
+                "the two."
             )
 
     @property
@@ -62,7 +62,7 @@ class ColumnMapping:
         Parameters
         ----------
         column
-            Numbers as they stand in the file, shape (n_samples,).
+            Numbers in the file, shape (n_samples,).
         """
         scale = 1.0 if self.scale is None else self.scale
         offset = 0.0 if self.offset is None else self.offset
@@ -71,26 +71,26 @@ class ColumnMapping:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Numbers of a file as they stand there, before scale and offset.
+    """Numbers of a file before scale and offset.
 
     Attributes
     ----------
     values
         Signal name -> column, shape (n_samples,); all finite. Without time where `axes` has it.
     labels
-        Signal name -> how the file calls the column.
+        Signal name -> name of the column in the file.
     lines
-        Number of every row, shape (n_samples,), as messages name it.
+        Number of every row for messages, shape (n_samples,).
     notes
-        What was assumed while reading.
+        Assumptions made while reading.
     units
-        Signal name -> unit that the file itself states in a place made for units.
+        Signal name -> unit stated in a dedicated field of the file.
     axes
         Signal name -> time stamps [s], shape (n_samples,), where the signals do not share one axis; else empty.
     row
-        What a row is called: ``"line"`` of a text, ``"sample"`` of anything else.
+        Name of a row in messages: ``"line"`` of a text, ``"sample"`` otherwise.
     names
-        How the file calls all its columns.
+        Names of all columns in the file.
     """
 
     values: Mapping[str, NDArray[np.float64]]

@@ -1,4 +1,4 @@
-"""Are the samples equally spaced, and if nearly, how do they become so?"""
+"""Check for equally spaced samples, and resampling of nearly equal ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigsight.errors import InputError
 from rigsight.records.record import Hold
 
 FEWEST_SAMPLES = 50
-# Beyond, squares and quotients of what was read leave the range of numbers; bytes of another type look like this.
+# Beyond, squares and quotients would overflow; data read with a wrong type looks like this.
 LARGEST_NUMBER = 1e100
 SHORTEST_TIME = 1e-100
 # Of the sample time: above the first a record is refused; below the second interpolation adds more error than it mends.
@@ -51,7 +51,7 @@ class TimeBase:
     def resample(self, samples: NDArray[np.float64], hold: Hold | None = None) -> NDArray[np.float64]:
         """Return samples on the even grid, shape (n_samples,).
 
-        An input is interpolated as its `hold` says it ran between the samples; None is an output, smooth by nature.
+        An input is interpolated according to its `hold`; None is an output, smooth by nature.
         """
         if self.stamps is None or hold == "zoh":
             return samples
@@ -83,18 +83,18 @@ def check_long_enough(file: str, n_samples: int) -> None:
 def time_base(
     stamps: NDArray[np.float64], lines: NDArray[np.int64], file: str, row: str = "line"
 ) -> TimeBase:
-    """Return the even grid on which the stamps lie.
+    """Return the even grid of the time stamps.
 
     Parameters
     ----------
     stamps
-        Time stamps as they stand in the file, shape (n_samples,).
+        Time stamps in the file, shape (n_samples,).
     lines
         Line number of every stamp, shape (n_samples,).
     file
         Name for messages.
     row
-        What messages call a row.
+        Name of a row in messages.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def time_base(
     span = abs(stamps[-1] - stamps[0])
     if not (span == 0.0 or span >= SHORTEST_TIME) or not np.max(np.abs(stamps)) <= LARGEST_NUMBER:
         raise InputError(
-            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}; no clock does. Check the column "
+            f"{file}: time runs from {stamps[0]:.6g} to {stamps[-1]:.6g}, which is implausible. Check the column "
             "that time is read from, and its type."
         )
     index = np.arange(stamps.size, dtype=np.float64)
@@ -136,12 +136,12 @@ def time_base(
             f"{steps[worst]:.4g}, the mean step {dt:.4g} (jitter {100 * jitter:.2g} %, at most 1 % is resampled). "
             f"{mend}"
         )
-    note = f"{file}: stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
+    note = f"{file}: time stamps jitter by {100 * jitter:.2g} % of the sample time; samples were interpolated onto an even grid."
     return TimeBase(float(stamps[0]), dt, stamps, (note,))
 
 
 def pauses(stamps: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the samples behind which others are missing; none where the steps vary everywhere, which is jitter.
+    """Return the samples after which others are missing; none if the steps vary everywhere (jitter).
 
     Parameters
     ----------

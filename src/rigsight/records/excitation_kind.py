@@ -1,4 +1,4 @@
-"""What drove the rig, and how strongly, as the samples of the input show it?"""
+"""Kind and amplitude of the excitation, from the samples of the input."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _RATIO = 1.5
 
 
 def guess_kind(samples: NDArray[np.float64]) -> Kind:
-    """Return the kind of an input of shape (n_samples,): a guess that a user is asked to check."""
+    """Return the kind of an input of shape (n_samples,): a guess that the user should check."""
     steps = np.diff(samples)
     jumps = int(np.count_nonzero(steps))
     if np.mean(steps == 0.0) > _STANDING and 0 < jumps <= _MOST_JUMPS:

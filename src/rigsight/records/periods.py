@@ -1,4 +1,4 @@
-"""Does a signal repeat itself, or another one, and after how many samples?"""
+"""Period of a signal, or repetition of another signal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ROUGH = 0.5
 
 
 def repeated_period(samples: NDArray[np.float64]) -> int | None:
-    """Return the period of a signal of shape (n_samples,) in samples that repeats but for noise; None if it does not."""
+    """Return the period in samples of a signal of shape (n_samples,) that is periodic apart from noise; None if it is not."""
     centered = samples - np.mean(samples)
     n = centered.size
     size = float(np.std(centered))

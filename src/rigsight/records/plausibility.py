@@ -1,4 +1,4 @@
-"""Do the samples look like a working measurement: does the signal move, and is it cut off at its extremes?"""
+"""Plausibility of samples: does the signal change, and is it clipped?"""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def is_constant(samples: NDArray[np.float64]) -> bool:
 
 
 def clipping(samples: NDArray[np.float64]) -> tuple[tuple[float, int], ...]:
-    """Return level and number of samples for each extreme at which a signal of shape (n_samples,) is cut off.
+    """Return level and number of samples for each extreme at which a signal of shape (n_samples,) is clipped.
 
-    A cut signal runs into its extreme at speed and stays there exactly, again and again, while it moves from sample to
-    sample elsewhere. Steps, held inputs and coarsely quantized signals stand still elsewhere too; a signal at rest
-    reaches its level once, or slowly.
+    A clipped signal reaches its extreme at speed and is exactly constant there, repeatedly, while it changes from sample to
+    sample elsewhere. Steps, held inputs and coarsely quantized signals are constant elsewhere too; a signal at rest reaches its
+    level once, or slowly.
     """
     steps = np.diff(samples)
     typical_step = float(np.sqrt(np.mean(steps**2)))

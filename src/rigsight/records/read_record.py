@@ -1,4 +1,4 @@
-"""How does a measured file become a checked `Record` of a rig's signals?"""
+"""Reading a measured file as a checked `Record` of a rig's signals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rigsight.records.sound_signals import (
     clipping_notes,
     listed_columns,
     moving,
-    refuse_what_nobody_measures,
+    refuse_implausible,
     rest_notes,
 )
 from rigsight.records.stretches import one_stretch, stretches
@@ -73,7 +73,7 @@ def read_record(
     Raises
     ------
     InputError
-        As `read_stretches`, and where the clock of the file pauses.
+        As `read_stretches`, and if the time axis has gaps.
     """
     return read_stretches(path, inputs, outputs, at_pauses="refuse", **options)[0]
 
@@ -104,7 +104,7 @@ def read_stretches(
     beside: Sequence[str] = (),
     at_pauses: Literal["split", "refuse"] = "split",
 ) -> tuple[Record, ...]:
-    """Read, check and repair the stretches of a record between the pauses of its clock; mostly there is one.
+    """Read, check and repair the stretches of a record between gaps in its time axis; usually there is only one.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def read_stretches(
     constant_inputs
         Input that the file does not hold -> its value throughout [SI].
     moving_inputs
-        Names of the inputs without whose motion nothing can be learned: a motion that is prescribed.
+        Names of the inputs that must change for an identification: a prescribed motion.
     name
         How results call the record, by default the file's name without its ending.
     role, kind, amplitude, hold
@@ -137,21 +137,23 @@ def read_stretches(
     constants
         See `Record`.
     beside
-        Names of signals that are none of the rig's; they are read where the file has them, in whatever unit.
+        Names of signals that do not belong to the rig; they are read if the file has them, in any unit.
     at_pauses
-        Whether a pause parts records, or makes the file unusable.
+        Whether a gap splits the record, or makes the file unusable.
 
     Raises
     ------
     InputError
-        Naming file, line or column, and the mend, for whatever makes the record unusable.
+        If the record is unusable; the message gives file, line or column, and the remedy.
     """
     columns = columns or {}
     time = columns.get(TIME, ColumnMapping(TIME))
     if time.scale is not None and time.scale < 0.0:
         raise InputError(f"{path.name}: the scale of time must be positive, got {time.scale:g}.")
     if dt is not None and TIME in columns:
-        raise InputError(f"{path.name}: dt = {dt:g} stands beside a column for time; give one of the two.")
+        raise InputError(
+            f"{path.name}: dt = {dt:g} is given together with a column for time; give one of the two."
+        )
     constant_inputs = constant_inputs or {}
     recorded = [signal for signal in inputs if signal.name not in constant_inputs]
     names = [*(signal.name for signal in (*recorded, *outputs)), *beside]
@@ -192,7 +194,7 @@ def read_stretches(
     raw = {name: table.values[name] for name in names if name in table.values}
     # A few samples at rest are too few before they are a rest.
     check_long_enough(path.name, max(values.size for values in table.values.values()))
-    refuse_what_nobody_measures(path, raw, table)
+    refuse_implausible(path, raw, table)
     found: list[str] = []
     if require_outputs:
         raw, found = moving(path, raw, table, needed, outputs)
@@ -204,9 +206,9 @@ def read_stretches(
     found += alike_notes(path, [o.name for o in outputs if o.name not in table.values], table)
     if absent:
         found.append(
-            f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, as nothing drives the rig."
+            f"{path.name}: has no column for {' and '.join(absent)}; taken as 0 throughout, because nothing drives the rig."
         )
-    # Where nothing drives the rig and nothing was measured, time alone says how many samples there are.
+    # If nothing drives the rig and nothing was measured, only time gives the number of samples.
     kept = [*raw] or [TIME]
     measured = [output.name for output in outputs if output.name in raw] if require_outputs else []
     cut = stretches(path.name, TIME, table, measured)
@@ -241,7 +243,7 @@ def read_stretches(
 
 @dataclass(frozen=True)
 class _Dialect:
-    """How a text is written, as far as somebody said so."""
+    """The format of a text, as far as specified."""
 
     separator: str | None
     decimal: str | None
@@ -284,9 +286,7 @@ def _refuse_time_as_signal(file: str, table: Columns) -> None:
 def _refuse_dialect(path: Path, dialect: _Dialect) -> None:
     for key, value in vars(dialect).items():
         if value is not None:
-            raise InputError(
-                f"{path.name} is no delimited text, so {key} means nothing for it; remove {key}."
-            )
+            raise InputError(f"{path.name} is not delimited text, so {key} does not apply; remove {key}.")
 
 
 def _bases(path: Path, table: Columns) -> dict[str, TimeBase]:

@@ -46,13 +46,13 @@ class Record:
     source
         The file it was read from, None for a simulated record.
     notes
-        What was found or repaired while reading, one sentence each.
+        Notes on problems and repairs while reading, one sentence each.
     constants
         Known numbers of the rig that differ from record to record (a payload), by name; they replace the campaign's.
     observed
-        Bandwidth [rad/s], by sensor, of the observer that pulls a simulation towards what was measured while it is fitted.
+        Bandwidth [rad/s], by sensor, of the observer that pulls a simulation towards the measurement while it is fitted.
     free_offsets
-        Outputs whose sensor has an offset of its own in this record: a fit estimates it as it does the state at the beginning.
+        Outputs whose sensor has its own offset in this record: a fit estimates it together with the initial state.
 
     Raises
     ------
@@ -99,7 +99,7 @@ class Record:
         object.__setattr__(self, "constants", MappingProxyType(self._checked_constants()))
 
     def _checked(self, signal: str, samples: ArrayLike) -> NDArray[np.float64]:
-        """Return a private, read-only copy: a caller that goes on writing to its array must not change the record."""
+        """Return a private, read-only copy, so that a caller cannot change the record through its array."""
         array = np.array(samples, dtype=np.float64)
         if array.ndim != 1 or array.size == 0:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Does a record of a closed loop hold the reference of the controller, so that it can serve as instrument?"""
+"""Does a closed-loop record contain the reference of the controller, which can serve as instrument?"""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ REFERENCE = "reference"
 
 
 def signals_beside(own: Collection[str]) -> tuple[str, ...]:
-    """Return what a record may hold beside the signals of its rig, whose names are given."""
+    """Return the signals that a record may contain in addition to those of its rig, whose names are given."""
     return () if REFERENCE in own else (REFERENCE,)
 
 
 def instrument_of(record: Record, own: Collection[str]) -> str | None:
-    """Return the name of the signal that drives a record's loop from outside; None where none is there, or it never changes.
+    """Return the name of the reference signal of a record's control loop; None if there is none, or it never changes.
 
     Parameters
     ----------

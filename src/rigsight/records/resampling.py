@@ -1,4 +1,4 @@
-"""How do signals of different rates come onto one time axis, once the campaign asks for it?"""
+"""Resampling of signals with different rates to one time axis, if the campaign requests it."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def refuse_different_axes(file: str, bases: Mapping[str, TimeBase], labels: Mapp
     )
     finest = min(base.dt for base in bases.values())
     raise InputError(
-        f"{file}: the signals do not share one time axis: {listed}. Nothing is resampled unless it is asked for: give the "
-        f"record resample = {finest:.6g} (sample time in seconds), or map signals of one rate."
+        f"{file}: the signals do not share one time axis: {listed}. Records are resampled only on request: give the record "
+        f"resample = {finest:.6g} (sample time in seconds), or map signals of one rate."
     )
 
 
@@ -68,8 +68,8 @@ def resampled(
 ) -> Resampled:
     """Return the signals on the even axis that all of them cover.
 
-    Inputs are interpolated as their hold says they ran between the samples, outputs, smooth by nature, by cubic splines. An
-    axis coarser than the samples is refused: what lies above its Nyquist frequency would fold into the record.
+    Inputs are interpolated according to their hold, outputs, which are smooth, by cubic splines. An axis coarser than the samples
+    is rejected, because content above its Nyquist frequency would alias.
 
     Parameters
     ----------
@@ -92,15 +92,15 @@ def resampled(
     for signal, base in bases.items():
         if step > _COARSER * base.dt:
             raise InputError(
-                f"{file}: resample = {step:g} is coarser than the samples of {signal}, {base.dt:.6g} s apart; what is faster "
-                f"would fold into the record. Give at most {min(b.dt for b in bases.values()):.6g}, or decimate it before."
+                f"{file}: resample = {step:g} is coarser than the samples of {signal}, {base.dt:.6g} s apart; faster signal "
+                f"content would alias. Give at most {min(b.dt for b in bases.values()):.6g}, or decimate it before."
             )
     start = max(base.t0 for base in bases.values())
     stop = min(base.t0 + base.dt * (samples[signal].size - 1) for signal, base in bases.items())
     asked = (stop - start) / step
     if not asked <= MOST_SAMPLES:
         raise InputError(
-            f"{file}: resample = {step:g} makes {asked:.3g} samples, more than the {MOST_SAMPLES} that are held."
+            f"{file}: resample = {step:g} makes {asked:.3g} samples, more than the limit of {MOST_SAMPLES}."
         )
     n_samples = int(np.floor(asked + _ON_GRID)) + 1
     if n_samples < FEWEST_SAMPLES:
@@ -117,7 +117,7 @@ def resampled(
             continue
         on_axis[signal], manner = _interpolated(even, base, start, step, n_samples, holds.get(signal))
         how.append(f"{signal} from {base.dt:.6g} s ({manner})")
-    note = f"{file}: resampled onto {step:g} s because the campaign asks for it: {', '.join(how)}."
+    note = f"{file}: resampled to {step:g} s as requested in the campaign: {', '.join(how)}."
     return Resampled(start, step, on_axis, (note,) if how else ())
 
 

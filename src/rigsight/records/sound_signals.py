@@ -1,4 +1,4 @@
-"""Can the signals that were found in a file be used? What is missing, still, cut off, or called nearly like another is told."""
+"""Checks of the signals of a file: missing, constant or clipped ones, and similar names, are reported."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class NamedSignal(Protocol):
 
 
 def check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: bool) -> None:
-    """Refuse inputs that are missing where the rig was driven, or where a column may well be one of them."""
+    """Reject missing inputs if the rig was driven, or if a column may be one of them."""
     names = [name for name in table.names if name not in table.labels.values()]
     is_free = is_free and not all(name.isdecimal() for name in (*names, *table.labels.values()))
     for signal in absent:
@@ -48,28 +48,29 @@ def check_absent(path: Path, absent: Sequence[str], table: Columns, *, is_free: 
 
 
 def alike_notes(path: Path, missing: Sequence[str], table: Columns) -> list[str]:
-    """Tell of a column that was not read although it is called nearly like an output that is missing: a slip of the pen."""
+    """Report an unread column whose name is similar to that of a missing output: possibly a typing error."""
     unread = [name for name in table.names if name not in table.labels.values()] if missing else []
     return [
-        f"{path.name}: has no column '{signal}', so {signal} is taken as not recorded there.{hint} Map it under columns if it is."
+        f"{path.name}: has no column '{signal}', so {signal} counts as not recorded in this file.{hint} Map it under columns if "
+        f"it is."
         for signal in missing
         if (hint := nearest(signal, unread))
     ]
 
 
 def listed_columns(table: Columns) -> str:
-    """Return how a file calls its columns, for a message."""
+    """Return the names of the columns of a file for a message."""
     return ", ".join(f"'{name}'" for name in table.names[:_LISTED]) or "none"
 
 
-def refuse_what_nobody_measures(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
-    """Refuse numbers that are bytes of another type, or a lost sign of a decimal."""
+def refuse_implausible(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> None:
+    """Reject implausibly large numbers, from a wrong data type or a lost decimal point."""
     for signal, samples in raw.items():
         largest = float(np.max(np.abs(samples)))
         if largest > LARGEST_NUMBER:
             raise InputError(
-                f"{path.name}, column '{table.labels[signal]}': {signal} is as large as {largest:.3g}; "
-                f"no sensor shows more than {LARGEST_NUMBER:g}. Check the column and its type."
+                f"{path.name}, column '{table.labels[signal]}': {signal} reaches {largest:.3g}; readings above "
+                f"{LARGEST_NUMBER:g} are implausible. Check the column and its type."
             )
 
 
@@ -90,7 +91,7 @@ def moving(
                 "Check sensor and column, or leave the record out."
             )
     still = sorted(constant.intersection(measured))
-    notes = [f"{path.name}: {signal} never changes and is taken as not measured." for signal in still]
+    notes = [f"{path.name}: {signal} never changes and counts as not measured." for signal in still]
     return {signal: samples for signal, samples in raw.items() if signal not in still}, notes
 
 
@@ -111,7 +112,7 @@ def rest_notes(
     if set(held) & set(must_move):
         raise InputError(
             f"{where}: no input changes ({values}), so nothing is excited and nothing can be identified. Check the column. "
-            'Of a rig that moves freely write kind = "operation" without an amplitude; a record that is only scored has '
+            'For free motion write kind = "operation" without an amplitude; for a record that is only scored, '
             'role = "validation".'
         )
     return [
@@ -120,10 +121,10 @@ def rest_notes(
 
 
 def clipping_notes(path: Path, raw: Mapping[str, NDArray[np.float64]], table: Columns) -> list[str]:
-    """Tell of signals that are cut off at their extremes."""
+    """Report clipped signals."""
     return [
-        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples stand exactly at "
-        f"its extreme {level:g}. Check range and saturation of sensor, amplifier or drive."
+        f"Warning: {path.name}, column '{table.labels[signal]}': {signal} looks clipped, {count} samples are exactly at its "
+        f"extreme {level:g}. Check range and saturation of sensor, amplifier or drive."
         for signal, samples in raw.items()
         for level, count in clipping(samples)
     ]

@@ -1,6 +1,6 @@
-"""Where does the clock of a record pause, and which stretches between its pauses are records by themselves?
+"""Gaps in the time axis of a record, and the stretches between them that become separate records.
 
-A motion across a pause is unknown, so that nothing is put in its place: each stretch begins in a state of its own.
+The motion in a gap is unknown, so nothing is interpolated: each stretch has its own initial state.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _FEWEST_KEPT = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """A table cut where its clock pauses.
+    """A table split at the gaps of its time axis.
 
     Attributes
     ----------
     parts
-        The tables of the stretches; the one table where there is no pause.
+        The tables of the stretches; the whole table if there is no gap.
     notes
         Where it was cut, and what was left out.
     """
@@ -45,7 +45,7 @@ class Stretches:
 
 
 def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ()) -> Stretches:
-    """Return the stretches of a table between the pauses of its clock.
+    """Return the stretches of a table between the gaps of its time axis.
 
     Parameters
     ----------
@@ -56,12 +56,12 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
     table
         What was read.
     outputs
-        Of these one at least changes in a stretch that is worth a record.
+        At least one of these must change in a stretch that becomes a record.
 
     Raises
     ------
     InputError
-        If there is a pause, and too little lies in stretches that are long enough.
+        If there is a gap, and too few samples are in stretches that are long enough.
     """
     stamps = table.values.get(time)
     if stamps is None or stamps.size < FEWEST_SAMPLES:
@@ -87,14 +87,14 @@ def stretches(file: str, time: str, table: Columns, outputs: Sequence[str] = ())
     )
     left = f" {dropped} samples in {why} were left out." if dropped else ""
     note = (
-        f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with "
-        f"initial states of its own; nothing was put between.{left}"
+        f"{file}: samples are missing {where}. It was read as {len(spans)} record{'s' if len(spans) > 1 else ''}, each with its "
+        f"own initial state; nothing was interpolated.{left}"
     )
     return Stretches(tuple(_part(table, start, stop) for start, stop in spans), (note,))
 
 
 def _may_be_rounding(stamps: NDArray[np.float64]) -> bool:
-    """Return True if an even clock, rounded to the digits that are printed, would jump like this now and then."""
+    """Return True if the jumps may come from rounding an even time axis to the printed digits."""
     digits = resolution(stamps)
     if np.max(digits) <= COARSEST_STAMPS * float(np.median(np.diff(stamps))):
         return False
@@ -109,18 +109,18 @@ def one_stretch(file: str, found: Stretches) -> Columns:
     Raises
     ------
     InputError
-        If its clock pauses.
+        If its time axis has gaps.
     """
     if len(found.parts) == 1 and not found.notes:
         return found.parts[0]
     told = found.notes[0].removeprefix(f"{file}: ").partition(".")[0]
     raise InputError(
-        f"{file}: {told}. Split it there into files of their own; a campaign reads each stretch as a record by itself."
+        f"{file}: {told}. Split it there into separate files; a campaign reads each stretch as a separate record."
     )
 
 
 def _where(stamps: NDArray[np.float64], table: Columns, ends: NDArray[np.intp]) -> str:
-    """Return where the first pause lies and how many there are."""
+    """Return the location of the first gap and the number of gaps."""
     first = int(ends[0])
     others = "" if ends.size == 1 else f", and at {ends.size - 1} more place{'s' if ends.size > 2 else ''}"
     return (

@@ -1,4 +1,4 @@
-"""Does one record show a signal in another unit than the others? Millimeters among meters spoil every fit and look like nothing else."""
+"""Does one record have a signal in another unit than the others, millimeters among meters?"""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ _SEGMENTS = 8
 _DRIVEN = 1e-2
 """Share of the largest power of an input from which a frequency counts as driven."""
 _LEAST_RATIO = 30.0
-"""Ratio of gains from which a unit is asked about: above what amplitude does to a nonlinear rig, below degrees for radians (57)."""
+"""Ratio of gains from which a unit is asked about: below degrees for radians (57), above what the amplitude changes in a rig."""
 
 
-def unit_mismatch(records: Sequence[Record], source: str, response: str) -> tuple[Record, Record, float] | None:
+def unit_mismatch(
+    records: Sequence[Record], source: str, response: str
+) -> tuple[Record, Record, float] | None:
     """Return the two records whose gains differ most, and by what factor; None where no unit explains it.
 
     Gains are compared at frequencies that drive both, so that it does not matter which band a record sweeps.
@@ -59,8 +61,8 @@ def _gain(record: Record, source: str, response: str) -> _Gain | None:
     if np.ptp(record[source]) == 0.0 or np.ptp(record[response]) == 0.0:
         return None
     length = max(record.n_samples // _SEGMENTS, min(record.n_samples, 64))
-    f, driving = welch(record[source], 1.0 / record.dt, nperseg=length, detrend="linear")
-    _, answer = welch(record[response], 1.0 / record.dt, nperseg=length, detrend="linear")
+    f, driving = welch(record[source], 1.0 / record.dt, nperseg=length)
+    _, answer = welch(record[response], 1.0 / record.dt, nperseg=length)
     driven = (driving > _DRIVEN * np.max(driving[1:], initial=0.0)) & (f > 0.0) & (answer > 0.0)
     return (f[driven], np.sqrt(answer[driven] / driving[driven])) if driven.any() else None
 

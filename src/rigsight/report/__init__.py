@@ -1,4 +1,4 @@
-"""Results for people: self-contained HTML pages, and summaries for the terminal."""
+"""Reports: self-contained HTML pages, and summaries for the terminal."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class BlindSummary:
             table.add_row(Text(words), Text(number(content["goals"][name])), Text(""), Text(""))
         yield table
         yield from _conditions(content)
-        yield Text("\nStated probability against what was right", "bold")
+        yield Text("\nStated probability against share of right verdicts", "bold")
         bins = Table.grid(padding=(0, 2))
         for row in content["reliability"]:
             if row["right"]["total"]:

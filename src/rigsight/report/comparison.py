@@ -1,4 +1,4 @@
-"""A comparison of models for people: tables on a terminal, and one self-contained HTML page with figures."""
+"""Report of a comparison of models: tables on a terminal, and one self-contained HTML page with figures."""
 
 from __future__ import annotations
 
@@ -217,9 +217,10 @@ def _failures(comparison: Comparison) -> list[str]:
 def _sentences(comparison: Comparison) -> list[str]:
     """Return what the page says about the reading of its numbers."""
     windows = (
-        "Free runs begin in an initial state that was estimated from the record."
+        "Free runs start from an initial state estimated from the record."
         if comparison.window_length is None
-        else f"The rig drifts, so free runs are windows of {comparison.window_length:.3g} s, each from its own initial state."
+        else f"The rig drifts, so free runs are split into windows of {comparison.window_length:.3g} s, each with its own "
+        f"initial state."
     )
     floors = [
         f"Noise of {floor.output}: {floor.std:.3g} {floor.unit}, from {floor.method}"
@@ -227,9 +228,9 @@ def _sentences(comparison: Comparison) -> list[str]:
         for floor in comparison.floors
     ]
     return [
-        f"All frequency responses, measured and simulated, are from one estimator: {comparison.method.replace('_', ' ')}.",
+        f"All frequency responses, measured and simulated, come from the same estimator: {comparison.method.replace('_', ' ')}.",
         "The noise floor of a frequency response is what noise of the size and spectrum below would change in the measured one.",
-        f"Steps are compared for {comparison.step_seconds:g} s, less the mean before them.",
+        f"Steps are compared for {comparison.step_seconds:g} s, with the mean before the step subtracted.",
         windows,
         *floors,
         *comparison.notes,

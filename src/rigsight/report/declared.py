@@ -1,4 +1,4 @@
-"""Of which rig is a diagnosis, and which effects does it name? As its model declares them."""
+"""The rig and the named effects of a diagnosis, as declared by its model."""
 
 from __future__ import annotations
 

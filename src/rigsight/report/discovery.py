@@ -86,13 +86,13 @@ def _term(term: Term) -> str:
     numbers = "; ".join(
         f"{name} = {estimate_text(Estimate(c.value, c.std, c.unit))}" for name, c in term.coefficients.items()
     )
-    return f"{numbers} (taken in {100 * term.inclusion:.0f} % of the draws)"
+    return f"{numbers} (selected in {100 * term.inclusion:.0f} % of the draws)"
 
 
 def _joint(joint: JointForce) -> str:
     left = f"leaves {joint.error_over_noise:.3g} x floor"
-    told = " and ".join(term.text for term in joint.law.terms) or "no law of its motion"
-    return f"explains {100 * joint.share:.4g} % of the sensors' errors, {left}: {told}"
+    told = " and ".join(term.text for term in joint.law.terms) or "not a function of the motion"
+    return f"explains {100 * joint.share:.4g} % of the sensor errors, {left}: {told}"
 
 
 def _alone(found: Discovery | str) -> str:

@@ -1,4 +1,4 @@
-"""Which equations does the diagnosed simulation have? Those of its own tree, as MathML, grouped by whose they are."""
+"""Equations of the diagnosed simulation as MathML, grouped by the part to which they belong."""
 
 from __future__ import annotations
 

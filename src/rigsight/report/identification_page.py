@@ -24,7 +24,7 @@ _TWO_SIDED = 1.96
 """Standard deviations of a 95 % interval."""
 _STABLE = {
     "stable": "stable",
-    "drifts": "stable, but for what nothing holds in place",
+    "drifts": "stable except for free rigid-body motion",
     "unstable": "unstable",
 }
 
@@ -98,7 +98,7 @@ def render_identification(
                 amplitudes,
                 "amplitudes-figure",
                 identification.amplitude_statement,
-                "Parameters of each record by itself over its amplitude, with 95 % intervals; dashed: one set for all.",
+                "Parameters fitted to each record alone, over its amplitude, with 95 % intervals; dashed: the common set.",
             ),
             command=command or "from Python",
             versions=versions,
@@ -137,9 +137,11 @@ def _figure(view: LinearView, drawing: Figure, number: int) -> PageFigure:
     )
     caption = (
         "Magnitude and phase of each sensor's response to each input: measured from all records together (gray, with 95 % "
-        "bands), and that of the fitted equations, linearized where they rest (blue)."
+        "bands), and that of the fitted equations, linearized at equilibrium (blue)."
     )
-    return page_figure(drawing, f"responses-{number}", shown or "No response was measured.", caption)
+    return page_figure(
+        drawing, f"responses-{number}", shown or "No frequency response was measured.", caption
+    )
 
 
 def _problems(view: LinearView) -> list[str]:

@@ -1,4 +1,4 @@
-"""Where the gap lies, for people: the rows and figures of that section."""
+"""Section "Where the gap lies": its rows and figures."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def place_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
         (
             place.name,
             percent(place.share),
-            "first" if place.looked_at else "only if the others explain too little",
+            "first" if place.looked_at else "only if the others explain too little of the gap",
         )
         for place in diagnosis.places
     ]
@@ -120,7 +120,7 @@ def force_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
         (
             force.joint,
             f"{force.error_over_noise:.3g} {TIMES}",
-            (listed(term.text for term in force.law.terms) or "no law of its motion")
+            (listed(term.text for term in force.law.terms) or "not a function of the motion")
             if force in agreeing
             else "ruled out by the sensors",
         )
@@ -143,9 +143,9 @@ def _figures(diagnosis: Diagnosis, output: str, key: str) -> list[PageFigure]:
     figures = []
     if bands:
         spread = (
-            "spread over frequency as in the stretches of noise alone"
+            "spread over frequency as in the stretches that contain only noise"
             if diagnosis.localization.noise_shape.get(output) == "measured"
-            else "taken to be spread evenly over frequency"
+            else "assumed to be white"
         )
         said = [
             (
@@ -219,7 +219,7 @@ def _states_figure(states: Sequence[StatePart], output: str, motion: str, key: s
     joint = states[0].joint
     if joint:
         whose = f"By state of {joint}, along the motion that follows all sensors, {rest}"
-        there = f", if all that they lack acts at {joint}" if lacking else ""
+        there = f", if everything missing acts at {joint}" if lacking else ""
     else:
         whose, there = f"By state of the measured motion, {rest}", ""
     return page_figure(
@@ -228,7 +228,9 @@ def _states_figure(states: Sequence[StatePart], output: str, motion: str, key: s
         f"Map of the error, {rest}, over the plane of states, largest with {gap_percent(worst.reidentified)} at "
         f"{place}; noise floor {gap_percent(worst.noise_floor)}. {_lacking(states)}",
         f"{whose}; the error is largest at {place}; the noise floor is at {gap_percent(worst.noise_floor)}."
-        + (f" Right: the mean force that the equations lack there, with its sign{there}." if lacking else ""),
+        + (
+            f" Right: the mean force missing in the equations there, with its sign{there}." if lacking else ""
+        ),
     )
 
 
@@ -260,7 +262,7 @@ def _lacking(states: Sequence[StatePart]) -> str:
         for half, words in ((forward, "forward"), (back, "backward"))
         if half
     ]
-    return f"Mean force that the equations lack while moving: {listed(means)}."
+    return f"Mean force missing in the equations while moving: {listed(means)}."
 
 
 def _motion(diagnosis: Diagnosis) -> str:

@@ -1,4 +1,4 @@
-"""How does a result look in a notebook? What the terminal says, as a small piece of HTML that needs nothing beside it."""
+"""Results in a notebook: the terminal output as a small self-contained piece of HTML."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from rigsight.report.wording import (
 
 @dataclass(frozen=True)
 class NotebookTable:
-    """A table of texts; `heads` may be empty, the first cell of a row says what the row is of."""
+    """A table of texts; `heads` may be empty, the first cell of a row is its label."""
 
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]

@@ -1,4 +1,4 @@
-"""What does the page show of each record? What it is, what the simulations leave of it, its curves over time and frequency."""
+"""Records in the page: description, errors of the simulations, curves over time and frequency."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class RecordView:
     title, facts
         Name, and role, kind, amplitude, length in words.
     rows
-        Output, and what each stage leaves of it in words.
+        Output, and the error of each stage in words.
     charts
         Each output over time, then each signal path over frequency.
     missing
@@ -153,7 +153,7 @@ def _time_chart(
     detail = (
         Detail(begin, end, "Step", "Show the step")
         if is_step
-        else Detail(begin, end, "Largest error", f"Show where it errs most, {first}")
+        else Detail(begin, end, "Largest error", f"Show where the error is largest, {first}")
     )
     title = f"Measured and simulated {output_label(diagnosis, output)}, record {trace.record}"
     data = chart_data(
@@ -166,7 +166,7 @@ def _time_chart(
     thinned = ""
     if measured.size > most_points:
         thinned = (
-            f" Drawn are the lowest and highest of every {-(-measured.size // (most_points // 2))} samples."
+            f" Shown are the minimum and maximum of every {-(-measured.size // (most_points // 2))} samples."
         )
     caption = (
         f"{output_label(diagnosis, output)} over time; below, simulated minus measured, with a band of twice the noise "

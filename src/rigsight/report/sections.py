@@ -1,4 +1,4 @@
-"""What stands in the page, in which order? From a diagnosis to the rows and figures of each section."""
+"""Rows and figures of each section of the page, in order."""
 
 from __future__ import annotations
 
@@ -76,21 +76,21 @@ def budget_drawing(diagnosis: Diagnosis) -> Figure:
 
 
 def budget_figure(diagnosis: Diagnosis) -> PageFigure:
-    """Return the gap budget with the words that go with it."""
+    """Return the gap budget with its caption."""
     alt = " ".join(
         f"{output}: {stages_told(diagnosis, gap)}, noise floor {gap_percent(gap.noise_floor)}."
         for output, gap in diagnosis.gap.items()
     )
     meaning = (
-        " Re-identified: the same equations with the numbers that fit best."
+        " Re-identified: the same equations with refitted parameters."
         if is_given(diagnosis)
-        else " No parameters were given: the rig's own equations with the numbers that fit best come first."
+        else " No parameters were given: the first bar is the rig's own equations with fitted parameters."
     )
     return page_figure(
         budget_drawing(diagnosis),
         "figure-budget",
         f"Waterfall of the gap. {alt}",
-        f"How the gap shrinks, step by step; the dashed line is what a perfect model would leave.{meaning}",
+        f"How the gap shrinks, step by step; the dashed line is the error of a perfect model.{meaning}",
     )
 
 
@@ -122,20 +122,24 @@ def ranking_drawing(diagnosis: Diagnosis) -> Figure:
 
 
 def ranking_figure(diagnosis: Diagnosis) -> PageFigure:
-    """Return the ranking with the words that go with it."""
+    """Return the ranking with its caption."""
     names = [effects_label(candidate.effects) for candidate in diagnosis.candidates]
     scored = [
         f"{name} {c.error_over_noise:.3g}"
         for name, c in zip(names, diagnosis.candidates, strict=True)
         if math.isfinite(c.error_over_noise)
     ]
-    hatched = " Hatched: cannot be told from it by these records." if diagnosis.ambiguous_with else ""
-    named = " Blue: the one named." if diagnosis.effects else ""
+    hatched = (
+        " Hatched: these records cannot distinguish it from the named one."
+        if diagnosis.ambiguous_with
+        else ""
+    )
+    named = " Blue: the named cause." if diagnosis.effects else ""
     return page_figure(
         ranking_drawing(diagnosis),
         "figure-ranking",
-        f"Bars of what each candidate leaves in units of the noise floor: {', '.join(scored[:16])}.",
-        f"What each candidate leaves; shorter is better.{named}{hatched}",
+        f"Bars of the error of each candidate in units of the noise floor: {', '.join(scored[:16])}.",
+        f"Error of each candidate; shorter is better.{named}{hatched}",
     )
 
 
@@ -190,12 +194,12 @@ def errors_told(diagnosis: Diagnosis) -> str:
         return ""
     if candidate.std_method == "bootstrap":
         return (
-            "Standard errors from simulations of this model under random forces from outside and sensor noise, of the size that "
-            "its remainder shows (parametric bootstrap)."
+            "Standard errors from simulations of this model with random disturbance forces and sensor noise as large as its "
+            "residual (parametric bootstrap)."
         )
     return (
-        "Standard errors from the formula of the fit; this model could not be simulated under random forces. They may be too "
-        "small where a force from outside decides when something sticks or lets go."
+        "Standard errors from the covariance of the fit, because this model could not be simulated with random forces. They may "
+        "be too small if disturbances decide when friction sticks or slips."
     )
 
 
@@ -237,8 +241,8 @@ def _disturbing(floor: NoiseFloor) -> str:
     if found is None:
         return ""
     return (
-        f". What the model leaves above it acts like a force of {found.std:.2g} {found.unit} beside the drive, "
-        f"up to {found.below:.3g} rad/s"
+        f". The error of the model above it corresponds to a random force of {found.std:.2g} {found.unit} added to the drive, up "
+        f"to {found.below:.3g} rad/s"
     )
 
 

@@ -1,4 +1,4 @@
-"""Can the numbers be trusted? The section of the report, its figure and table, and one line for a terminal."""
+"""Section on the trust in parameters: its figure and table, and one line for a terminal."""
 
 from __future__ import annotations
 
@@ -63,8 +63,9 @@ def trust_view(diagnosis: Diagnosis) -> TrustView | None:
         figure = page_figure(
             trust_drawing(diagnosis),
             "figure-trust",
-            f"Numbers as single groups have them, with 95 % intervals. {told}.",
-            "Each number as one record, level or window alone has it, with 95 % intervals. Dashed with its band: the common fit.",
+            f"Parameters estimated from single groups of records, with 95 % intervals. {told}.",
+            "Each parameter as estimated from one record, level or window alone, with 95 % intervals. Dashed line with band: the "
+            "common fit.",
         )
     return TrustView(diagnosis.trust.statement, figure, tuple(map(_row, diagnosis.trust.parameters)))
 
@@ -84,7 +85,7 @@ def trust_drawing(diagnosis: Diagnosis) -> Figure:
     """
     drawn = _drawn(diagnosis)
     if not drawn:
-        raise InputError("No number of this diagnosis was estimated in two groups of records.")
+        raise InputError("No parameter of this diagnosis could be estimated from two groups of records.")
     return plot.parameters_by_group(
         [
             plot.GroupPanel(

@@ -1,4 +1,4 @@
-"""How does one say it in plain words? Sentences that the page and the terminal share."""
+"""Sentences that the page and the terminal share."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from rigsight.effects import AT
 from rigsight.report.quantities import gap_percent
 
 TIMES = "\u00d7"
-_WITHOUT_EFFECT = "no effect, best numbers"
+_WITHOUT_EFFECT = "no effect, refitted parameters"
 _PROPER_NAMES = {"bouc wen": "Bouc-Wen", "coulomb": "Coulomb", "stribeck": "Stribeck", "iwan": "Iwan"}
 _SEPARATES = 1.0
-"""RMS difference in standard deviations of the noise below which an experiment is no help."""
+"""RMS difference in standard deviations of the noise below which an experiment does not help."""
 _PLACES = {
     "actuator": "at the actuator",
     "sensor": "at the sensor",
@@ -109,7 +109,7 @@ def stage_names(diagnosis: Diagnosis) -> dict[Stage, str]:
 
 
 def stages_told(diagnosis: Diagnosis, gap: OutputGap | GapPart) -> str:
-    """Return what each stage leaves: ``"given simulation 42 %, re-identified 13 %, with effect 0.94 %"``."""
+    """Return the error of each stage: ``"given simulation 42 %, re-identified 13 %, with effect 0.94 %"``."""
     return ", ".join(
         f"{name} {gap_percent(getattr(gap, stage))}" for stage, name in stage_names(diagnosis).items()
     )
@@ -163,7 +163,7 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         return _effect_sentence(diagnosis)
     if diagnosis.verdict == "parameters":
         return (
-            f"The gap is caused by wrong parameters: the same equations with better numbers {_shrinks(diagnosis, 'close')}, "
+            f"The gap is caused by wrong parameters: refitting the same equations {_shrinks(diagnosis, 'closes')}, "
             f"down to {times_floor(after)}."
         )
     if diagnosis.verdict == "none":
@@ -171,11 +171,14 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
             return f"There is no gap to explain: {_first(diagnosis)} {times_floor(before)}."
         if before > VERDICT.at_lower_bound:
             return (
-                f"No effect is seen to be missing: {_first(diagnosis)} {times_floor(before)}, but that goes with nothing that "
-                "was looked at. The noise floor seems too low; a repeated record would measure it."
+                f"No missing effect was found: {_first(diagnosis)} {times_floor(before)}, but this error correlates with no "
+                f"signal that was tested. The noise floor is probably too low; repeat a record to measure it."
             )
-        other = ", and better numbers do not change that much" if is_given(diagnosis) else ""
-        return f"The gap is too small against the noise to have a cause: {_first(diagnosis)} {times_floor(before)}{other}."
+        other = ", and refitting the parameters hardly changes it" if is_given(diagnosis) else ""
+        return (
+            f"The gap is too small, compared with the noise, to find a cause: {_first(diagnosis)} "
+            f"{times_floor(before)}{other}."
+        )
     return _unknown_sentence(diagnosis)
 
 
@@ -202,7 +205,7 @@ def _unknown_sentence(diagnosis: Diagnosis) -> str:
     scored = [c for c in diagnosis.candidates if c.effects and math.isfinite(c.error_over_noise)]
     best = min(scored, key=lambda c: c.error_over_noise, default=None)
     places = listed(dict.fromkeys(map(place_label, diagnosis.where)))
-    points = f"; the evidence points to something {places}" if places else ""
+    points = f"; the evidence points to a cause {places}" if places else ""
     if best is None:
         return f"The cause of the gap is unknown{points}."
     return (
@@ -214,14 +217,14 @@ def _unknown_sentence(diagnosis: Diagnosis) -> str:
 def _shrinks(diagnosis: Diagnosis, closes: str) -> str:
     before, after = error_over_noise(diagnosis, "before"), error_over_noise(diagnosis, "after")
     if not before > 1.0:
-        return f"{closes} none of it, as there is hardly any"
+        return f"{closes} none of it, because there is hardly any gap"
     share = (before - after) / (before - 1.0)
     # A set that stays below half a percent would read "closes 0 %".
     return f"{closes} {percent(share)} of the gap" if share >= 0.005 else f"{closes} none of the gap"
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """Return what a named or an unknown cause leaves and with what that goes; empty where it leaves nothing to tell."""
+    """Return the remaining error of a named or an unknown cause and its correlated signal; empty where there is none."""
     left = diagnosis.remainder
     return (
         left.text
@@ -231,7 +234,7 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
 
 
 def missing_force_sentence(diagnosis: Diagnosis) -> str:
-    """Return what is known of the force that is missing where no effect explains the gap; empty where nothing is."""
+    """Return a sentence on the missing force if no effect explains the gap; empty where nothing is known."""
     if diagnosis.missing_force is not None:
         return diagnosis.missing_force.sentence
     forces = diagnosis.joint_forces
@@ -243,7 +246,8 @@ def missing_force_sentence(diagnosis: Diagnosis) -> str:
     others = [f"at {force.joint} {force.error_over_noise:.3g}" for force in forces if force not in agreeing]
     beside = f" ({listed(others)})" if others else ""
     return (
-        f"A missing force at {names} alone, whatever its course, leaves {times_floor(nearest)} of what all sensors show{beside}. "
+        f"A missing force at {names} alone, of any shape over time, would leave an error of {times_floor(nearest)} over all "
+        f"sensors{beside}. "
         f"{forces[0].sentence}"
     )
 
@@ -255,7 +259,7 @@ def ambiguity_sentence(diagnosis: Diagnosis) -> str:
         rivals = listed((effects_label(effects) for effects in diagnosis.ambiguous_with), "or")
         sentences.append(f"These records cannot tell {effects_label(diagnosis.effects)} from {rivals}.")
     if diagnosis.verdict == "effect" and diagnosis.likely.outside:
-        sentences.append("A cause that no catalogue holds belongs to the likely causes too.")
+        sentences.append("A cause outside the catalogue is also among the likely causes.")
     return " ".join(sentences)
 
 
@@ -278,13 +282,13 @@ def advice_sentences(diagnosis: Diagnosis) -> list[str]:
         rival = effects_label(advice.rival)
         if advice.separation < _SEPARATES:
             sentences.append(
-                f"No experiment of the menu tells {rival} apart: the best, a {advice.waveform} of {size}{band}, parts the two "
-                f"predictions of {advice.output} by {_deviations(advice.separation)} of the noise."
+                f"None of the experiments considered would rule out {rival}: with the best, a {advice.waveform} of {size}{band}, "
+                f"the two predictions of {advice.output} differ by only {_deviations(advice.separation)} of the noise."
             )
         else:
             sentences.append(
-                f"To tell {rival} apart, drive a {advice.waveform} of {size}{band}: the two predictions of {advice.output} then "
-                f"differ by {_deviations(advice.separation)} of the noise."
+                f"To confirm or rule out {rival}, record a {advice.waveform} of {size}{band}: the two predictions of "
+                f"{advice.output} then differ by {_deviations(advice.separation)} of the noise."
             )
     return sentences
 
@@ -312,8 +316,9 @@ def basis_sentence(diagnosis: Diagnosis) -> str:
         chosen = ""
         if diagnosis.verdict == "effect" and diagnosis.error_of_choice is not None:
             chosen = (
-                " The same records chose the model. A model chosen on part of them leaves "
+                " The model was also selected on these records, which makes this error optimistic. A model selected on part of "
+                "them leaves "
                 f"{diagnosis.error_of_choice:.3g} times the noise floor on the rest."
             )
         return f"Errors are those of validation records, which were not fitted{windows}.{chosen}"
-    return f"There is no validation record: errors are those of the fitted records{windows}, and too good."
+    return f"There is no validation record: errors are those of the fitted records{windows}, and therefore optimistic."

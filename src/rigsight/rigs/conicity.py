@@ -1,4 +1,4 @@
-"""How does the conicity of a wheel set give its lateral creep factor? As the running gear's file declares it (2.12)."""
+"""Lateral creep factor from the conicity of a wheel set, as declared in the file of the running gear (2.12)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Are accelerations of coupled coordinates formulas, or found by elimination? By how long the formulas would be."""
+"""Accelerations of coupled coordinates: as formulas or, if these are too long, by elimination."""
 
 from __future__ import annotations
 

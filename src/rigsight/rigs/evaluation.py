@@ -1,4 +1,4 @@
-"""Which number does an expression of a rig's declaration have, and how does it answer to what it is made of?"""
+"""Value of an expression of a rig's declaration, and its derivatives."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from rigsight.rigs.parts import (
 from rigsight.simulators import Bodies, force_leaf, mass_leaf
 
 _LONGEST_SHORTENED = 100
-"""In operations. Shortening takes a millisecond for each, and nobody reads what is longer."""
+"""In operations. Simplification takes a millisecond for each, and longer expressions are not read."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Mechanism:
         )
 
     def _is_plain(self, drive: Drive) -> bool:
-        """Return True for a drive that is told an input, and whose force goes with it by a constant gain."""
+        """Return True for a drive whose force is an input times a constant gain."""
         own = sp.Symbol(drive.name, real=True)
         gain = sp.diff(drive.force, own)
         read = gain.free_symbols | {own, *drive.signal.free_symbols}

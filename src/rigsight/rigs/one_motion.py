@@ -1,4 +1,4 @@
-"""What are a rig of one motion and a state that follows it, in the words of `m x'' + d x' + k x = gain u`?"""
+"""A rig of one motion and a state that follows it, in the form `m x'' + d x' + k x = gain u`?"""
 
 from __future__ import annotations
 

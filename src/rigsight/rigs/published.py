@@ -1,4 +1,4 @@
-"""Parameter sets that were published for a rig, each with its source."""
+"""Published parameter sets of rigs, each with its source."""
 
 from __future__ import annotations
 

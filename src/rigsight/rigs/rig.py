@@ -139,7 +139,7 @@ class Rig:
         """
         mechanism = self.mechanism
         if not self.has_one_motion:
-            raise ValueError(f"{self.name} is more than one mass, or more than one element.")
+            raise ValueError(f"{self.name} has more than one mass or element.")
         (coordinate,), (joint,) = mechanism.coordinates, mechanism.joints
         drive_gain, inertia = sp.S.Zero, None
         if mechanism.free:

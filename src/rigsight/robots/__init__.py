@@ -1,4 +1,4 @@
-"""Models of robots that other simulators run: MJCF and URDF to a rig file that is checked, numbers and effects back to them."""
+"""Robot models of other simulators: from MJCF and URDF to a checked rig file, and parameters and effects back to them."""
 
 from rigsight.robots.drafting.draft import RigDraft as RigDraft
 from rigsight.robots.drafting.draft import draft_rig as draft_rig

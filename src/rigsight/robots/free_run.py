@@ -1,4 +1,4 @@
-"""Does a rig move as MuJoCo does? Both start from one state and run freely, and their coordinates are compared."""
+"""Comparison of a rig with MuJoCo: both run freely from the same state, and their coordinates are compared."""
 
 from __future__ import annotations
 

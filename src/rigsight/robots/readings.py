@@ -1,4 +1,4 @@
-"""What do the sensors of a MuJoCo model show while it follows controls? Beside records, or in examples in their place."""
+"""Sensor readings of a MuJoCo model for given controls, to compare with records or to replace them in examples."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def sensor_readings(model: mujoco.MjModel, controls: NDArray[np.float64], dt: fl
     steps = dt / float(model.opt.timestep)
     if round(steps) < 1 or abs(steps - round(steps)) > _WHOLE:
         raise InputError(
-            f"dt is a whole number of the model's steps of {model.opt.timestep:g} s, got {dt:g} s."
+            f"dt must be a multiple of the model's step of {model.opt.timestep:g} s, got {dt:g} s."
         )
     data = mujoco.MjData(model)
     readings = np.empty((len(controls), model.nsensordata))

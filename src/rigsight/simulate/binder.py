@@ -1,4 +1,4 @@
-"""What do the names in the declarations of a rig and its effects stand for in the equations of one structure?"""
+"""Meaning of the names in the declarations of a rig and its effects in the equations of one structure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Binder:
     unique
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
-        Values of parameters that stand in the equations as numbers.
+        Values of parameters that appear in the equations as numbers.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
-"""How do long expressions change with their arguments? By the derivatives of their parts.
+"""Derivatives of long expressions from the derivatives of their parts.
 
-A derivative of a whole expression repeats what its factors hold, and takes sympy longer than all else. Those of the parts are
-short, and the chain rule joins them: A. Griewank and A. Walther, Evaluating Derivatives (2008), 3.1.
+A derivative of a whole expression repeats its factors, and takes sympy longer than everything else. Those of the parts are short,
+and the chain rule combines them: A. Griewank and A. Walther, Evaluating Derivatives (2008), 3.1.
 """
 
 from __future__ import annotations

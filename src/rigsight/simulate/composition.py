@@ -1,4 +1,4 @@
-"""Which structure do a rig and a tuple of effects make?"""
+"""Composition of a rig and a tuple of effects to a structure."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def compose(
     Raises
     ------
     InputError
-        If an effect makes no sense on this rig or is given twice.
+        If an effect does not apply to this rig or is given twice.
 
     Notes
     -----
@@ -110,7 +110,7 @@ def _compose(
     assert isinstance(effects, tuple)
     _check_effects(rig, effects)
     unique = unique_names(rig, effects)
-    late = {rig.acts_at(effect) for effect in effects if effect.measured_late is not None}
+    late = {rig.acts_at(effect) for effect in effects if effect.reading_delay is not None}
     of_observer = [*map(_bandwidth, observed), *(_ahead(sensor) for sensor in observed if sensor in late)]
     parameters = (*_parameters(rig, effects, unique, dict(fixed)), *of_observer)
     symbols = {p.name: sp.Symbol(f"parameter {p.name}", real=True) for p in parameters}
@@ -132,13 +132,13 @@ def _check_effects(rig: Rig, effects: tuple[Effect, ...]) -> None:
         joint = joint_of(rig, effect)
         if effect.reads_inertia and joint.inertia is None and not rig.mechanism.has_short_inverse:
             raise InputError(
-                f"Effect '{effect.name}' reads the inertia that moves with a joint, and the formula for it is too long on the "
-                f"rig '{rig.name}'. Give joints.{joint.name} an inertia in the rig file."
+                f"Effect '{effect.name}' reads the inertia that moves with a joint, and its formula is too long on the rig "
+                f"'{rig.name}'. Set inertia in joints.{joint.name} of the rig file."
             )
         if not rig.offers(effect):
-            raise InputError(f"Effect '{effect.name}' makes no sense on the rig '{rig.name}'.")
+            raise InputError(f"Effect '{effect.name}' does not apply to the rig '{rig.name}'.")
     if len(set(names)) < len(names):
-        raise InputError(f"An effect is named twice: {', '.join(names)}.")
+        raise InputError(f"An effect is given twice: {', '.join(names)}.")
 
 
 def _parameters(
@@ -163,9 +163,7 @@ def _bandwidth(sensor: str) -> Parameter:
 
 
 def _ahead(sensor: str) -> Parameter:
-    return Parameter(
-        ahead_name(sensor), f"time by which the motion of {sensor} is read ahead", unit="s", default=0.0
-    )
+    return Parameter(ahead_name(sensor), f"lead time of the reading of {sensor}", unit="s", default=0.0)
 
 
 def structure_named(

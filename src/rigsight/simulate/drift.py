@@ -1,4 +1,4 @@
-"""Does something bring a rig back wherever it is put, or does it drift?"""
+"""Does a restoring force bring the rig back to rest, or does it drift?"""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _SINGULAR = 1e-9
 
 
 def can_drift(rig: Rig, known: Mapping[str, float]) -> bool:
-    """Return True if a rig can rest at another place without another force, and a sensor shows it.
+    """Return True if a rig can rest at different places under the same force, and a sensor shows it.
 
     Parameters
     ----------
     rig
         The rig.
     known
-        Values of constants and parameters; the others are drawn: what matters is which are zero.
+        Values of constants and parameters; the others are drawn at random, since only zero values matter.
     """
     structure = compose(rig)
     motion = structure.tree.motion

@@ -1,7 +1,7 @@
-"""How are accelerations found that are too long to be written down? By elimination in numbers, in steps with names.
+"""Accelerations whose formulas are too long: numerical elimination in named steps.
 
-``mass @ accelerations = loads`` is solved by ``mass = L D L'``, with ones on the diagonal of L. That needs no root: numbers that
-a fit tries on its way may give a mass matrix that is none.
+``mass @ accelerations = loads`` is solved by ``mass = L D L'``, with ones on the diagonal of L. This needs no square root,
+because parameters tried during a fit may give an indefinite mass matrix.
 
 G. H. Golub and C. F. Van Loan, Matrix Computations (2013), 4.1.
 """

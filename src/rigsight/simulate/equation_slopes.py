@@ -1,4 +1,4 @@
-"""How do a rig's equations change with states and inputs, and where does it rest? Symbolic derivatives, called with numbers."""
+"""Symbolic derivatives of the equations of a rig by states and inputs, evaluated with numbers, and its equilibrium."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Slopes:
     outputs_by_states, outputs_by_inputs
         Of the outputs, shapes (n_outputs, n_states) and (3, n_outputs, n_inputs).
     rests
-        Whether nothing moves at that place.
+        Whether that place is an equilibrium.
     """
 
     states: Floats
@@ -98,7 +98,7 @@ class SlopeFunctions:
         return np.concatenate([np.arange(self._n), np.arange(2 * self._n, self._n_states)])
 
     def resting(self, near: Floats, inputs: Floats, p: Floats) -> Floats:
-        """Return the state at which nothing moves under constant inputs, or that comes nearest to it, from a place near by."""
+        """Return the equilibrium under constant inputs, or the state closest to it, from a nearby state."""
         state, held = near.copy(), self._held
         state[self._n : 2 * self._n] = 0.0
         if not held.size:

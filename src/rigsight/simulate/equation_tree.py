@@ -1,4 +1,4 @@
-"""What are the equations of a rig with effects made of, before anything is substituted: one tree that everything else reads."""
+"""The equations of a rig with effects before substitution: one tree that everything else reads."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Kind(StrEnum):
 
 
 class late(sp.Function):  # type: ignore[misc]  # noqa: N801
-    """First argument as it was the second argument ago; the whole expression of a definition, never a part of one."""
+    """First argument delayed by the second; always the whole expression of a definition, never a part of one."""
 
     is_real = True
 
@@ -40,7 +40,7 @@ class shifted(late):  # noqa: N801
 
 @dataclass(frozen=True)
 class Definition:
-    """A named value: what an effect makes of the signal that reaches it, or what the rig calls by a name of its own.
+    """A named value: the output of an effect, or a named quantity of the rig.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class EquationsOfMotion:
 
 @dataclass(frozen=True)
 class FirstOrderState:
-    """A state beside the motion: a memory, a lag, the lateral displacement.
+    """A state other than the motion: a memory, a lag, the lateral displacement.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class EquationTree:
     Attributes
     ----------
     inputs
-        Symbols of what is recorded and drives the rig, as it is now and not as it arrives.
+        Symbols of the recorded inputs of the rig, before any delay.
     definitions
         Named values in the order of evaluation.
     motion

@@ -1,4 +1,4 @@
-"""Which equations of motion do drives, joints, energies and simulated bodies make together?
+"""Equations of motion from drives, joints, energies and simulated bodies.
 
 Lagrange's equations with the forces of drives and joints by virtual work.
 """

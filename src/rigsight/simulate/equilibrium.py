@@ -1,4 +1,4 @@
-"""Where does a mechanism of any shape stand still? Where its forces balance, with those that friction and hysteresis hold."""
+"""Equilibrium of a mechanism of any shape: balance of forces, including those held by friction and hysteresis."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _PRECISE = 1e-15
 def equilibrium(
     structure: Structure, p: Floats, inputs: Floats, given: Mapping[int, float] | None = None
 ) -> Floats:
-    """Return the static equilibrium that slowly rising inputs reach from rest, where dry friction and hysteresis hold their part.
+    """Return the static equilibrium reached from rest under slowly rising inputs, with dry friction and hysteresis.
 
-    Without inputs the rig rests where its springs and weights are in balance, no friction beside; from there friction holds a
-    joint until it is overcome. What no force holds stays at zero, and so does all where there is no balance.
+    Without inputs the rig rests where its springs and weights are in balance without friction; from there friction holds a joint
+    until it is overcome. States without forces stay at zero, and so do all states if there is no equilibrium.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def equilibrium(
     inputs
         Inputs at the start, shape (n_inputs,).
     given
-        States that are known, by index; the others are in balance with them. Velocities do not enter: all stands still.
+        Known states, by index; the others are in equilibrium with them. All velocities are zero.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def equilibrium(
 
     References
     ----------
-    M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for the step with multipliers in the place of friction's signs.
+    M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235, for the step with multipliers instead of friction signs.
     """
     balance = _balance_of(_Key(structure))
     given = dict(given or {})
@@ -73,7 +73,7 @@ def equilibrium(
 
 @dataclass(frozen=True)
 class _Balance:
-    """What has to vanish at standstill, as functions of (parameters, inputs, states, states before, friction signs).
+    """Residuals of the equilibrium, as functions of (parameters, inputs, states, states before, friction signs).
 
     Attributes
     ----------
@@ -86,9 +86,9 @@ class _Balance:
     n_frictions
         Number of joints with dry friction.
     remembers
-        Whether there are states of hysteresis, which follow the way and not the forces.
+        Whether there are hysteresis states, which depend on the path and not on the forces.
     one_sided
-        Null values, by index among the parameters, of friction that is larger one way: with no sign it would still push.
+        Null values, by parameter index, of directional friction, which would otherwise exert a force at sign zero.
     """
 
     rates: Callable[..., Any]
@@ -108,7 +108,7 @@ def _reached(
     *,
     with_friction: bool,
 ) -> Floats:
-    """Return the states in balance under the inputs that are nearest to those before, these where there are none."""
+    """Return the equilibrium under the inputs closest to the previous states, or these if there is none."""
     free = [i for i, index in enumerate(balance.unknown) if index not in given]
     places = [balance.unknown[i] for i in free]
     n = len(places)

@@ -1,4 +1,4 @@
-"""What of the equations depends on parameters alone, and in which form do the rest take fewest operations?"""
+"""Parts of the equations that depend only on parameters, and the form of the rest with the fewest operations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples of an input -> what it does between them, as cubic polynomials per interval.
+"""Input between its samples, as a cubic polynomial per interval.
 
 The hold decides how well a model can fit: a sampled analog signal that is interpolated linearly looks like a small delay and
 a gain error that grows with frequency.

@@ -1,4 +1,4 @@
-"""Which accelerations jump when a kink flips, where elimination finds them? Answered in numbers at a place of no meaning."""
+"""Accelerations, found by elimination, that jump when a kink changes sign. Determined numerically at an arbitrary point."""
 
 from __future__ import annotations
 

@@ -215,8 +215,8 @@ def _frictions(
         found.append(Friction(index, held, alone))
     if len(found) > MOST_FRICTIONS:
         raise InputError(
-            f"{structure.rig.name} has dry friction at {len(found)} motions; at most {MOST_FRICTIONS} can stick and slip "
-            "together. Leave some out, or make them viscous."
+            f"{structure.rig.name} has dry friction at {len(found)} joints; at most {MOST_FRICTIONS} can stick and slip "
+            f"together. Leave some out, or replace them by viscous damping."
         )
     return tuple(found)
 

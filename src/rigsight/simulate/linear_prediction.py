@@ -1,4 +1,4 @@
-"""How would a sampled signal go on beyond its ends? What smooths or interpolates it reaches there."""
+"""Extrapolation of a sampled signal beyond its ends, for smoothing and interpolation."""
 
 from __future__ import annotations
 

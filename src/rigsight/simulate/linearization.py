@@ -1,7 +1,7 @@
-"""Which linear system do the equations of a rig follow close to where it rests?
+"""Linearization of the equations of a rig at its equilibrium.
 
 Derivatives are symbolic. Loops of control laws are closed in the equations, and so in what is returned. At rest dry friction is
-left out: no line has the slope of its jump.
+left out, because its jump has no slope.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ def linearize(
         slopes = functions.at(at_state, at_inputs, p)
     except np.linalg.LinAlgError:
         raise SimulationError(
-            f"The mass matrix of {structure.rig.name} is singular where it rests."
+            f"The mass matrix of {structure.rig.name} is singular at the equilibrium."
         ) from None
     A, direct = slopes.states, slopes.inputs
     # z = x - E_0 u - E_1 u' takes the rates of the inputs out of the equations.
@@ -214,7 +214,8 @@ def linearize(
     parts = (found.state_matrix, found.input_matrix, found.output_matrix, found.feedthrough)
     if not all(np.all(np.isfinite(part)) for part in parts):
         raise SimulationError(
-            f"The equations of {structure.rig.name} have no slope where it rests: a root or a quotient ends there."
+            f"The equations of {structure.rig.name} cannot be linearized at the equilibrium: a root or a quotient has no "
+            f"derivative there."
         )
     return found
 

@@ -1,8 +1,7 @@
-"""By which acceleration does an observer follow what a sensor showed?
+"""Correction acceleration with which an observer tracks a measured sensor.
 
-Accelerations and not forces, so that how closely it follows does not depend on the parameters of the rig.
-An error e of a reading dies away by ``e'' + sqrt(2) w e' + w^2 e = 0``: the optimal observer of a free mass on which white noise
-acts as a force.
+It is an acceleration and not a force, so that the tracking does not depend on the parameters of the rig. An error e of a reading
+decays with ``e'' + sqrt(2) w e' + w^2 e = 0``: the optimal observer of a free mass on which white noise acts as a force.
 """
 
 from __future__ import annotations

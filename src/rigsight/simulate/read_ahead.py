@@ -1,8 +1,7 @@
-"""How does an observer follow a sensor that is late? The measured motion is read ahead by as much, before anything is simulated.
+"""Observer with a delayed sensor: the measured motion is advanced by the delay before the simulation.
 
-In the equations stands only what a shifted set of parameters changes beside that, by a Taylor series: it is exact where the
-parameters are those of the first set. The whole delay by that series moved the delays of sensors of a pendulum by up to a hundred
-standard errors.
+In the equations, a Taylor series accounts only for the change of the delay between parameter sets: it is exact for the first set.
+The whole delay by that series moved the delays of sensors of a pendulum by up to a hundred standard errors.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where does a record start when nothing else is known? Where the rig says, and in static equilibrium."""
+"""Default initial state of a record: the start values of the rig, else static equilibrium."""
 
 from __future__ import annotations
 

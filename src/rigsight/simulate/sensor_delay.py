@@ -1,4 +1,4 @@
-"""What do sensors that are late show of simulated outputs?"""
+"""Readings of delayed sensors from simulated outputs."""
 
 from __future__ import annotations
 

@@ -118,7 +118,9 @@ def normal_equations(
         If a sensor is late.
     """
     if structure.is_shifted or structure.histories:
-        raise ValueError("What a late sensor shows is known once all of a record is simulated.")
+        raise ValueError(
+            "The reading of a delayed sensor is available only after the whole record has been simulated."
+        )
     return kernel_of(structure).normal_equations(records, p, initial_states)
 
 

@@ -1,4 +1,4 @@
-"""How do effects enter a rig's equations? One walk along its places, which leaves an `EquationTree`.
+"""Insertion of effects into the equations of a rig: one pass along its places, which builds an `EquationTree`.
 
 At a drive: ``signal -> delays -> static effects and lags -> generalized force``. At a joint: ``motion -> what stands between it
 and the spring -> spring -> what changes its torque``, other torques beside. At a sensor: ``reading -> effects -> delays``.
@@ -52,7 +52,7 @@ def equation_tree(
     unique
         Name of each effect's parameter in the structure, by (effect, own name).
     fixed
-        Values of parameters that stand in the equations as numbers.
+        Values of parameters that appear in the equations as numbers.
     offsets
         Sensors whose readings are shifted, each by a state that never changes.
     observed
@@ -242,7 +242,7 @@ class _Path:
             joint.force.xreplace({c.rate: sp.S.Zero for c in self._rig.mechanism.coordinates})
         )
         carried, torques = [spring, static], []
-        # What weighs on a joint is known before what goes with its load.
+        # The load of a joint must be known before effects that depend on it.
         for effect in sorted(effects, key=lambda effect: effect.reads(canonical.load)):
             if effect.torque is None:
                 continue
@@ -372,9 +372,9 @@ class _Path:
                     Kind.READING, effect, self._binder.effect(effect, effect.measured, signals)
                 )
         delays = [
-            (effect, self._binder.effect(effect, effect.measured_late, {}))
+            (effect, self._binder.effect(effect, effect.reading_delay, {}))
             for effect in effects
-            if effect.measured_late is not None
+            if effect.reading_delay is not None
         ]
         if sensor.name in self._bandwidths:
             self._shown[sensor.name] = (reading, sp.Add(*(delay for _, delay in delays)))

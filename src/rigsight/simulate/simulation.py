@@ -29,8 +29,8 @@ Ten times as much costs a tenth less time, and is five times beside the wish whe
 
 _REASONS = {
     1: "more than 20000 steps were needed within one sample; the model is too stiff or chatters",
-    2: "the motion left the range of numbers; the model is unstable with these parameters",
-    3: "there is no memory for what its delays remember",
+    2: "the motion diverged; the model is unstable with these parameters",
+    3: "not enough memory for the history of its delays",
 }
 
 
@@ -94,7 +94,7 @@ def simulate(
     InputError
         If `before` is not samples of each of the rig's inputs.
     SimulationError
-        If the motion leaves the range of numbers or the model is too stiff.
+        If the motion diverges or the model is too stiff.
     """
     if before is not None:
         earlier = _before(structure, before)
@@ -128,7 +128,7 @@ def _before(
     inputs = [signal.name for signal in structure.rig.inputs]
     if not inputs:
         raise InputError(
-            f"'before' holds samples of inputs; {structure.rig.name} has none. Give its initial state instead."
+            f"'before' contains samples of inputs, but {structure.rig.name} has none. Give its initial state instead."
         )
     wanted = f"{structure.rig.name} has the inputs {', '.join(inputs)}"
     if isinstance(before, Mapping):
@@ -197,7 +197,7 @@ def simulate_outputs(
     Raises
     ------
     SimulationError
-        If the motion leaves the range of numbers or the model is too stiff.
+        If the motion diverges or the model is too stiff.
     """
     held, p = read_ahead(structure, held, p)
     status, out, _ = kernel_of(structure).simulate_one(

@@ -1,4 +1,4 @@
-"""How far may each state of a structure go with given parameter values?"""
+"""Limits of each state of a structure for given parameter values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How are long expressions evaluated part by part, so that nothing is computed twice?"""
+"""Evaluation of long expressions part by part, so that nothing is computed twice."""
 
 from __future__ import annotations
 

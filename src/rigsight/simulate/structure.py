@@ -1,4 +1,4 @@
-"""What a rig with a tuple of effects is for a simulation: its parameters, its equations, and these without definitions."""
+"""A rig with a tuple of effects for simulation: its parameters, its equations, and these with definitions substituted."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ class Structure:
         found: dict[str, sp.Expr] = {}
         for effect in self.effects:
             sensor = self.rig.acts_at(effect)
-            if effect.measured_late is None or sensor not in self.observed:
+            if effect.reading_delay is None or sensor not in self.observed:
                 continue
             values = {}
             for own in effect.parameters:
@@ -216,7 +216,7 @@ class Structure:
                 values[sp.Symbol(own.name, real=True)] = (
                     symbols[name] if name in symbols else sp.Float(dict(self.fixed)[name])
                 )
-            found[sensor] = found.get(sensor, sp.Integer(0)) + effect.measured_late.xreplace(values)
+            found[sensor] = found.get(sensor, sp.Integer(0)) + effect.reading_delay.xreplace(values)
         return found
 
     @property

@@ -1,4 +1,4 @@
-"""How many fixed steps does each piece of an input need? A sweep needs many at its fast end and one at its slow end."""
+"""Number of fixed integration steps for each piece of an input: a sweep needs many at its fast end and one at its slow end."""
 
 from __future__ import annotations
 

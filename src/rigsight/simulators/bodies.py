@@ -1,7 +1,7 @@
-"""Which bodies does another program simulate, by what names, and what can it be asked?
+"""Bodies that another program simulates: their names there, and the interface to the program.
 
-``M(q, p) q'' = f + h(q, q', f, p)``: the program gives the mass matrix M and the force h of weight, gyration and whatever else it
-has between and on the bodies; f are the forces of the rig's drives and joints. Numbers p are parameters of its own.
+``M(q, p) q'' = f + h(q, q', f, p)``: the program gives the mass matrix M and the force h of gravity, gyroscopic and all other
+effects between and on the bodies; f are the forces of the rig's drives and joints. Numbers p are parameters of its own.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ class Bodies:
         if self.digest and model_digest(self.kind, Path(self.file)) != self.digest:
             included = ", what it includes or MuJoCo itself" if self.kind == "mujoco" else ""
             raise InputError(
-                f"{self.file}{included} has changed since this rig was read; its numbers belong to another model."
+                f"{self.file}{included} has changed since this rig was read; read the rig again."
             )
         program: Program = _openers()[self.kind](self)
         return program
@@ -237,7 +237,7 @@ def model_digest(kind: str, path: Path) -> str:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except ValueError as error:
-        raise InputError(f"{str(path)!r} is no name of a file: {error}.") from None
+        raise InputError(f"{str(path)!r} is not a file name: {error}.") from None
     if kind == "mujoco":
         from rigsight.simulators.mujoco_program import compiled_model
 

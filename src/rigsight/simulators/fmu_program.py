@@ -26,9 +26,9 @@ _FUNCTIONS = {
 }  # fmt: skip
 """What the C text calls, in the order of its table."""
 _WHY = {
-    -1: "no mass matrix follows from its accelerations: states in [simulator.rates] and inputs in [simulator.forces] have to "
-    "belong to the coordinates beside which they stand, and forces have to enter linearly",
-    -2: "a state in [simulator.rates] is not the rate of the coordinate beside which it stands",
+    -1: "no mass matrix can be derived from its accelerations: states in [simulator.rates] and inputs in [simulator.forces] must "
+    "belong to their coordinates, and forces must enter linearly",
+    -2: "a state in [simulator.rates] is not the rate of its coordinate",
 }
 """What the C text finds wrong."""
 
@@ -73,16 +73,16 @@ class FmuProgram:
         try:
             description = read_model_description(bodies.file)
         except Exception as error:
-            raise InputError(f"{bodies.file} is no FMU that FMPy reads: {error}") from None
+            raise InputError(f"{bodies.file} is not an FMU that FMPy can read: {error}") from None
         if description.modelExchange is None:
             raise InputError(
-                f"{bodies.file} is an FMU for Co-Simulation alone. Effects act while it moves, so its rates are asked for: "
-                "export it for Model Exchange."
+                f"{bodies.file} is an FMU for Co-Simulation only. Effects need its state derivatives: export it for Model "
+                f"Exchange."
             )
         if description.numberOfEventIndicators or getattr(description, "eventIndicators", None):
             raise InputError(
-                f"{bodies.file} switches at events (stops, contacts, dry friction), which are not looked for in it. Leave them "
-                "out of the FMU, and declare them at joints of the rig file."
+                f"{bodies.file} has state events (stops, contacts, dry friction), which are not supported. Leave them out of the "
+                f"FMU, and declare them at joints of the rig file."
             )
         self._version = description.fmiVersion[0]
         self._variables = {variable.name: variable for variable in description.modelVariables}
@@ -91,7 +91,7 @@ class FmuProgram:
         others = [state for index, state in enumerate(states) if index not in self._places]
         if others:
             raise InputError(
-                f"{bodies.file} has states that are no coordinate and no rate of the rig: {', '.join(others)}. "
+                f"{bodies.file} has states that are neither coordinates nor rates of the rig: {', '.join(others)}. "
                 "Name them in [simulator.coordinates] and [simulator.rates], or leave them out of the FMU."
             )
         self._forces = [self._reference(name, "input", "[simulator.forces]") for name in bodies.forces]

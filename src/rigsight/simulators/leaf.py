@@ -1,4 +1,4 @@
-"""What another program computes, as functions in symbolic equations that have derivatives and numbers."""
+"""Results of another program as functions in symbolic equations, with derivatives and numerical values."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class MujocoProgram:
         if len(self._places) != self._model.nv:
             others = [self._model.joint(i).name for i in range(self._model.njnt)]
             raise InputError(
-                f"{bodies.file} moves by {self._model.nv} coordinates, and the rig names {len(self._places)} of them. "
+                f"{bodies.file} has {self._model.nv} coordinates, but the rig names only {len(self._places)} of them. "
                 f"Joints: {', '.join(others)}."
             )
         self._fields = [self._field(name) for name in bodies.parameters]
@@ -73,15 +73,15 @@ class MujocoProgram:
             int(mujoco.mjtJoint.mjJNT_SLIDE),
         ):
             raise InputError(
-                f"{self._bodies.file}: joint '{name}' is no hinge and no slide; a coordinate is one of these."
+                f"{self._bodies.file}: joint '{name}' is neither a hinge nor a slide; a coordinate must be one of these."
             )
         return int(self._model.jnt_qposadr[index]), int(self._model.jnt_dofadr[index])
 
     def _field(self, name: str) -> tuple[NDArray[np.float64], tuple[int, ...]]:
         """Return the array of a field, and the place in it: of ``body_ipos hand 2`` the row of the body, and 2."""
         wanted = (
-            f"{self._bodies.file}: '{name}' is no number of the model. Write a field, the name of what has it, and of a vector "
-            "the number of the entry from 0: 'body_mass hand', 'body_ipos hand 2'."
+            f"{self._bodies.file}: '{name}' is not a number of the model. Write a field, the name of its element and, for a "
+            f"vector, the index of the entry from 0: 'body_mass hand', 'body_ipos hand 2'."
         )
         words = name.split()
         field = (
@@ -106,8 +106,8 @@ class MujocoProgram:
             raise InputError(f"{wanted} MuJoCo: {error}") from None
         if not self._is_kept(field, place):
             raise InputError(
-                f"{self._bodies.file}: '{name}' follows from other numbers of the model, or counts nowhere in its bodies. "
-                "Dry friction is declared at a joint of the rig file."
+                f"{self._bodies.file}: '{name}' is derived from other numbers of the model or does not affect its bodies. "
+                f"Declare dry friction at a joint of the rig file."
             )
         return field, place
 
@@ -170,7 +170,7 @@ def opened(path: Path) -> mujoco.MjModel:
     try:
         import mujoco
     except ImportError:
-        raise InputError("Simulations by MuJoCo need it: pip install 'rigsight[mujoco]'.") from None
+        raise InputError("Simulations by MuJoCo need the package: pip install 'rigsight[mujoco]'.") from None
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

@@ -62,8 +62,8 @@ class PythonProgram:
     def __init__(self, bodies: Bodies) -> None:
         if bodies.file not in _given:
             raise InputError(
-                f"the simulator '{bodies.file}' is a function of Python, and a rig file runs no code. Name it on the command "
-                "line, --simulator FILE.py:FUNCTION, or in Python by rigsight.simulators.give_function."
+                f"the simulator '{bodies.file}' is a Python function, but rig files must not run code. Give it on the command "
+                f"line, --simulator FILE.py:FUNCTION, or in Python with rigsight.simulators.give_function."
             )
         self._bodies = bodies
         self._error: BaseException | None = None
@@ -121,6 +121,6 @@ class PythonProgram:
             raise error
         if failed:
             raise InputError(
-                f"The simulator '{self._bodies.file}' gives accelerations from which no mass matrix follows: forces have to "
-                "enter linearly, each along its own coordinate."
+                f"The simulator '{self._bodies.file}' returns accelerations from which no mass matrix can be derived: forces "
+                f"must enter linearly, each along its own coordinate."
             )

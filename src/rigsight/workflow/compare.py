@@ -254,7 +254,10 @@ def _distinct(name: str, taken: Sequence[str]) -> str:
 
 
 def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
-    notes = closed_loop_notes(campaign.records, campaign.rig, "It is not used in a comparison.")
+    notes = [
+        *campaign.notes,
+        *closed_loop_notes(campaign.records, campaign.rig, "It is not used in a comparison."),
+    ]
     if all(record.kind == "step" for record in campaign.records):
         notes.append(
             "No record is a sweep or a multisine, so no frequency responses are compared; steps and free runs are."

@@ -19,7 +19,7 @@ from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.own.effect_names import effects_on
 from rigsight.workflow.run.fit_journal import FitJournal
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels, structures_to_try
-from rigsight.workflow.run.progress import Listener, Stage, Step, silent
+from rigsight.workflow.run.progress import Listener, Stage, Step, silent, tell
 from rigsight.workflow.run.results import (
     DIAGNOSIS_FILE,
     REPORT_FILE,
@@ -120,6 +120,7 @@ def diagnose_campaign(
     SimulationError
         If the given simulation cannot be run.
     """
+    tell(campaign.notes, listener)
     # What nobody put anywhere is passed over where it makes no sense; a place that was named must be there.
     named = [effect for effect in effects if effect.at is None] + [
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")

@@ -15,7 +15,7 @@ from rigsight.diagnose.fitting.windows import cut, window_length
 from rigsight.diagnose.noise.detection import noise_floors
 from rigsight.discover import METHODS, Discovery, RegressionData, discover
 from rigsight.discover.discovery import Method
-from rigsight.discover.regression_data import has_no_spring
+from rigsight.discover.regression_data import has_stiffness
 from rigsight.errors import InputError, RigsightError, check_option
 from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.plot import svg_text
@@ -25,7 +25,7 @@ from rigsight.rigs import RIGS, is_built_in_motion
 from rigsight.workflow.campaign.model_file import MODEL_FILE
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.run.kernels import checked_jobs
-from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.progress import Listener, Stage, silent, tell
 from rigsight.workflow.run.results import check_writable, json_text, write_together
 
 DISCOVERY_FILE = "discovery.json"
@@ -120,6 +120,7 @@ def discover_campaign(
     """
     chosen = cast("Method", check_option("The method", method, METHODS))
     data = regression_data(campaign)
+    tell(campaign.notes, listener)
     stage = Stage(DISCOVERING, _STEPS, listener)
     # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
@@ -149,9 +150,9 @@ def regression_data(campaign: Campaign) -> RegressionData:
         If its rig of one motion is told in other words than the built-in ones, or records have constants of their own.
     """
     _check_can_be_discovered(campaign)
-    no_spring = has_no_spring(campaign)
-    floors = noise_floors(campaign.rig, campaign.records, drifts=no_spring)
-    length = window_length(campaign.rig, campaign.estimation) if no_spring else None
+    drifts = not has_stiffness(campaign)
+    floors = noise_floors(campaign.rig, campaign.records, drifts=drifts)
+    length = window_length(campaign.rig, campaign.estimation) if drifts else None
     return RegressionData(
         campaign, {floor.output: floor.std for floor in floors}, cut(campaign.records, length)
     )

@@ -16,8 +16,8 @@ from rigsight.errors import InputError, check_option
 from rigsight.identify.amplitude_dependence import amplitude_dependence
 from rigsight.identify.identification import Identification, JointIdentification, RecordIdentification
 from rigsight.identify.record_identification import EstimationOptions, identify_record
-from rigsight.identify.transfer.physical import PhysicalEstimates
 from rigsight.identify.transfer.record_response import METHODS, Method
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.report.identification_page import render_identification
 from rigsight.simulate import compose
 from rigsight.simulate.model import Model
@@ -34,7 +34,7 @@ from rigsight.workflow.identification.warnings import (
     out_of_band,
 )
 from rigsight.workflow.run.kernels import checked_jobs, prepare_kernels
-from rigsight.workflow.run.progress import Listener, Stage, silent
+from rigsight.workflow.run.progress import Listener, Stage, silent, tell
 from rigsight.workflow.run.results import check_writable, json_text, write_together
 from rigsight.workflow.run.versions import versions
 
@@ -125,9 +125,10 @@ def identify_campaign(
     InputError
         If a record is too short for the resolution asked for, or no record shows the motion.
     """
+    tell(campaign.notes, listener)
     if not has_transfer_forms(campaign):
         return identify_any_rig(campaign, options, n_jobs, listener)
-    no_spring = campaign.parameters.get("k") == 0.0
+    has_stiffness = campaign.parameters.get("k") != 0.0
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
     found = []
@@ -135,12 +136,12 @@ def identify_campaign(
     with threadpool_limits(limits=1, user_api="blas"):
         parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
         for record in parallel(
-            delayed(identify_record)(record, campaign.rig, campaign.constants, no_spring, options)
+            delayed(identify_record)(record, campaign.rig, campaign.constants, has_stiffness, options)
             for record in campaign.estimation
         ):
             found.append(record)
             stage.finished(record.record.name)
-        joint = identify_jointly(campaign, found, no_spring)
+        joint = identify_jointly(campaign, found, has_stiffness)
     stage.finished("one set for all records")
     if not campaign.rig.is_driven:
         found = [_over_time(record, joint) for record in found]
@@ -159,9 +160,9 @@ def identify_campaign(
         joint=joint,
         model=model,
         warnings=(
-            *campaign_warnings(campaign, found, joint, no_spring),
+            *campaign_warnings(campaign, found, joint, has_stiffness),
             *beyond_identified_amplitudes(campaign, joint),
-            *([] if no_spring else offsets_of_records(campaign, joint, {})),
+            *(offsets_of_records(campaign, joint, {}) if has_stiffness else []),
         ),
     )
     stage.finished("amplitudes")

@@ -126,7 +126,7 @@ def test_a_nonlinear_effect_is_no_fault_of_the_data(effect):
     quality = looked_at(sweeps(effect=effect))
     assert quality.findings == ()
     assert quality.amplitudes[0].answer == "yes"
-    assert "a nonlinear effect takes part" in quality.notes[-1]
+    assert "a nonlinear effect is involved" in quality.notes[-1]
 
 
 def test_what_scatters_too_much_is_not_called_linear():
@@ -155,7 +155,7 @@ def test_a_hold_that_a_delay_explains_as_well_is_told_with_its_rival():
     (finding,) = looked_at(misdeclared(sweeps(hold="zoh"), "foh")).findings
     assert (finding.kind, finding.serious) == ("hold", False)
     assert 'hold = "zoh"' in finding.mend
-    assert "a shift of the time base by 2.5" in finding.sentence
+    assert "a time offset of 2.5" in finding.sentence
 
 
 @pytest.mark.parametrize(("sign", "serious"), [(-1, True), (1, False)])
@@ -220,8 +220,8 @@ def with_lost_counts(x):
 @pytest.mark.parametrize(
     ("fault", "kind", "told"),
     [
-        (clipped, "clipping", "is cut off at"),
-        (stuck, "stuck", "stands exactly still from 7.5 to 7.995 s"),
+        (clipped, "clipping", "is clipped at"),
+        (stuck, "stuck", "is exactly constant from 7.5 to 7.995 s"),
         (coarse, "quantization", "61 levels"),
         (with_spike, "jump", "at 10 s"),
         (with_lost_counts, "jump", "at 10 s"),
@@ -284,7 +284,7 @@ def test_one_amplitude_cannot_tell():
     record = sweeps()[0]
     quality = looked_at([record, replace(record, name="again", role="validation")])
     assert quality.amplitudes[0].answer == "cannot tell"
-    assert "Record another one" in quality.amplitudes[0].sentence
+    assert "Record another amplitude" in quality.amplitudes[0].sentence
 
 
 def test_the_list_of_the_file_says_the_same():

@@ -24,15 +24,15 @@ NOISE = 1e-3
 
 
 def test_a_rest_position_is_known_only_where_it_is_given() -> None:
-    assert known_constant_forces(AXIS, EVEN, {}, has_spring=True) == {}
-    assert known_constant_forces(AXIS, LOPSIDED, {}, has_spring=True) is None
-    assert known_constant_forces(AXIS, LOPSIDED, {"x_off": 0.1}, has_spring=True) == {
+    assert known_constant_forces(AXIS, EVEN, {}, has_stiffness=True) == {}
+    assert known_constant_forces(AXIS, LOPSIDED, {}, has_stiffness=True) is None
+    assert known_constant_forces(AXIS, LOPSIDED, {"x_off": 0.1}, has_stiffness=True) == {
         "x_off": 0.1,
         "force_off": 0.0,
     }
-    assert known_constant_forces(AXIS, LOPSIDED, {"force_off": 2.0}, has_spring=False)["force_off"] == 2.0
+    assert known_constant_forces(AXIS, LOPSIDED, {"force_off": 2.0}, has_stiffness=False)["force_off"] == 2.0
     shaft = effect_named("directional_friction@shaft")
-    assert known_constant_forces(RIGS["drive_train"], shaft, {}, has_spring=True) == {}
+    assert known_constant_forces(RIGS["drive_train"], shaft, {}, has_stiffness=True) == {}
 
 
 def bench_of(effect: Effect, values: Mapping[str, float], given: Mapping[str, float]) -> FitContext:

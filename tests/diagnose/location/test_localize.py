@@ -200,7 +200,7 @@ def test_the_force_of_a_bench_is_its_residual() -> None:
     ("effect", "values", "said"),
     [
         ("input_delay", {"T_d": 0.02}, "before psi is measured"),
-        ("sensor_delay", {"T_s": 0.02}, "if psi were measured"),
+        ("sensor_delay", {"T_s": 0.02}, "if psi is assumed to be measured 20 ms later than y"),
     ],
 )
 def test_the_path_tells_a_late_input_from_a_late_sensor(
@@ -235,7 +235,7 @@ def test_a_clean_path_says_so() -> None:
     context = workbench(RUNNING_GEAR, measured(RUNNING_GEAR, [], GEAR, 30.0), GEAR)
     true = as_given(context, GEAR)
     where, _ = localized(context, true, true, true)
-    assert "No leg of the path has a gap" in where.sentence
+    assert "No section of the signal path has a noticeable gap" in where.sentence
 
 
 def test_the_floor_of_a_band_follows_the_noise_where_it_was_seen_alone() -> None:

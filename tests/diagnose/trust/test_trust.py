@@ -127,7 +127,7 @@ def test_amplitude_and_time_that_go_together_are_told_apart_by_nobody() -> None:
     effects = (effect_named("coulomb_friction"),)
     ordered = asked(axis_records(LADDER, effects, {"T_c": 0.3}))
     assert number(ordered, "d").goes_with == ("amplitude", "time")
-    assert "cannot be told apart" in ordered.statement
+    assert "cannot be separated" in ordered.statement
     mixed = asked(axis_records((1.0, 4.0, 0.5, 2.0), effects, {"T_c": 0.3}))
     assert number(mixed, "d").goes_with == ("amplitude",)
 
@@ -156,7 +156,7 @@ def test_wider_errors_of_the_bootstrap_widen_those_by_group() -> None:
 def test_a_stiffness_without_order_is_something_not_recorded() -> None:
     found = asked(axis_records((1.0,) * 5, by_record=[{"k": k} for k in (100.0, 102.0, 99.5, 101.5, 99.0)]))
     assert number(found, "k").pattern is Pattern.RECORD
-    assert "without order" in found.statement
+    assert "without a trend" in found.statement
 
 
 def test_a_number_that_changes_within_records_is_told() -> None:
@@ -230,7 +230,7 @@ def test_one_record_is_compared_with_its_own_parts() -> None:
     found = asked(axis_records((1.0,)))
     assert found.stable
     assert set(found.parameters[0].groups) <= {"portion", "window"}
-    assert "One record cannot tell" in found.statement
+    assert "A single record cannot show" in found.statement
 
 
 def test_numbers_known_as_a_ratio_are_told() -> None:

@@ -65,7 +65,7 @@ def test_a_stiffness_a_hundred_times_off_and_a_number_at_its_bound_are_told(mode
     found = doubts(with_numbers(coulomb, values, coulomb.fit.standard_errors), reidentified)
     assert not any(doubt.grave for doubt in found)
     assert any("k = 1.1e+04" in doubt.text for doubt in found)
-    assert any("T_c = 0 stands at the bound" in doubt.text for doubt in found)
+    assert any("T_c = 0 is at the bound of its search range" in doubt.text for doubt in found)
 
 
 def test_a_plausible_model_at_the_same_place_comes_first(models) -> None:

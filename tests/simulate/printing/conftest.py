@@ -23,11 +23,11 @@ from rigsight.simulate.structure import TIME, input_symbols
 
 @dataclass(frozen=True)
 class Instant:
-    """Rates by state and outputs by column at one instant; the first output is read `measured_late` later."""
+    """Rates by state and outputs by column at one instant; the first output is read `reading_delay` later."""
 
     rates: dict[sp.Symbol, float]
     outputs: dict[str, float]
-    measured_late: float
+    reading_delay: float
 
 
 @pytest.fixture(scope="session")
@@ -53,13 +53,13 @@ def _simulated_instant(
         known[mode] = 1.0 if _values([switch], known)[0] >= 0.0 else -1.0
     rates = _values(frozen.rates, known)
     outputs = _values(frozen.outputs[: len(structure.outputs)], known)
-    measured_late = (
+    reading_delay = (
         0.0 if structure.first_shown_late is None else _values([structure.first_shown_late], known)[0]
     )
     return Instant(
         dict(zip(structure.states, rates, strict=True)),
         dict(zip((s.name for s in structure.rig.outputs), outputs, strict=True)),
-        measured_late,
+        reading_delay,
     )
 
 

@@ -57,7 +57,7 @@ def composed(rig: str, names: Sequence[str]) -> Structure:
 
 
 def is_a_delay(effect: Effect) -> bool:
-    return effect.delay is not None or effect.measured_late is not None
+    return effect.delay is not None or effect.reading_delay is not None
 
 
 def one_place_each(rig: str) -> list[tuple[str, tuple[str, ...]]]:
@@ -230,7 +230,7 @@ def test_what_is_shown_is_what_is_simulated(simulated_instant, rig: str, names: 
         for state in structure.states:
             assert reader.rate(state) == pytest.approx(instant.rates[state], rel=1e-9, abs=1e-12), state
         for i, (name, value) in enumerate(instant.outputs.items()):
-            read_at = reader.now + (instant.measured_late if i == 0 else 0.0)
+            read_at = reader.now + (instant.reading_delay if i == 0 else 0.0)
             assert reader.output(name, read_at) == pytest.approx(value, rel=1e-9, abs=1e-12), name
 
 

@@ -1,1 +1,1 @@
-"""Trials whose plants are a second source: equations of motion and effects written out by hand, composed from no declaration."""
+"""Trials with independent plants: equations of motion and effects written by hand instead of composed from declarations."""

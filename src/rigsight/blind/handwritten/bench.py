@@ -1,4 +1,4 @@
-"""How does a hand-written plant move in the records of a trial, and what do the rig's equations leave of that?"""
+"""Motion of a hand-written plant in the records of a trial, and the gap of the rig's equations."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ class HandwrittenBench:
         return self._fitted(records, self.values, self.free)
 
     def scored(self, refit: FitResult, records: Sequence[Record]) -> FitResult:
-        """Return what fitted equations leave of other records."""
+        """Return the residuals of fitted equations on other records."""
         return self._fitted(records, refit.values, [])
 
     @property
@@ -207,6 +207,6 @@ class HandwrittenBench:
         return found
 
     def largest_left(self, found: FitResult) -> float:
-        """Return the largest RMS of what a fit leaves of a reading, in units of its noise."""
+        """Return the largest residual RMS of a fit over the readings, in units of their noise."""
         left = np.sqrt(np.nanmean(np.concatenate(found.residuals) ** 2, axis=0))
         return float(np.max(left / [self.noise[s.name] for s in self.rig.outputs]))

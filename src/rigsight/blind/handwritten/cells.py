@@ -1,7 +1,7 @@
-"""What is hidden in which trial of design ``handwritten``? Eight kinds of trials in turn, twelve rows of each.
+"""Hidden effects of the trials of design ``handwritten``: eight kinds of trials in turn, twelve rows of each.
 
-The kind changes fastest: any first N trials hold all kinds evenly. Which row a kind meets first is shuffled by the seed, anew for
-each pass.
+The kind changes fastest, so that the first N trials contain all kinds evenly. The order of the rows of a kind is shuffled by the
+seed for each pass.
 """
 
 from __future__ import annotations

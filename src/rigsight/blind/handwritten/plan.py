@@ -1,4 +1,4 @@
-"""Which records does a trial hold? Sample rate, hold, kinds, sizes, lengths and rests are drawn, no two trials alike."""
+"""Records of a trial: sample rate, hold, kinds, amplitudes, lengths and rests are drawn at random for each trial."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ _N_ESTIMATION, _N_VALIDATION = (3, 5), (1, 3)
 _LEAST, _SMALL = 0.25, 0.5
 """Range of the smallest record, in units of the largest."""
 _REST = (0.5, 2.0)
-"""Rest at the begin of a record [s] in half of all trials; the others begin at once, and no record tells the noise by itself."""
+"""Rest at the beginning of a record [s] in half of all trials; the others begin at once, so that no record shows the noise
+alone."""
 _LINES = (15, 60)
 """Sines of a multisine: from a hand-made one to a full band."""
 _FADE = 1.0
@@ -143,7 +144,7 @@ def draw_plan(
     """
     dt = 1.0 / float(rng.choice(_RATES))
     hold: Hold = "band_limited" if prescribed else _HOLDS[int(rng.integers(len(_HOLDS)))]
-    # A motion at rest says nothing of an element's noise that its offset would not.
+    # A motion at rest shows only the offset of an element, not its noise.
     rest = rng.uniform(*_REST) if rng.random() < 0.5 and not prescribed else 0.0
     kinds: tuple[Kind, ...] = ("sweep", "multisine", "operation", "step")
     any_kind = kinds[:2] if prescribed else kinds

@@ -1,6 +1,6 @@
-"""Which hand-written plant has which effect of the catalogue, by the catalogue's names of its parameters?
+"""Assignment of hand-written plants to effects of the catalogue and the names of their parameters.
 
-The names are all that is shared with the catalogue: they are what keys and scores speak of.
+Only these names are shared with the catalogue, because keys and scores use them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which shape has a hidden effect? Drawn from what machines have, in units of the motion; no start value of a search is used.
+"""Parameters of hidden effects, drawn from realistic ranges in units of the motion; start values of the search are not used.
 
-Sizes grow with a strength that is found afterwards; what is drawn here are the numbers that give an effect its form, evenly over
-their logarithm where a range spans more than a factor of three.
+The strength of an effect is found afterwards; drawn here are the parameters of its form, uniformly in the logarithm if a range
+spans more than a factor of three.
 """
 
 from __future__ import annotations

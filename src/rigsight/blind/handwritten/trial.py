@@ -1,4 +1,4 @@
-"""What does one trial of design ``handwritten`` measure, and what does its key hold? Everything follows from seed and number."""
+"""Records and key of one trial of design ``handwritten``; everything follows from seed and number."""
 
 from __future__ import annotations
 

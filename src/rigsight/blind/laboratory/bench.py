@@ -1,4 +1,4 @@
-"""How does a stand move, what is recorded of it, and what do equations without its effects leave of that?"""
+"""Motion of a stand, its records, and the gap of the equations without its effects."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class LaboratoryBench:
 
     @cached_property
     def noise(self) -> dict[str, float]:
-        """What a sensor by itself adds to each reading."""
+        """Noise that a sensor adds to each reading."""
         by_size = math.hypot(self.around.noise, self.around.step / math.sqrt(12.0))
         return {signal.name: by_size * self.sizes[signal.name] for signal in self.rig.outputs}
 
@@ -248,7 +248,7 @@ class LaboratoryBench:
         return self._fitted(compose(self.rig), records, self.values, self.free)
 
     def scored(self, refit: FitResult, records: Sequence[Record]) -> FitResult:
-        """Return what fitted equations leave of other records."""
+        """Return the residuals of fitted equations on other records."""
         return self._fitted(compose(self.rig), records, refit.values, ())
 
     def floor(

@@ -1,4 +1,4 @@
-"""What do the channels of a data logger make of what a rig does? Noise, a filter before the sampler, steps of an encoder."""
+"""Channels of a data logger: noise, an anti-aliasing filter, quantization of an encoder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which records does a laboratory take under which condition?"""
+"""Records that a laboratory takes under each condition."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LOOP_BAND = (0.1, 1.5)
 _MOVE = 6.0
 """Time of a move in units of the reciprocal of the loop's bandwidth: one period of it."""
 _REST_BEFORE_MOVES = (1.0, 3.0)
-"""Time of rest before the first of them [s]: what somebody takes to press start."""
+"""Time of rest before the first of them [s]: the time it takes to press start."""
 _LET_GO: tuple[tuple[Role, float], ...] = (
     ("estimation", 1.0), ("estimation", 0.7), ("estimation", 0.45), ("estimation", 0.3),
     ("validation", 0.85), ("validation", 0.55),

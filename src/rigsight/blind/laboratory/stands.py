@@ -1,7 +1,7 @@
-"""Which test stands does the laboratory have, with which numbers, and how are they wired?
+"""Test stands of the laboratory: parameters and wiring.
 
-A stand is a built-in rig: that is what its campaign names. The plant behind the records is the same rig with what the campaign
-does not tell of: a control law, a force from outside, and parts that give way as they warm up.
+The campaign of a stand names a built-in rig. The plant behind the records is the same rig with additions that the campaign does
+not mention: a control law, an external force, and parts that soften as they warm up.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Stand:
     held
         Parameters that its records do not tell beside the others.
     looped
-        True for one that nobody runs open loop.
+        True for a stand that is never operated in open loop.
     """
 
     name: str

@@ -1,7 +1,7 @@
-"""What is hidden in which trial of design ``laboratory``? Ten conditions in turn, each on several test stands.
+"""Hidden effects of the trials of design ``laboratory``: ten conditions in turn, each on several test stands.
 
-The condition changes fastest: any first N trials hold all conditions evenly. Which stand and which family of effects a condition
-meets first is shuffled by the seed, anew for each pass.
+The condition changes fastest, so that the first N trials contain all conditions evenly. The order of stands and families of
+effects is shuffled by the seed for each pass.
 """
 
 from __future__ import annotations

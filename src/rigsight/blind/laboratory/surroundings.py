@@ -1,4 +1,4 @@
-"""What does a laboratory do to a record, and how much of it? Sizes are drawn for each trial from what laboratories have."""
+"""Imperfections of laboratory records, with sizes drawn for each trial from realistic ranges."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigsight.blind.laboratory.subjects import LaboratorySubject
 GAPS = (5.0, 100.0)
 """Gap that the re-identified equations leave, in units of the true floor: what an eye sees in a plot, up to a wrong model."""
 LEAST_BESIDE = 1.5
-"""Least gap of a further effect beside the main one, in units of the floor: less is nothing that anybody sees."""
+"""Least gap of a further effect in addition to the main one, in units of the floor: less is not visible."""
 _NOISE = (3e-4, 3e-3)
 """Sensor noise in units of the reading's size: 70 to 50 dB, a laser head's or a strain gauge's."""
 _INPUT_NOISE = (2e-4, 1e-2)

@@ -1,1 +1,1 @@
-"""What came of trials whose truth is known, one by one and together?"""
+"""Scores of trials whose truth is known, single and summarized."""

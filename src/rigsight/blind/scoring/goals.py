@@ -1,4 +1,4 @@
-"""What must a diagnosis reach to be believed, and has it?"""
+"""Goals of a diagnosis, and whether they are reached."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ SURE = 0.9
 def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Return the figures for which there are goals, and those that stand beside them.
 
-    A gap that nobody has measured counts as a large one, or a failed diagnosis would not count at all. Trials of a laboratory
-    count towards its own goals alone.
+    An unknown gap counts as a large one, otherwise a failed diagnosis would not count at all. Trials of a laboratory count
+    towards its own goals alone.
     """
     taken, outcomes = [o for o in outcomes if o.condition], [o for o in outcomes if not o.condition]
     large = [o for o in outcomes if o.gap is None or o.gap >= _LARGE_GAP]

@@ -28,7 +28,7 @@ UNMEASURED = "not measured"
 
 @dataclass(frozen=True)
 class WithheldError:
-    """What a diagnosed model leaves of one record that no diagnosis has seen.
+    """Error of a diagnosed model on one withheld record.
 
     Attributes
     ----------
@@ -57,14 +57,14 @@ class Outcome:
     design, seed, trial
         Which trial it is: a number of a drawn bench as text, or the name of a campaign.
     fingerprint
-        Of the files of a campaign written by somebody else and of its key; empty where design, seed and number say all.
+        Of the files of an external campaign and of its key; empty if design, seed and number define it.
     version
         The rigsight that scored it.
     kind, effects, places, rig, noise
         From the key: kind of subject, hidden effects, the place of each (empty where the key does not say it effect by effect),
         rig, noise level.
     gap
-        What the re-identified equations leave on validation records, in units of the true noise floor; None if not known.
+        Error of the re-identified equations on validation records, in units of the true noise floor; None if unknown.
     tier
         Strength by that gap; "below" where it is smaller than the faintest, "" where nothing is hidden.
     verdict, named, named_places
@@ -83,7 +83,7 @@ class Outcome:
     looked_at
         All these places are among those at which the diagnosis tried effects; None as above, and where it did not have to choose.
     probability
-        On the truth; for an effect from outside, what is left beside all candidates.
+        Of the truth; for an effect from outside the catalogue, the probability not given to any candidate.
     stated
         On what the verdict says; 0 where there is none.
     stated_is_true
@@ -155,7 +155,7 @@ def outcome(
     Parameters
     ----------
     key
-        As `draw_trial` makes it. A key written by somebody else may hold a `fingerprint`, and None for `where` and `gap`.
+        As `draw_trial` makes it. An external key may contain a `fingerprint`, and None for `where` and `gap`.
     diagnosis
         Content of ``diagnosis.json``; None if the diagnosis failed.
     withheld

@@ -1,4 +1,4 @@
-"""Does the frequency response change with the amplitude? No leaves linear causes, yes asks for a nonlinear one."""
+"""Does the frequency response change with the amplitude? If not, the cause is linear; if so, nonlinear."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def amplitude_dependences(
 ) -> tuple[AmplitudeDependence, ...]:
     """Compare the frequency responses at the lowest and the highest amplitude of one kind of record, path by path.
 
-    Of a rig with one motion the path from its input to its motion is asked, of any other those from each input to each sensor.
+    On a rig with one motion the path from its input to its motion is compared, on any other those from each input to each sensor.
 
     Parameters
     ----------
@@ -34,14 +34,16 @@ def amplitude_dependences(
     records
         All records of a campaign; steps do not take part.
     faulty
-        Record and sensor of each reading at fault: it distorts as an effect would.
+        Record and sensor of each faulty reading, which would distort like an effect.
     """
     if not rig.is_driven:
         return (
-            AmplitudeDependence("cannot tell", "An element has no frequency response of a driven motion."),
+            AmplitudeDependence(
+                "cannot tell", "A single element has no driven motion and so no frequency response."
+            ),
         )
     if not rig.inputs or not records:
-        return (AmplitudeDependence("cannot tell", "Without an input there is no frequency response."),)
+        return (AmplitudeDependence("cannot tell", "The rig has no input and so no frequency response."),)
     if rig.has_one_motion:
         responses = [leading_output(rig, records)]
     else:
@@ -60,7 +62,7 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
         what = "Nothing drives the rig" if len(rig.inputs) == 1 else f"'{source}' does not move"
         return AmplitudeDependence(
             "cannot tell",
-            f"{what} in the sound records, so that they have no frequency response {path}.",
+            f"{what} in the usable records, so there is no frequency response {path}.",
             path=path,
         )
     alone = len(rig.inputs) == 1
@@ -68,8 +70,9 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
     if pair is None:
         return AmplitudeDependence(
             "cannot tell",
-            f"The sound records have one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the frequency "
-            f"response {path} changes with it. Record another one.",
+            f"The usable records have only one amplitude{'' if alone else f' of {source}'}, so they cannot tell whether the "
+            f"frequency "
+            f"response {path} changes with it. Record another amplitude.",
             path=path,
         )
     names = (pair[0].name, pair[1].name)
@@ -83,7 +86,7 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
     if omega.size < NOTES.fewest_lines:
         return AmplitudeDependence(
             "cannot tell",
-            f"{names[0]} and {names[1]} share too few frequencies at which the response {path} stands out of the noise.",
+            f"{names[0]} and {names[1]} have too few common frequencies at which the response {path} stands out of the noise.",
             names,
             path,
         )
@@ -100,7 +103,7 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
         return AmplitudeDependence(
             "yes",
             f"The frequency response {path} changes with the amplitude{by}: between {span} by up to "
-            f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect takes part.",
+            f"{relative[worst]:.0%} of its size (at {omega[worst]:.3g} rad/s), so a nonlinear effect is involved.",
             names,
             path,
         )
@@ -108,14 +111,15 @@ def _of_path(rig: Rig, records: Sequence[Record], source: str, response: str) ->
     if np.mean(chance < NOTES.line_chance) < NOTES.lines_changed and seen > 0.1:
         return AmplitudeDependence(
             "cannot tell",
-            f"Between {span} the frequency responses {path}{by} agree within their noise, but that hides changes of {seen:.0%}.",
+            f"Between {span} the frequency responses {path}{by} agree within their noise, but the noise would hide changes up to "
+            f"{seen:.0%}.",
             names,
             path,
         )
     return AmplitudeDependence(
         "no",
         f"The frequency response {path} does not change with the amplitude{by} between {span} "
-        f"(by {float(np.median(relative)):.1%} in the median): a linear cause, or an effect too small to be seen there.",
+        f"(by {float(np.median(relative)):.1%} in the median): the cause is linear, or too small to show here.",
         names,
         path,
     )

@@ -16,7 +16,7 @@ from rigsight.records.record import Record
 
 
 def data_quality(context: FitContext, records: Sequence[Record], reidentified: Scored) -> DataQuality:
-    """Look at the records before an effect is tried.
+    """Check the records before an effect is tried.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def data_quality(context: FitContext, records: Sequence[Record], reidentified: S
 
 
 def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
-    """Ask whether what the best model leaves has another mean in each record, as offsets that differ make it.
+    """Add the note if the mean residual of the best model differs between records, as with offsets that differ.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) 
 
 
 def with_best_model(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
-    """Ask about the hold of the input once more, with the effects in the model that hid its part of the gap.
+    """Test the hold of the input again with the effects in the model that may have hidden its part of the gap.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a look at the records themselves found, before any effect is tried."""
+"""Findings in the records themselves, before any effect is tried."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Finding:
     mend
         What to do about it.
     serious
-        True if it is a fault of the data that the gap may come from; False for what an effect may just as well explain.
+        True for a fault of the data that may cause the gap; False if an effect may explain it equally well.
     record, signal
         Where it was seen; None for all records.
     explained
-        Share of the gap of the equations without an effect, above the noise floor and as power, that goes with it; None
-        where that was not measured.
+        Share of the gap of the equations without an effect, above the noise floor and as power, that it explains; None where that
+        was not measured.
     """
 
     kind: FindingKind
@@ -58,7 +58,7 @@ class AmplitudeDependence:
     Attributes
     ----------
     answer
-        ``"yes"``: a nonlinear effect takes part; ``"no"``: only linear causes are left; or ``"cannot tell"``.
+        ``"yes"``: a nonlinear effect is involved; ``"no"``: only linear causes are left; or ``"cannot tell"``.
     sentence
         The answer with numbers.
     records
@@ -75,7 +75,7 @@ class AmplitudeDependence:
 
 @dataclass(frozen=True)
 class DataQuality:
-    """What the records themselves say.
+    """Findings in the records themselves.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class DataQuality:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences with mends, and the answers about the amplitude; clipping is told where a record is read."""
+        """Sentences with remedies, and the answers about the amplitude; clipping is reported when a record is read."""
         told = [f"{f.sentence} {f.mend}" for f in self.findings if f.kind != "clipping"]
         return (*told, *(answer.sentence for answer in self.amplitudes))
 

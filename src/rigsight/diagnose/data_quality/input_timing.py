@@ -1,7 +1,7 @@
-"""Would another hold of the input, or a constant shift of the time base, explain what a model leaves?
+"""Would another hold of the input, or a constant time offset, explain the residual of a model?
 
-The model is fitted again to the liveliest stretches of the records under each hypothesis. A shift is a delay whose zero is moved:
-the outputs are paired with inputs some samples earlier, so that a fitted delay shorter than that is a lead.
+The model is refitted to the most excited stretches of the records under each hypothesis. A time offset is fitted as a delay: the
+outputs are paired with inputs some samples earlier, so that a fitted delay shorter than that is a lead.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _DELAYS = ("input_delay", "sensor_delay")
 
 @dataclass(frozen=True)
 class InputTiming:
-    """What a model leaves on the liveliest stretches under each hypothesis.
+    """Error of a model on the most excited stretches under each hypothesis.
 
     Attributes
     ----------
@@ -52,12 +52,12 @@ class InputTiming:
     dt: float
 
     def explained(self, error_over_noise: float) -> float:
-        """Return the share of the gap above the floor, as power, that goes where only `excess` is left."""
+        """Return the explained share of the gap above the floor, as power, if the error falls to `error_over_noise`."""
         gap = self.as_given**2 - 1.0
         return 0.0 if gap <= 0.0 else float(np.clip((self.as_given**2 - error_over_noise**2) / gap, 0.0, 1.0))
 
     def findings(self) -> list[Finding]:
-        """Return the hypotheses that explain a good part of what the model leaves."""
+        """Return the hypotheses that explain a large part of the residual."""
         if not self.as_given > VERDICT.at_floor:
             return []
         least = min(self.with_hold.values())
@@ -82,13 +82,13 @@ class InputTiming:
         told = " or ".join(f'"{hold}"' for hold in holds)
         rival = ""
         if self.shift is not None and shifted <= VERDICT.worthwhile * least:
-            rival = f" So would a shift of the time base by {1e3 * self.shift:.3g} ms"
+            rival = f" So would a time offset of {1e3 * self.shift:.3g} ms"
             rival += ", or a delay in the rig." if self.shift > 0.0 else "."
         return Finding(
             "hold",
-            f'Between its samples the input runs as hold = {told} rather than "{self.given}": that alone explains '
+            f'Between samples the input follows hold = {told} rather than "{self.given}": this alone explains '
             f"{self.explained(least):.0%} of the gap ({self.as_given:.3g} -> {least:.3g} times the noise floor).{rival}",
-            f"Set hold = {told} for the records in campaign.toml, if that is how the drive works.",
+            f"Set hold = {told} for the records in campaign.toml, if the drive works like this.",
             serious=not (rival and self.shift is not None and self.shift > 0.0),
             explained=self.explained(least),
         )
@@ -97,16 +97,16 @@ class InputTiming:
         if shift < 0.0:
             return Finding(
                 "time_shift",
-                f"The outputs come {-1e3 * shift:.3g} ms before the input that causes them: a shift of the time base explains "
+                f"The outputs come {-1e3 * shift:.3g} ms before the input that causes them: a time offset explains "
                 f"{by_shift:.0%} of the gap ({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor).",
-                "Align the channels: no rig answers before it is asked.",
+                "Align the channels: the output precedes the input.",
                 explained=by_shift,
             )
         return Finding(
             "time_shift",
-            f"The outputs come {1e3 * shift:.3g} ms late: a shift of the time base would explain {by_shift:.0%} of the gap "
+            f"The outputs come {1e3 * shift:.3g} ms late: a time offset would explain {by_shift:.0%} of the gap "
             f"({self.as_given:.3g} -> {self.with_shift:.3g} times the noise floor). So would a delay or a short lag in the rig.",
-            "Make sure that input and outputs share one clock before an effect is blamed.",
+            "Check that input and outputs share one clock before you look for an effect.",
             serious=False,
             explained=by_shift,
         )
@@ -115,7 +115,7 @@ class InputTiming:
 def input_timing(
     context: FitContext, effects: tuple[Effect, ...], base: FitResult, with_shift: bool = True
 ) -> InputTiming | None:
-    """Fit a model to the liveliest stretches with every hold, and with a shift of the time base.
+    """Fit a model to the most excited stretches with every hold, and with a time offset.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def input_timing(
     if not context.rig.is_driven or not context.driven or len(given) != 1:
         return None
     (declared,) = given
-    as_given = _excess(context, base, context.look)
+    as_given = _error_over_noise(context, base, context.look)
     if not np.isfinite(as_given):
         return None
     others: tuple[Hold, ...] = tuple(hold for hold in get_args(Hold) if hold != declared)
@@ -146,7 +146,7 @@ def input_timing(
         given=declared,
         as_given=as_given,
         with_hold={
-            hold: _excess(context, base, [replace(record, hold=hold) for record in context.look])
+            hold: _error_over_noise(context, base, [replace(record, hold=hold) for record in context.look])
             for hold in others
         },
         with_shift=shifted,
@@ -155,7 +155,7 @@ def input_timing(
     )
 
 
-def _excess(context: FitContext, base: FitResult, records: Sequence[Record]) -> float:
+def _error_over_noise(context: FitContext, base: FitResult, records: Sequence[Record]) -> float:
     return _refitted(context, base, base.values, base.free, records).weighted_rms
 
 
@@ -173,7 +173,7 @@ def _refitted(
 def _shifted(
     context: FitContext, effects: tuple[Effect, ...], base: FitResult
 ) -> tuple[float | None, float | None]:
-    """Return the fitted shift and what is left with it."""
+    """Return the fitted time offset and the remaining error."""
     if not context.rig.has_one_motion:
         return None, None  # with control loops and several drives a shift is no delay of one input
     names = {effect.name for effect in (*context.modelled, *effects)}

@@ -1,7 +1,7 @@
-"""Do the records ask for an offset of each sensor in each record? Asked before any second effect is believed.
+"""Does each sensor need its own offset in each record? This is tested before a second effect is accepted.
 
-A sensor that was zeroed anew shifts a whole record. A memory that begins each record where it likes does nearly the same, and a
-second effect with a memory takes the credit. So models without a memory are asked first.
+A sensor that was zeroed again shifts a whole record. An effect with memory and a free initial state does nearly the same, so that
+it could be named as a second effect by mistake. Therefore models without memory are tested first.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from rigsight.rigs import Rig
 from rigsight.simulate.drift import can_drift
 
 _TOLERANCE = 1e-5
-_KEPT = 'Write offsets = "per_record" at the top of campaign.toml to have it so in every command.'
+_KEPT = 'Write offsets = "per_record" at the top of campaign.toml to do this in every command.'
 
 
 def asked_offsets(
     context: FitContext, reidentified: Scored, singles: Sequence[Scored], allowed: float
 ) -> Finding | None:
-    """Return what speaks for an offset in each record, None where nothing does.
+    """Return the evidence for an offset in each record, None where there is none.
 
-    With offsets free a model must explain the records: an effect that pulls to one side, the more the larger the motion, shifts
-    records as well, and leaves more than shifts.
+    The model must explain the records once offsets are free: an asymmetric effect, whose mean grows with the motion, also shifts
+    records but leaves more than offsets do.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def asked_offsets(
     linear, singles
         The re-identified equations, and every effect by itself.
     allowed
-        What a named cause may leave, in units of the noise floor.
+        Error that a named cause may leave, in units of the noise floor.
     """
     models = [reidentified, *(m for m in singles if m.fit.residuals and np.isfinite(m.error_over_noise))]
     forgetful = [m for m in models if not _remembers(m.effects)]
@@ -60,9 +60,9 @@ def asked_offsets(
             unit = next(signal.unit for signal in context.rig.outputs if signal.name == worst.output)
             return Finding(
                 "offset",
-                f"{worst.sentence(unit)} With an offset of each sensor in each record the nearest model leaves "
-                f"{freed.error_over_noise:.3g} times the noise floor instead of {model.error_over_noise:.3g}: "
-                "such offsets are estimated here, and no part of the model.",
+                f"{worst.sentence(unit)} With a free offset for each sensor in each record, the best model leaves "
+                f"{freed.error_over_noise:.3g} times the noise floor instead of {model.error_over_noise:.3g}. These offsets are "
+                f"estimated here but are not part of the model.",
                 _KEPT,
                 signal=worst.output,
             )
@@ -70,10 +70,10 @@ def asked_offsets(
 
 
 def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding]:
-    """Return the sensors whose level differs between records by more than they move in any: no fit begins well from there.
+    """Return the sensors whose mean differs between records by more than they move in any: fits start badly from there.
 
-    Springs bring a rig back to one place where its inputs and constants are the same; nothing is said where they are not, or of a
-    rig that can rest anywhere.
+    Springs return a rig to the same place if its inputs and constants are the same; nothing is reported otherwise, or for a rig
+    that can rest anywhere.
 
     Parameters
     ----------
@@ -95,7 +95,8 @@ def levels_apart(context: FitContext, records: Sequence[Record]) -> list[Finding
             found.append(
                 Finding(
                     "offset",
-                    f"{signal.name} lies {moves:.3g} times as far apart in '{lowest}' and '{highest}' as it moves in any record.",
+                    f"{signal.name} has means in '{lowest}' and '{highest}' that differ by {moves:.3g} times its motion in any "
+                    f"record.",
                     OFFSETS_MEND,
                     signal=signal.name,
                 )
@@ -125,7 +126,7 @@ def _apart(records: Sequence[Record], name: str) -> tuple[float, str, str]:
 
 
 def means_of(context: FitContext, model: Scored) -> list[DifferingMeans]:
-    """Return the outputs of which a model leaves other means in each record.
+    """Return the outputs whose mean residual differs between records.
 
     Parameters
     ----------

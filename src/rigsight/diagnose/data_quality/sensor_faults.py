@@ -1,4 +1,4 @@
-"""Is a recorded channel cut off at its extremes, stuck, coarsely quantized, or does it jump?"""
+"""Is a recorded channel clipped, stuck or coarsely quantized, or does it jump?"""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _clipped(record: Record, name: str, unit: str) -> list[Finding]:
     return [
         Finding(
             "clipping",
-            f"Record {record.name}: {name} is cut off at {level:.4g} {unit} ({count} samples).",
+            f"Record {record.name}: {name} is clipped at {level:.4g} {unit} ({count} samples).",
             "Record again with a wider range, or leave the record out.",
             record=record.name,
             signal=name,
@@ -80,9 +80,9 @@ def _quantized(record: Record, name: str, unit: str, n_given: int) -> list[Findi
     return [
         Finding(
             "quantization",
-            f"Record {record.name}: {name} moves in steps of {step:.3g} {unit} ({levels.size} levels); rounding alone is a noise "
-            f"of {step / np.sqrt(12.0):.2g} {unit}.",
-            "Record with a finer resolution, or expect nothing below that.",
+            f"Record {record.name}: {name} moves in steps of {step:.3g} {unit} ({levels.size} levels); rounding alone causes "
+            f"noise of {step / np.sqrt(12.0):.2g} {unit}.",
+            "Record with a finer resolution; smaller errors cannot be resolved.",
             serious=False,
             record=record.name,
             signal=name,
@@ -114,8 +114,8 @@ def _stuck(record: Record, name: str) -> list[Finding]:
     return [
         Finding(
             "stuck",
-            f"Record {record.name}: {name} stands exactly still from {', '.join(told)}{_more(stuck.size)} and breaks off there.",
-            "Look at the sensor and its transmission; cut these stretches out.",
+            f"Record {record.name}: {name} is exactly constant from {', '.join(told)}{_more(stuck.size)} and jumps at its end.",
+            "Check the sensor and its transmission; cut these stretches out.",
             record=record.name,
             signal=name,
         )
@@ -150,8 +150,8 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
         Finding(
             "jump",
             f"Record {record.name}: {name} jumps by about {largest:.3g} {unit} at {told}"
-            f"{_more(len(places))}; no mass does that.",
-            "Look for interference or lost counts; repair the samples or leave the record out.",
+            f"{_more(len(places))}; no mass can move like that.",
+            "Check for interference or lost counts; repair the samples or leave the record out.",
             record=record.name,
             signal=name,
         )
@@ -159,4 +159,4 @@ def _jumping(record: Record, name: str, unit: str) -> list[Finding]:
 
 
 def _more(count: int) -> str:
-    return f" and {count - NOTES.first_told} times more" if count > NOTES.first_told else ""
+    return f" and {count - NOTES.first_told} more times" if count > NOTES.first_told else ""

@@ -1,1 +1,1 @@
-"""With what is every model fitted: which records, over which stretch, with which numbers free?"""
+"""Set-up of all fits: which records, over which stretch, with which parameters free."""

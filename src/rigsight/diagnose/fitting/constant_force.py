@@ -1,8 +1,8 @@
-"""What is known of the constant forces at a joint, where an effect has a mean force of its own?
+"""Are the constant forces at a joint known, if an effect has a mean force of its own?
 
-Friction that differs each way and a constant force beside even friction obey the same equation. Such an effect is fitted with the
-constant forces of its joint held where the simulation in question has them, and competes only where even friction would have to
-move them: then it is the one cause in the place of a cause and a wrong number.
+Friction that differs between the two directions obeys the same equation as symmetric friction plus a constant force. Such an
+effect is therefore fitted with the constant forces of its joint held at the values of the given simulation. It competes only if
+symmetric friction would require other values: then it is a single cause instead of a cause and a wrong parameter.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from rigsight.rigs import Rig, joint_of
 
 
 def known_constant_forces(
-    rig: Rig, effect: Effect, given: Mapping[str, float], has_spring: bool
+    rig: Rig, effect: Effect, given: Mapping[str, float], has_stiffness: bool
 ) -> dict[str, float] | None:
-    """Return the values at which the constant forces beside an effect are held.
+    """Return the values at which the constant forces are held while an effect is fitted.
 
     Parameters
     ----------
@@ -25,14 +25,14 @@ def known_constant_forces(
     effect
         At its place, or of no place.
     given
-        Numbers of the rig that the simulation in question came with.
-    has_spring
-        Whether the spring of a rig of one motion is there: without it a rest position pushes nothing.
+        Parameters of the rig in the given simulation.
+    has_stiffness
+        False for a rig of one motion without a spring: there a rest position exerts no force.
 
     Returns
     -------
-    Empty for an effect without a mean force; None where a constant force is not known. A force that is not given has its default,
-    a rest position has none: it is where somebody set a sensor to zero.
+    Empty for an effect without a mean force; None where a constant force is not known. A force that is not given has its default;
+    a rest position has none, because it depends on where the sensor was set to zero.
     """
     if not effect.holds_constant_force:
         return {}
@@ -41,7 +41,7 @@ def known_constant_forces(
     resting = {symbol.name for symbol in joint.rest.free_symbols}
     defaults = {p.name: p.default for p in rig.parameters if p.name not in resting and p.default is not None}
     known = {**defaults, **given}
-    needed = [name for name in names if has_spring or name not in resting]
+    needed = [name for name in names if has_stiffness or name not in resting]
     if any(name not in known for name in needed):
         return None
     return {name: known[name] for name in names if name in known}

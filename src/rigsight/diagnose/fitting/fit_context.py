@@ -81,23 +81,23 @@ class FitContext:
     estimation, scoring
         Records to fit and records to score, already cut into windows where that is needed.
     look
-        The liveliest stretch of each estimation record, for a first look at each start.
+        The most excited stretch of each estimation record, for the first fit from each start.
     scales
         Size of each base quantity.
     noise
         Noise floor of each output.
     held
-        Parameters of the rig that no fit moves (a spring that is not there, outputs that were not measured).
+        Parameters of the rig that are held in all fits (such as those of an absent spring or of outputs that were not measured).
     given
-        Numbers of the rig that the simulation in question came with.
+        Parameters of the rig in the given simulation.
     start
-        Values before any fit, of the given simulation or a regression: fits without the effect may bend them beyond use.
+        Values before any fit, from the given simulation or a regression: fits without the effect may distort them too much.
     modelled
-        Effects that the simulation in question has already; every candidate is added to them.
+        Effects already in the given simulation; every candidate is added to them.
     memory
         Where the outcomes of fits are kept.
     threads
-        Who helps with the records of a fit.
+        Threads that help with the records of a fit.
     """
 
     rig: Rig
@@ -131,7 +131,7 @@ class FitContext:
 
     @cached_property
     def look_in_pieces(self) -> tuple[tuple[Record, ...], ...]:
-        """Pieces of each of the liveliest stretches: a model that is far off stays in step with the motion in them."""
+        """Pieces of each of the most excited stretches: an inaccurate model stays in phase with the motion in them."""
         return tuple(self.cut_in_pieces([record], HORIZON.piece) for record in self.look)
 
     def cut_in_pieces(self, records: Sequence[Record], periods: float) -> tuple[Record, ...]:
@@ -181,20 +181,20 @@ class FitContext:
         return held
 
     def _known_constant_forces(self, effect: Effect) -> dict[str, float] | None:
-        has_spring = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
-        return known_constant_forces(self.rig, effect, self.given, has_spring)
+        has_stiffness = not (self.rig.has_one_motion and self.rig.is_driven) or self.has_stiffness
+        return known_constant_forces(self.rig, effect, self.given, has_stiffness)
 
     def leaves_numbers_open(self, fit: FitResult) -> bool:
-        """Return True if a fit leaves a mass, a stiffness or a damping undetermined: a missing effect may have bent it."""
+        """Return True if a fit leaves a mass, a stiffness or a damping undetermined: a missing effect may have distorted it."""
         positive = {p.name for p in self.rig.parameters if p.lower >= 0.0}
         return any(
             name in positive and not fit.standard_errors[name] < abs(fit.values[name]) for name in fit.free
         )
 
     def releasable_parameters(self, structure: Structure) -> list[str]:
-        """Return what a fit may move once it has settled: a constant force that a bent spring tells from its rest position.
+        """Return the parameters freed after a first fit: a constant force, if an asymmetric spring determines it.
 
-        An even spring cannot: shifting it changes its slope, and that is free already.
+        A symmetric spring does not distinguish them: a shift changes its slope, which is already free.
         """
         bent = any(_sees_position(e) and not e.signature.even_harmonics for e in structure.effects)
         even = any(_sees_position(e) and e.signature.even_harmonics for e in structure.effects)
@@ -208,14 +208,14 @@ class FitContext:
 
     @property
     def has_stiffness(self) -> bool:
-        """True where a spring holds a rig of one motion."""
+        """True for a rig of one motion with a spring."""
         return not {symbol.name for symbol in self.rig.motion.stiffness.free_symbols} <= self.held
 
     def offered(self, effects: Iterable[Effect]) -> list[Effect]:
-        """Return the effects that make sense on this rig and in these records, each at each place.
+        """Return the effects that apply to this rig and these records, each at each place.
 
-        Without a spring that is none that changes it; where an input rests none at a drive that is told nothing else; beside a
-        constant force that nobody knows none with a mean force.
+        Excluded are effects of the spring if there is none, effects of a drive whose input is constant, and effects with a mean
+        force if the constant force is unknown.
         """
         offered = [
             effect
@@ -246,7 +246,7 @@ class FitContext:
     def score(self, effects: tuple[Effect, ...], fit: FitResult, roughly: bool = False) -> Scored:
         """Simulate the scoring records with a fitted model; only their initial states are estimated.
 
-        `roughly` is enough to place a model that is far from the best.
+        `roughly` is sufficient to rank a model that is far from the best.
         """
         if roughly:
             rough = self.problem(fit.structure, self.scoring, _ROUGH_ACCURACY)
@@ -259,7 +259,7 @@ class FitContext:
         return Scored(effects, fit, result, error_over_noise)
 
     def on_all_records(self, model: Scored) -> FitResult:
-        """Return what a model leaves of `records`, with the initial states that suit it in each; nothing is fitted anew."""
+        """Return the residuals of a model on `records` with refitted initial states; parameters are not refitted."""
         if self.scoring == self.estimation:
             return model.held_out
         parts = (model.fit, model.held_out)
@@ -277,10 +277,10 @@ def _sees_position(effect: Effect) -> bool:
 
 
 def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
-    """Return the records, those of a free motion only until it has died away.
+    """Return the records, those of a free motion only until it has decayed.
 
-    Where friction catches a mass its place jumps with the numbers of a model: a fit that begins with the rest that follows, which
-    may be long, stays where it begins.
+    The position at which friction stops a mass changes in jumps with the parameters: a fit that includes the following rest,
+    which may be long, would not leave its start.
     """
     cut_off = []
     for record, output in zip(records, shown_by(rig, records), strict=True):
@@ -295,7 +295,7 @@ def until_rest(records: Sequence[Record], rig: Rig) -> tuple[Record, ...]:
 
 
 def liveliest(records: Sequence[Record], rig: Rig, n_samples: int = 8000) -> tuple[Record, ...]:
-    """Return the stretch of each record in which its output moves most, together about `n_samples` long."""
+    """Return the most excited stretch of each record, together about `n_samples` long."""
     share = max(500, n_samples // max(1, len(records)))
     stretches = []
     for record, output in zip(records, shown_by(rig, records), strict=True):

@@ -1,8 +1,8 @@
-"""How are models of a rig that drifts compared with records? By an observer: each softly follows the measured motion.
+"""Models of a drifting rig are compared with records as observers: each model is weakly coupled to the measured motion.
 
-Without a spring of its own a rig integrates every error of force twice: a free run soon shows where it has drifted to, and no
-more. An observer is pulled towards the measured motion. What a model lacks still shows within a time of the order of the
-reciprocal of its bandwidth; what it drifts in longer times does not. Memories of effects go on as they would.
+A rig without a spring integrates every force error twice, so that a free run soon shows only the drift. An observer is pulled
+towards the measured motion. A missing effect still shows within about the reciprocal of the observer bandwidth, while slower
+drift is removed. Internal states of effects are not corrected.
 
 References
 ----------
@@ -23,14 +23,14 @@ from rigsight.simulate import Structure, compose, structure_of_fit
 
 @dataclass(frozen=True)
 class Observer:
-    """What a model follows while it is compared with records.
+    """Sensors that a model tracks while it is compared with records, and the bandwidth.
 
     Attributes
     ----------
     sensors
-        Names of those that show nothing but the motion.
+        Names of sensors that read only the motion.
     bandwidth
-        Angular frequency up to which the motion is followed [rad/s].
+        Angular frequency up to which the motion is tracked [rad/s].
     """
 
     sensors: tuple[str, ...]
@@ -50,7 +50,7 @@ def observed_sensors(records: Sequence[Record]) -> frozenset[str]:
 
 
 def followed_sensors(campaign: Campaign) -> tuple[str, ...]:
-    """Return the sensors that models of a campaign can follow: those that show nothing but the motion.
+    """Return the sensors that models of a campaign can track: those that read only the motion.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def structures_to_fit(campaign: Campaign, structures: Iterable[Structure]) -> li
 
 
 def sensors_of_motion(rig: Rig) -> tuple[str, ...]:
-    """Return the sensors of a rig that show nothing but its motion: coordinates and their rates."""
+    """Return the sensors of a rig that read only its motion: coordinates and their rates."""
     structure = compose(rig)
     motion = structure.tree.motion
     moving = {*motion.coordinates, *motion.velocities}

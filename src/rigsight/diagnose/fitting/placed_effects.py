@@ -1,4 +1,4 @@
-"""Which effects, and where, are candidates? Each at every place of a rig at which it makes sense."""
+"""Candidates: every effect at every place of the rig to which it applies."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from rigsight.rigs import Rig
 def candidates_on(rig: Rig, effects: Iterable[Effect], modelled: Iterable[Effect] = ()) -> list[Effect]:
     """Return effects at the places of a rig, in the order of the effects.
 
-    On one mass or one element each effect has one place, and its plain name says all.
+    On one mass or one element each effect has only one place, so its name needs no place.
 
     Parameters
     ----------
     rig
         The rig.
     effects
-        Of no place; those that have one keep it.
+        Without a place; those that have one keep it.
     modelled
         Effects that the simulation has already.
     """

@@ -1,4 +1,4 @@
-"""What are the candidates of a campaign fitted with: which records, scales, start values, and which numbers are held?"""
+"""Preparation of the fits of a campaign: records, scales, start values, and which parameters are held."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fit_context_of(
     memory: FitMemory | None,
     threads: IdleThreads,
 ) -> FitContext:
-    """Return what candidates of a campaign are fitted and scored with.
+    """Return the context in which candidates of a campaign are fitted and scored.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def start_values_of(campaign: Campaign) -> dict[str, float]:
 
 
 def _held(campaign: Campaign) -> frozenset[str]:
-    """Return rig parameters that these records say nothing about, and the stiffness of a spring that is not there."""
+    """Return rig parameters that these records do not determine, and the stiffness of an absent spring."""
     held = set() if campaign.absent_spring is None else {campaign.absent_spring}
     if campaign.open_factor is not None:
         held.add(campaign.open_factor.held)

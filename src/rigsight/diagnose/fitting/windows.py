@@ -1,4 +1,4 @@
-"""Cutting records into windows with their own initial states, for rigs that drift in free run or forget where they began."""
+"""Cutting records into windows with their own initial states, for rigs that drift or move too sensitively."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Windowing:
     length
         Length of a window [s].
     cycles
-        Cycles of motion in a window, whatever they take: the fast part of a sweep is cut finer than the slow one.
+        Cycles of motion in a window, so that the fast part of a sweep is cut finer than the slow one.
     noise
         Noise floor of each output whose cycles count, the first that a record holds.
     observer
@@ -83,7 +83,7 @@ class Windowing:
 def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.float64]]:
     """Return what a sensor shows in each record that holds it, windows joined, by the name of the record.
 
-    Where the sensor has an offset in each record its level says nothing: it is shown about its mean.
+    If the sensor has its own offset in each record, its mean is removed.
     """
     parts: dict[str, list[NDArray[np.float64]]] = {}
     for record in records:
@@ -95,7 +95,7 @@ def readings(records: Sequence[Record], sensor: str) -> dict[str, NDArray[np.flo
 
 
 def leading_output(rig: Rig, records: Sequence[Record]) -> str:
-    """Return the output that tells cycles and lively stretches: the first that most records hold, of motion if one is."""
+    """Return the output that defines cycles and excited stretches: the first that most records contain, preferably of motion."""
     outputs = [signal.name for signal in rig.outputs]
     of_motion = [name for name in sensors_of_motion(rig) if any(name in record for record in records)]
     return max(of_motion or outputs, key=lambda name: sum(name in record for record in records))
@@ -110,7 +110,7 @@ def shown_by(rig: Rig, records: Sequence[Record]) -> list[str]:
 def window_length(rig: Rig, records: Sequence[Record]) -> float:
     """Return a window length [s] that holds several of the typical periods of the velocity.
 
-    An axis without a spring integrates every error of the force twice; a window keeps that drift small against the motion.
+    An axis without a spring integrates every force error twice; a window keeps that drift small compared with the motion.
     """
     dt = max(record.dt for record in records)
     longest = max(record.n_samples * record.dt for record in records)

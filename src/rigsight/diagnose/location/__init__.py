@@ -1,1 +1,1 @@
-"""Location: in which records, bands, states and legs of the signal path is how much of the gap?"""
+"""Location of the gap: its shares by record, frequency band, state and section of the signal path."""

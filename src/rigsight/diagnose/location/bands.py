@@ -82,7 +82,7 @@ def band_powers(samples: NDArray[np.float64], dt: float, edges: NDArray[np.float
 
 
 def dominant_frequency(samples: NDArray[np.float64], dt: float, size: float) -> float:
-    """Return where the power of a stretch has its center [rad/s]; NaN where it rests.
+    """Return the center frequency of the power of a stretch [rad/s]; NaN where it is constant.
 
     Parameters
     ----------

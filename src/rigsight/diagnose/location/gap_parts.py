@@ -11,18 +11,18 @@ from typing import Any
 
 @dataclass(frozen=True, kw_only=True)
 class GapPart:
-    """What the simulations leave of one output in one part of the records.
+    """Errors of the simulations in one output and one part of the records.
 
     Attributes
     ----------
     output
         Name of the output.
     before, reidentified, after, noise_floor
-        NRMSE; what it is relative to stands at each kind of part. `after` is NaN where it cannot be formed.
+        NRMSE; the reference is given for each kind of part. `after` is NaN where it cannot be formed.
     share
-        This part's share of the squared residual that the re-identified equations leave of this output.
+        Share of this part in the squared residual of the re-identified equations in this output.
     noise_share
-        How much of all that squared residual is this part's noise; the rest of `share` is gap.
+        Share of the whole squared residual that is noise in this part; the rest of `share` is gap.
     units
         Unit of each key by which the gap is split, where it has one.
     """
@@ -45,8 +45,8 @@ class GapPart:
 class RecordPart(GapPart):
     """One record, relative to its own measured RMS about the mean.
 
-    Records that were fitted (`scored` is False) stand beside those that were scored, and their shares are among the fitted
-    ones. `interval` holds 95 % limits by stage, see `quantify`.
+    Fitted records (`scored` is False) are listed too; their shares are relative to the fitted records. `interval` holds 95 %
+    limits by stage, see `quantify`.
     """
 
     record: str
@@ -92,10 +92,10 @@ class StatePart(GapPart):
     n_samples
         Samples in it.
     force_mean, force_rms, force_noise
-        Force (torque) that the re-identified equations lack there: mean, RMS, and the standard deviation that the sensor's noise
-        gives it. NaN where it does not stand out of the noise anywhere, and for an output that no force acts on directly.
+        Force (torque) missing in the re-identified equations there: mean, RMS, and its standard deviation due to sensor noise.
+        NaN where it does not exceed the noise anywhere, and for an output on which no force acts directly.
     joint
-        The joint whose motion it is and at which all of the force would act; empty on a rig with one motion.
+        The joint with this motion, at which the whole force would act; empty on a rig with one motion.
     """
 
     x_low: float
@@ -113,8 +113,8 @@ class StatePart(GapPart):
 class TimePart(GapPart):
     """One stretch of a scored record, relative to the measured RMS of all scored records.
 
-    `omega` is the frequency at which the input has its power in this stretch (NaN where it rests); `mean` the mean residual of
-    the re-identified equations on the same scale: a drift shows in it.
+    `omega` is the center frequency of the input power in this stretch (NaN where it is constant); `mean` is the mean residual of
+    the re-identified equations on the same scale, which shows a drift.
     """
 
     record: str
@@ -126,7 +126,7 @@ class TimePart(GapPart):
 
 @dataclass(frozen=True, kw_only=True)
 class PathPart(GapPart):
-    """One leg of the signal path with its input as measured, relative to the measured RMS of its output.
+    """One section of the signal path driven by its measured input, relative to the measured RMS of its output.
 
     Attributes
     ----------
@@ -135,9 +135,9 @@ class PathPart(GapPart):
     source
         The signal that drives it, as measured.
     shift, shift_std
-        How much earlier the source must have come for the best fit [s]; NaN where that was not asked.
+        Time by which the source must be earlier for the best fit [s]; NaN where that was not tested.
     shifted
-        What the re-identified leg leaves with its source shifted by that; NaN where that was not asked.
+        Error of the re-identified section with its source shifted by that; NaN where that was not tested.
     """
 
     path: str
@@ -149,7 +149,7 @@ class PathPart(GapPart):
 
 @dataclass(frozen=True)
 class Localization:
-    """The gap split by record, amplitude, band, state, time and signal path; `sentence` says what the paths tell.
+    """The gap split by record, amplitude, band, state, time and signal path; `sentence` summarizes the signal path.
 
     ``noise_shape`` tells for each output how its noise floor is spread over bands: as ``"measured"``, or as ``"white"`` noise.
     """

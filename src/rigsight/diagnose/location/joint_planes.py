@@ -1,6 +1,7 @@
-"""How does each joint of a rig with several move, and which force would act there if all that the equations lack did?
+"""Motion of each joint of a rig, and the force that would act there if everything missing acted at this joint.
 
-Along the motion that follows the sensors, with a force of any course at the joint. The rig's numbers are the re-identified ones.
+The motion follows the sensors, with a force of any shape over time at the joint. The parameters of the rig are the re-identified
+ones.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ Signals = Mapping[str, NDArray[np.float64]]
 def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trace]) -> tuple[StatePart, ...]:
     """Return the gap of each output over the plane of each joint's motion.
 
-    The joint first at which a force agrees best with the sensors. Where much is missing, the re-identified numbers are far
-    off, and so is that agreement: it orders, and rules nothing out.
+    First the joint at which a force agrees best with the sensors. If a large effect is missing, the re-identified parameters are
+    inaccurate and so is this agreement: it only sorts and excludes nothing.
 
     None beside effects that are modelled already, as the motion is followed with the rig's own equations, of a rig that nothing
     but prescribed motions move, and where a sensor's level is not known.
@@ -53,7 +54,7 @@ def joint_parts(context: FitContext, reidentified: Scored, scored: Sequence[Trac
     try:
         motions = joint_motions(context.rig, records, reidentified.fit.values, context.noise)
     except (SimulationError, np.linalg.LinAlgError):
-        # A map is no reason to have no diagnosis.
+        # A diagnosis is still useful without this map.
         return ()
     motions = tuple(motion for motion in motions if np.isfinite(motion.left))
     parts: list[StatePart] = []
@@ -97,7 +98,7 @@ def _plane(context: FitContext, motion: JointMotion, lacks: bool) -> Plane:
     return Plane(
         x=np.concatenate(motion.displacement),
         v=np.concatenate(motion.velocity),
-        # What resists the motion is what the equations lack with the other sign.
+        # The resisting force is the missing force with the opposite sign.
         force=force if lacks else np.full(force.size, NOTHING),
         force_noise=rms(np.concatenate(motion.error)) if lacks else NOTHING,
         forced=tuple(signal.name for signal in context.rig.outputs),

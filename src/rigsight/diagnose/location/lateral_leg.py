@@ -1,7 +1,7 @@
-"""Does the lateral part follow from the motion as it was measured? Its linear equation fitted with that as input.
+"""Does the lateral part follow from the measured motion? Its linear equation is fitted with the measured motion as input.
 
 ``y' = b (c + g x(t + shift) - y)`` with x joined by straight lines. For each rate b and shift, gain g, offset c and initial
-values follow by linear least squares, so that the search has two dimensions at most. Errors of what moves x do not enter.
+values follow by linear least squares, so that the search has two dimensions at most. Errors of the model of x do not matter.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class LateralLeg:
-    """The leg from the measured motion to y.
+    """The section from the measured motion to y.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class LateralLeg:
     shift, shift_std
         How much earlier the motion must have come for the best fit [s], and its standard error from a white residual.
     noise_gain
-        Share of the motion's noise that reaches y, [unit of y per unit of x].
+        Gain from the noise of the motion to y, [unit of y per unit of x].
     """
 
     given: tuple[NDArray[np.float64], ...]
@@ -142,7 +142,7 @@ def _projected(
 
 
 def _left(record: Record, names: tuple[str, str], numbers: _Numbers) -> NDArray[np.float64]:
-    """Return what is left of y with these numbers; only the initial value is fitted."""
+    """Return the residual of y with these parameters; only the initial value is fitted."""
     decay = _decay(record, numbers.rate)
     follows = numbers.gain * _answer(_moved(record, names[0], numbers.shift), record.dt, numbers.rate)
     left = record[names[1]] - follows - numbers.offset * (1.0 - decay)

@@ -45,7 +45,7 @@ def localize(
     context
         Records and noise.
     traces
-        What the simulations leave of every record.
+        Errors of the simulations on every record.
     scored_on
         Role of the records that the gap budget counts.
     before, linear, after
@@ -212,7 +212,7 @@ def _by_time(scored: Sequence[Trace], noise: Mapping[str, float]) -> list[TimePa
 
 
 def _figures(group: Sequence[Trace], output: str, noise: float, alike: Sequence[Trace]) -> dict[str, Any]:
-    """Return what a group of records leaves relative to its own motion, and its share among records of its kind."""
+    """Return the error of a group of records relative to its own motion, and its share among records of its kind."""
     spread = _spread(group, output)
     stages = {
         str(stage): rms(np.concatenate([trace.residual(stage, output) for trace in group])) / spread

@@ -1,6 +1,6 @@
-"""On which leg of the signal path does the gap lie? Each leg with its own input as measured, and what they say together.
+"""In which section of the signal path does the gap arise? Each section is driven by its measured input.
 
-A delay before the motion leaves the lateral leg alone. A delay of the motion's sensor shifts it the other way: the motion is
+A delay before the motion does not affect the lateral section. A delay of the motion sensor shifts it the other way: the motion is
 measured late, so y seems early.
 """
 
@@ -25,7 +25,7 @@ from rigsight.rigs import Rig
 def path_parts(
     context: FitContext, before: Scored, reidentified: Scored, after: Scored
 ) -> tuple[PathPart, ...]:
-    """Return every leg of the signal path with what it leaves of its output when its input is taken as measured.
+    """Return the error of every section of the signal path when it is driven by its measured input.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def path_parts(
 
 
 def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
-    """Return what the legs of the path say together, in plain words; empty where there is no leg."""
+    """Return a sentence on the sections of the signal path; empty where there is none."""
     if not parts:
         return ""
     first = parts[0]
     motion = f"{first.path} leaves {_times(first.reidentified, first)}"
     if len(parts) == 1:
-        return f"The path has one leg that can be checked: {motion} after re-identification."
+        return f"One section of the signal path can be checked: {motion} after re-identification."
     lateral = parts[1]
     clean = lateral.reidentified <= VERDICT.at_floor * lateral.noise_floor
     said = (
@@ -71,19 +71,19 @@ def path_sentence(parts: Sequence[PathPart], rig: Rig) -> str:
     )
     if clean and first.reidentified > VERDICT.at_floor * first.noise_floor:
         return (
-            f"The gap lies before {lateral.source} is measured: {motion}, but {said}. Drive or {_words(rig)}, not the lateral "
-            f"part and not a delay of the {lateral.source} sensor."
+            f"The gap arises before {lateral.source} is measured: {motion}, but {said}. So the cause is the drive or "
+            f"{_words(rig)}, not the lateral part and not a delay of the {lateral.source} sensor."
         )
     if clean:
-        return f"No leg of the path has a gap worth the name: {motion}, {said}."
+        return f"No section of the signal path has a noticeable gap: {motion}, {said}."
     shifted = _times(lateral.shifted, lateral)
     if moved and lateral.shifted <= VERDICT.at_floor * lateral.noise_floor:
         late, early = (
             (lateral.source, lateral.output) if lateral.shift > 0.0 else (lateral.output, lateral.source)
         )
         return (
-            f"The sensors disagree: {said}, and {shifted} if {late} were measured {1e3 * abs(lateral.shift):.3g} ms too late "
-            f"against {early}; {motion}."
+            f"The sensors are not synchronous: {said}, but only {shifted} if {late} is assumed to be measured "
+            f"{1e3 * abs(lateral.shift):.3g} ms later than {early}; {motion}."
         )
     better = f" ({shifted} with {lateral.source} shifted by {1e3 * lateral.shift:.3g} ms)" if moved else ""
     return f"The lateral part or a sensor has a gap of its own: {said}{better}; {motion}."
@@ -98,7 +98,7 @@ def _words(rig: Rig) -> str:
 
 
 def _motion_alone(context: FitContext, reidentified: Scored) -> Scored:
-    """Re-identify the motion without regard to what it drives: a gap there must not bend the numbers here."""
+    """Re-identify the motion without what it drives, so that a gap there does not distort these parameters."""
     downstream = context.rig.downstream_parameters
     if not downstream or downstream <= context.held:
         return reidentified

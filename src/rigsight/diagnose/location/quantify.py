@@ -1,7 +1,7 @@
-"""How far does the gap shrink, how surely, and how much of that is owed to each of several effects?
+"""How far the gap shrinks, with confidence intervals, and the share of each of several effects.
 
-The intervals are those of a block bootstrap over the scored records: how much the figures would move with other stretches of
-the same experiments. They do not cover what another amplitude or another waveform would bring.
+The intervals are those of a block bootstrap over the scored records: how much the figures vary between stretches of the same
+experiments. They do not cover other amplitudes or waveforms.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def gap_intervals(
 ) -> dict[str, Interval]:
     """Return 95 % intervals of the NRMSE of each stage, and of the share of the gap that is closed.
 
-    All stages are resampled together, so that a stretch in which the rig moves much weighs on all of them.
+    All stages are resampled together, so that a stretch with large motion affects all of them equally.
 
     Parameters
     ----------
@@ -82,15 +82,15 @@ def effect_shares(
 ) -> dict[str, dict[str, float]]:
     """Return the share of the closed gap that each of several effects explains, by effect and output.
 
-    An effect's share is what it takes away, averaged over the orders in which the effects can be added: the shares add up to one,
-    and two effects that can stand for each other share what both explain.
+    The share of an effect is its reduction of the error, averaged over the orders in which the effects can be added: the shares
+    add up to one, and two interchangeable effects share what both explain.
 
     Parameters
     ----------
     effects
         Effects of the verdict.
     left
-        NRMSE by output of the models that were fitted, by the set of their effects; the empty set is the re-identified equations.
+        NRMSE by output of the fitted models, by the set of their effects; the empty set is the re-identified equations.
 
     Returns
     -------

@@ -1,9 +1,9 @@
-"""In which states does the gap arise? Residuals, and the force that the equations lack, over displacement and velocity.
+"""In which states does the gap arise? Residuals, and the force missing in the equations, over displacement and velocity.
 
-The force that the re-identified equations lack is ``m e'' + d e' + k e`` of their residual e: the initial transient and the
-drive obey the equations and cancel. Effects that the simulation has already are linearized away: beside them the map shows the
-shape of the missing force, not its exact size. It is formed from the residual up to the frequency
-at which that stands out of the noise.
+The force missing in the re-identified equations is ``m e'' + d e' + k e`` of their residual e: the initial transient and the
+drive obey the equations and cancel. Effects that the simulation already contains are neglected in this, so that the map then
+shows the shape of the missing force but not its exact size. The residual is used up to the frequency at which it exceeds the
+noise.
 """
 
 from __future__ import annotations

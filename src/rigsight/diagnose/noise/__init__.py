@@ -1,1 +1,1 @@
-"""What counts as noise and disturbance, and what does a model leave above them?"""
+"""Noise and disturbance, and the error of a model above them."""

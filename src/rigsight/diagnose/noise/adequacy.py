@@ -1,21 +1,22 @@
-"""Is what a model leaves noise and disturbance, or does it still go with motion, drive, reading, time or record?
+"""Is the residual of a model noise and disturbance, or is it correlated with motion, drive, reading, time or record?
 
-What is left is compared with the answers of the model's own readings to small pushes that go with one of these: a force that
-depends on a joint's velocity or position, a drive that is another function of its signal, a number that changes with time or
-from record to record. Noise and disturbance agree with such an answer in one stretch of a record as often as they contradict it
-in the next, so that the signs of what is left may be turned stretch by stretch: how often chance agrees as well is the p-value.
-What is compared is what is new at each sample (`innovations.py`), as a disturbance hangs together for as long as a rig swings,
-and pushes go with the motion that the equations have, as the measured one goes with the disturbance itself. No floor of the
-noise is needed, and noise may be colored and of changing size. Whether that size goes with the motion can be asked beside it: an
-effect that no push resembles, such as a pulsating stiffness, leaves more where there is more motion; a sensor's noise does not.
+The residual is correlated with the responses of the outputs to small perturbations that depend on one of these: a force as a
+function of a joint's velocity or position, a drive as another function of its signal, a parameter that changes with time or from
+record to record. For noise and disturbance the sign of this correlation is random in every stretch, so the signs of the residual
+may be flipped stretch by stretch: the p-value is the share of flips that correlate as well (randomization test). The innovations
+(`innovations.py`) are used instead of the residuals, because a disturbance remains correlated for as long as the rig rings. The
+perturbations follow the simulated motion, because the measured one is correlated with the disturbance itself. No noise floor is
+needed, and the noise may be colored and vary in size. A second test asks whether the size of the residual depends on the motion:
+an effect that no perturbation resembles, such as a varying stiffness, leaves more where there is more motion; sensor noise does
+not.
 
 References
 ----------
-E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for turning signs (the wild bootstrap with Rademacher weights).
-R. De Santis, J. J. Goeman, J. Hemerik, S. Davenport and L. Finos, J. Am. Stat. Assoc. (2025), doi 10.1080/01621459.2025.2491775,
-for turned signs beside fitted numbers.
-P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the smallest of several p-values.
-T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for what the size of a remainder goes with; here by ranks.
+E. Flachaire, Comput. Stat. Data Anal. 49 (2005) 361, for flipping signs (the wild bootstrap with Rademacher weights). R. De
+Santis, J. J. Goeman, J. Hemerik, S. Davenport and L. Finos, J. Am. Stat. Assoc. (2025), doi 10.1080/01621459.2025.2491775, for
+sign flips with fitted parameters. P. H. Westfall and S. S. Young, *Resampling-Based Multiple Testing* (Wiley 1993), for the
+smallest of several p-values. T. S. Breusch and A. R. Pagan, Econometrica 47 (1979) 1287, for the dependence of the size of a
+residual on a variable; here by ranks.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ _TOO_FAST = "motion that is too fast for the sample time"
 
 @dataclass(frozen=True)
 class Agreement:
-    """How what a model leaves goes with one thing.
+    """Correlation of the residual of a model with one signal or cause.
 
     Attributes
     ----------
@@ -57,9 +58,9 @@ class Agreement:
     place
         Joint, drive or sensor; empty for what has no place.
     p_value
-        Probability of such an agreement by chance, this one thing looked at alone.
+        Probability of such a correlation by chance, tested alone.
     share
-        Share of the squared remainder that goes with it beyond chance.
+        Share of the squared residual that it explains beyond chance.
     """
 
     what: str
@@ -70,16 +71,16 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Adequacy:
-    """Is what a model leaves noise and disturbance?
+    """Is the residual of a model noise and disturbance?
 
     Attributes
     ----------
     p_value
-        Probability that noise and disturbance alone agree as well with anything that was looked at.
+        Probability that noise and disturbance alone correlate this well with anything that was tested.
     agreements
-        With what it goes: what chance hardly makes first, of that the largest share.
+        Signals with which it correlates, significant ones first and by decreasing share.
     is_spread
-        False where it stands in a few stretches of the records, as noise does not.
+        False if it is concentrated in a few stretches of the records, unlike noise.
     significance
         p-value below which it is not adequate.
     """
@@ -91,12 +92,12 @@ class Adequacy:
 
     @property
     def adequate(self) -> bool:
-        """True where nothing contradicts that noise and disturbance are all that is left."""
+        """True if nothing contradicts that the residual is only noise and disturbance."""
         return self.is_spread and self.p_value >= self.significance
 
     @property
     def goes_with(self) -> str:
-        """With what the largest part of it goes; empty where it is adequate."""
+        """What the largest part of it correlates with; empty where it is adequate."""
         if self.adequate:
             return ""
         if self.p_value >= self.significance:
@@ -105,7 +106,7 @@ class Adequacy:
 
     @property
     def place(self) -> str:
-        """Joint, drive or sensor of what it goes with; empty where that has none."""
+        """Joint, drive or sensor of that signal; empty where it has none."""
         return "" if self.p_value >= self.significance else self.agreements[0].place
 
 
@@ -116,10 +117,10 @@ def adequacy(
     significance: float = VERDICT.significance,
     of_steady_size: bool = False,
 ) -> Adequacy:
-    """Say whether what a model leaves of all records goes with anything.
+    """Test whether the residual of a model on all records is correlated with anything.
 
-    Those that were fitted too: their other amplitudes show a law that has not quite the right form. Numbers that the fit bent to
-    hide it move with the answers, so that they hide nothing here.
+    Fitted records are included, because their other amplitudes show a law with a slightly wrong form. Parameters that the fit
+    distorted to compensate are free in the test, so that they do not hide it.
 
     Parameters
     ----------
@@ -132,7 +133,7 @@ def adequacy(
     significance
         p-value below which it is not adequate.
     of_steady_size
-        Whether noise and disturbance are to be as large where nothing moves.
+        Whether noise and disturbance must also be equally large where nothing moves.
     """
     records = context.records
     answers = Answers(context, records, context.on_all_records(model), model.effects, model.fit.free)
@@ -148,7 +149,7 @@ def adequacy(
         told = _turned(fresh, new, stretches, signs, innovations.followed)
         if told is None:
             continue
-        # How large it is counts in the readings themselves; what is new in them says only whether it is there.
+        # The size is computed in the readings themselves; innovations only decide whether it is significant.
         seen = _turned(answers.without_free(columns), seen_left, stretches, signs)
         share = (
             0.0 if seen is None else max(0.0, seen.reached - seen.mean) / float(answers.left @ answers.left)
@@ -163,7 +164,7 @@ def adequacy(
 
 
 class Checks:
-    """Whether what each model leaves is noise and disturbance, asked once of each.
+    """Whether the residual of each model is noise and disturbance, tested once for each.
 
     Parameters
     ----------
@@ -172,9 +173,10 @@ class Checks:
     rng
         Source of the turned signs.
     at_floor
-        What counts as the floor itself, in units of it: equations without an effect that leave more are asked for growth.
+        Error, in units of the floor, that counts as the floor itself: if the equations without an effect leave more, the
+        dependence of the residual's size on the motion is tested.
     allowed
-        What a model may leave before the floor speaks against it, in the same units.
+        Error that a model may leave before the floor is evidence against it, in the same units.
     """
 
     def __init__(
@@ -187,26 +189,26 @@ class Checks:
         self._known: dict[tuple[tuple[str, ...], float], Adequacy] = {}
 
     def of(self, model: Scored) -> Adequacy:
-        """Return what a model's remainder goes with."""
-        # A model may be fitted on, and then leaves something else.
+        """Return the adequacy of a model."""
+        # A model may be fitted further and then has another residual.
         own = model.names, model.fit.cost
         if own not in self._known:
             significance = (
                 VERDICT.significance if model.error_over_noise <= self._allowed else VERDICT.against_a_floor
             )
-            # Noise that only motion makes is no reason to say that nothing is missing.
+            # Noise that occurs only in motion does not show that nothing is missing.
             steady = not model.effects and model.error_over_noise > self._at_floor
             self._known[own] = adequacy(self._context, model, self._rng, significance, steady)
         return self._known[own]
 
     def is_adequate(self, model: Scored) -> bool:
-        """Return True where nothing contradicts that it is noise and disturbance."""
+        """Return True if nothing contradicts that its residual is noise and disturbance."""
         return self.of(model).adequate
 
 
 @dataclass(frozen=True)
 class _Turned:
-    """How much of what is left goes with some columns, and how much where the signs of its stretches are turned."""
+    """Part of the residual explained by some columns, and the same after the signs of its stretches are flipped."""
 
     reached: float
     by_chance: Floats
@@ -223,10 +225,10 @@ class _Turned:
 def _turned(
     columns: Floats, left: Floats, stretches: Sequence[slice], signs: Floats, followed: Followed | None = None
 ) -> _Turned | None:
-    """Return how much goes with columns that no parameter follows; None if there are none.
+    """Return how much is explained by columns after projecting out the parameters; None if none remain.
 
-    What parameters and initial states took of what is left is missing from it once signs are turned, so that chance would seem
-    smaller than it is: with `followed` each turn counts in units of what it then expects.
+    The part of the residual absorbed by parameters and initial states is missing after signs are flipped, which would
+    underestimate chance: with `followed` each flip is normalized by its expected value.
     """
     basis = orthonormal(columns)
     if basis.shape[1] == 0:
@@ -261,7 +263,7 @@ def _is_spread(answers: Answers) -> bool:
 
 
 def _growth(answers: Answers, stretches: Sequence[slice]) -> Agreement | None:
-    """Return how the size of what is left goes with how much moves: with what of several chance explains least."""
+    """Return the dependence of the size of the residual on the size of the motion: the most significant of several."""
     left = [float(np.mean(answers.seen_left[part] ** 2)) for part in stretches]
     rig = answers.context.rig
     moving: list[tuple[str, str, Sequence[Floats]]] = []

@@ -1,11 +1,12 @@
 """Is there a gap? The noise floor of each output, from the records themselves.
 
-Three ways, the first that the records allow wins: repeated periods of one input (noise and disturbance alike), stretches in
+Three methods, of which the first possible one is used: repeated periods of one input (noise and disturbance alike), stretches in
 which the input rests (sensor noise and the disturbance that passes through the rig), and the top of the spectrum, where no rig
 responds (white sensor noise only: a lower bound).
 
-An element's input is itself measured, and its noise reaches the force only while the element moves: what a force shows at rest is
-a lower bound as well: an assumption that the dampers on a bench suggested, whose forces no effect explains to that floor.
+The input of an element is itself measured, and its noise affects the force only while the element moves. So the noise of a force
+at rest is also taken as a lower bound. This assumption is based on dampers on a test bench, whose forces no effect explains down
+to that floor.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ def noise_floors(
     records
         All records of a campaign: they share their sensors.
     drifts
-        True for an axis without a spring: where it has drifted to from one period to the next is not noise.
+        True for an axis without a spring: drift from one period to the next is not noise.
     at_rest
-        False for a rig whose motion while the input rests is known to be no noise.
+        False for a rig that is known to move while the input is constant.
     """
     floors = []
     for signal in rig.outputs:
@@ -96,7 +97,7 @@ def _noise_floor(
         return scatter, "repeated periods of the input", tuple(left)
     top = float(np.median([_top_of_spectrum(record[output]) for record in records]))
     if not rig.is_driven:
-        # No mass smooths a measured force: where friction lets it jump, the jumps fill the whole spectrum.
+        # A measured force is not smoothed by a mass: jumps due to friction fill the whole spectrum.
         top = min(top, float(np.median([roughness(record[output]) for record in records])))
     quiet = [q for record in records if at_rest for q in _quiet_stretches(record, sources, output)]
     if quiet:
@@ -140,7 +141,7 @@ def _repeated(
                 settled = settled and other_settled
                 used.add(j)
         if len(group) > 1:
-            # Whole records may start in different motion; by their second half they have forgotten it.
+            # Whole records may start with different motion; it has decayed by their second half.
             start = 0 if settled else first_input.size // 2
             groups.append((np.array(group)[:, start:], dt))
     return groups
@@ -159,7 +160,7 @@ def _common_period(driven: NDArray[np.float64]) -> int | None:
 
 
 def _without_drift(group: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return answers to one input without the parabolas by which they differ: a constant force moves a free mass on one."""
+    """Return responses to one input without the parabolas by which they differ: a constant force moves a free mass along one."""
     t = np.linspace(-1.0, 1.0, group.shape[1])
     mean = np.mean(group, axis=0)
     drift = np.polynomial.polynomial.polyfit(t, (group - mean).T, 2)
@@ -174,7 +175,7 @@ def _quiet_stretches(
     span = np.ptp(samples, axis=0)
     if not np.any(span):
         return []  # what swings by itself is no noise, however little drives it
-    # A measured input is never quite still: its own noise is no motion, as long as it is small.
+    # A measured input is never exactly constant: its own noise is not motion, as long as it is small.
     noise = np.array(
         [min(roughness(column), NOTES.quiet_noise * s) for column, s in zip(samples.T, span, strict=True)]
     )
@@ -194,7 +195,7 @@ def _quiet_stretches(
         trend = abs(float(np.mean(second) - np.mean(first)))
         scatter = float(np.std(np.diff(settled))) / np.sqrt(2.0)
         deviation = float(np.std(settled))
-        # A drift or a decaying oscillation is not noise. What is as rough as white noise is no oscillation.
+        # A drift or a decaying oscillation is not noise. A signal as rough as white noise is not an oscillation.
         steady = trend <= max(3.0 * scatter, deviation) and np.std(first) <= 2.0 * np.std(second) + 1e-300
         if steady and (deviation <= 3.0 * scatter or not _is_free_motion(settled)):
             found.append((settled - np.mean(settled), record.dt))
@@ -204,7 +205,7 @@ def _quiet_stretches(
 def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int, int]:
     """Return the first and the last sample of the part at one end, the longer, in which no input has moved by so much.
 
-    Slow motion has small steps as well: a rest from which an input moves off gently ends where it has moved.
+    Slow motion also has small steps: a rest from which an input starts gently ends where it has moved.
     """
 
     def length(ordered: NDArray[np.float64]) -> int:
@@ -219,7 +220,7 @@ def _held(samples: NDArray[np.float64], moved: NDArray[np.float64]) -> tuple[int
 def _is_free_motion(samples: NDArray[np.float64]) -> bool:
     """Return True if a few exponentials (a ringing rig left alone) explain most of a stretch.
 
-    Ringing that a disturbance keeps up changes phase and amplitude with every period or so; no exponential follows it for long.
+    Ringing sustained by a disturbance changes phase and amplitude within about a period; no exponential follows it for long.
 
     References
     ----------

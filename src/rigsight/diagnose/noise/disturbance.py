@@ -1,7 +1,7 @@
-"""How large is the force that disturbs a rig, judged by what the completed model leaves?
+"""Size of the disturbance force, estimated from the residual of the completed model.
 
-A force w beside the drive moves one mass by ``H w`` with ``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0 being the
-bandwidth of an observer and 0 in a free run. What is left above the sensor's noise, divided by H, is its spectrum.
+A force w in addition to the drive moves one mass by ``H w`` with ``1 / H = k + w0^2 m - m W^2 + j W (d + sqrt(2) w0 m)``, w0
+being the bandwidth of an observer and 0 in a free run. The residual above the sensor noise, divided by H, is the spectrum of w.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SMOOTHED = 9
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A force that acts beside the drive.
+    """A disturbance force in addition to the drive.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ def disturbance(
     noise: float,
     bandwidth: float | None,
 ) -> Disturbance | None:
-    """Return the force that would leave what a model leaves; None of other rigs than one driven mass, and where noise covers it.
+    """Return the force that would cause the residual of a model; None except for one driven mass, and where noise hides it.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def disturbance(
     records
         What was scored.
     left
-        What the model leaves of the first output of each record, shape (n_samples,).
+        Residuals of the model in the first output of each record, shape (n_samples,).
     noise
         Standard deviation of the sensor's noise.
     bandwidth

@@ -1,8 +1,9 @@
-"""How well does a model explain the records, beside a force from outside and noise of any spectrum?
+"""Evidence of a model with a disturbance force and noise of any spectrum.
 
-A force from outside swings a rig at its resonances, and the error is large there whatever the model: what merely follows that
-swing gains little, what explains the records gains over all of the spectrum. So what a model leaves is taken for noise of the
-spectrum that it shows, a smooth one once the resonances of the linearized rig are divided out (prewhitening). No floor is needed.
+A disturbance force excites the resonances of a rig, where the error is then large for every model: a model that only follows
+these resonances gains little, one that explains the records gains over the whole spectrum. So the residual of a model is treated
+as noise with the spectrum of the residual, which is smooth once the resonances of the linearized rig are divided out
+(prewhitening). No noise floor is needed.
 
 References
 ----------
@@ -45,7 +46,7 @@ _FAINT, _STRONG = 1e-12, 1e3
 
 
 class Evidence:
-    """Schwarz's criterion of models of the same records, to be compared with each other.
+    """Bayesian information criterion (Schwarz) of models of the same records.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ class Evidence:
     reidentified
         The re-identified equations: their resonances are divided out.
     reference
-        The model whose remainder tells how large the forces from outside are and how large the sensors' noise.
+        The model whose residual gives the size of disturbance forces and sensor noise.
 
     Attributes
     ----------
@@ -67,12 +68,12 @@ class Evidence:
         self._context = context
         self._responses = self._of_forces(reidentified)
         self._known: dict[tuple[int, float], Floats] = {}
-        # Models are kept beside what was found, so that no other has their identity.
+        # Models are stored with the results, so that no other object can have the same identity.
         self._criteria: dict[int, tuple[Scored, float]] = {}
         self.powers = self._fitted_powers(self._remainders(reference))
 
     def criterion(self, model: Scored) -> float:
-        """Return minus twice the log-likelihood with the price of all numbers and initial states: the lower, the better."""
+        """Return minus twice the log-likelihood plus the penalty for all parameters and initial states: the lower, the better."""
         if id(model) not in self._criteria:
             self._criteria[id(model)] = (model, self._criterion(model))
         return self._criteria[id(model)][1]
@@ -94,10 +95,10 @@ class Evidence:
         return told + n_free * float(np.log(max(n_samples, 1))) + self._price_of_states(model)
 
     def gain(self, model: Scored, simpler: Scored) -> float:
-        """Return by how much a model raises the log-likelihood where noise has the spectrum that a simpler one leaves.
+        """Return the gain in log-likelihood of a model if the noise has the residual spectrum of a simpler one.
 
-        What is missing of the simpler model swells that spectrum. A model that has it leaves no more than that anywhere; one that
-        trades a slow error for a fast one loses.
+        An effect missing in the simpler model raises that spectrum. A model with this effect stays below it everywhere; a model
+        that replaces a slow error by a fast one loses.
 
         Parameters
         ----------
@@ -106,7 +107,7 @@ class Evidence:
 
         Returns
         -------
-        In nats; no number is paid for.
+        In nats, without a penalty for parameters.
         """
         gained = 0.0
         for (left, dt), (least, _) in zip(self._remainders(simpler), self._remainders(model), strict=True):
@@ -118,9 +119,9 @@ class Evidence:
         return gained
 
     def _price_of_states(self, model: Scored) -> float:
-        """Return the price of a model's initial states: of each the logarithm of the number of samples that tell of it.
+        """Return the penalty of a model's initial states: for each, the logarithm of the number of samples that inform it.
 
-        That is the entropy of their leverages, the same for all states that move the readings alike.
+        This is the entropy of their leverages, the same for all states with the same effect on the readings.
         """
         found = self._context.on_all_records(model)
         answers = answers_to_states(self._context.problem(found.structure, self._context.records), found)
@@ -128,7 +129,7 @@ class Evidence:
         return float(sum(np.sum(entr(own)) for own in leverages))
 
     def _remainders(self, model: Scored) -> list[tuple[Floats, float]]:
-        """Return what a model leaves of each record that is long enough, shape (n, n_outputs), with its sample time."""
+        """Return the residuals of a model on each record that is long enough, shape (n, n_outputs), with its sample time."""
         found = self._context.on_all_records(model).residuals
         records = self._context.records
         return [
@@ -138,7 +139,7 @@ class Evidence:
         ]
 
     def _of_forces(self, reidentified: Scored) -> Linearization | None:
-        """Return how forces at the joints move the sensors; None where the equations have no slope."""
+        """Return the responses of the sensors to forces at the joints; None where the equations cannot be linearized."""
         structure = compose(with_probes(self._context.rig), self._context.modelled)
         values = {**reidentified.fit.values, **dict(reidentified.fit.structure.fixed), PUSH_SIZE: 1.0}
         try:
@@ -162,7 +163,7 @@ class Evidence:
         return self._known[key]
 
     def _spectra(self, n_samples: int, dt: float) -> Floats:
-        """Return the expected spectrum of what is left, shape (lines, outputs)."""
+        """Return the expected spectrum of the residual, shape (lines, outputs)."""
         return np.asarray(np.einsum("kij,ij->ki", self._gains(n_samples, dt), self.powers))
 
     def _fitted_powers(self, remainders: Sequence[tuple[Floats, float]]) -> Floats:

@@ -1,7 +1,7 @@
-"""What is new at each sample of a remainder, beside what follows from the samples before?
+"""Innovations of a residual: the part of each sample that cannot be predicted from the previous samples.
 
-A disturbing force that moves a rig leaves errors that hang together over many samples, at its resonance most. Errors and answers
-through the filter that takes this away are compared as if the errors were white.
+A disturbance force causes errors that are correlated over many samples, most at the resonance. After a whitening filter, errors
+and responses are compared as if the errors were white.
 
 References
 ----------
@@ -56,7 +56,7 @@ def whitening_filter(parts: Sequence[Floats]) -> Floats:
 
 
 class Innovations:
-    """Answers and what is left through the filters that make white what fitted equations leave.
+    """Responses and residuals after whitening filters for the residuals of fitted equations.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Innovations:
     Attributes
     ----------
     followed
-        What parameters and initial states could follow of what is new.
+        Subspace of innovations that parameters and initial states could compensate.
     """
 
     def __init__(self, answers: Answers) -> None:
@@ -78,14 +78,14 @@ class Innovations:
         self.followed = Followed.of(answers.spans, by_state, self.of(answers.by_parameter))
 
     def of(self, columns: Floats) -> Floats:
-        """Return what is new at each sample of weighted and stacked readings, shape (n,) or (n, m).
+        """Return the innovations of weighted and stacked readings, shape (n,) or (n, m).
 
-        Zero where a record has no samples enough before.
+        Zero where a record has too few previous samples.
         """
         return np.concatenate([self._of_record(columns[span]) for span in self._spans])
 
     def without_free(self, columns: Floats) -> Floats:
-        """Return what is left of such columns when parameters and initial states follow."""
+        """Return such columns less what parameters and initial states could compensate."""
         return self.followed.without(columns)
 
     def _of_record(self, columns: Floats) -> Floats:

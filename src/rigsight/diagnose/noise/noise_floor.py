@@ -1,4 +1,4 @@
-"""The noise floor of an output: what no model can explain, and how that was found."""
+"""The noise floor of an output: the error that no model can explain, and how it was found."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Stretches = tuple[tuple[NDArray[np.float64], float], ...]
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Standard deviation of what no model can explain in an output, and how it was found.
+    """Standard deviation of the error that no model can explain in an output, and how it was found.
 
-    ``lower_bound`` says that only part of the noise was seen: colored noise and disturbances may stand above it. ``interval``
-    are its 95 % limits; the upper one of a lower bound is what an adequate model leaves, infinite without one. ``stretches``
-    are pieces of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise.
-    ``disturbance`` is the force that would leave what the diagnosed model leaves above this noise, where the records show one.
+    ``lower_bound`` means that only part of the noise was seen: colored noise and disturbances may exceed it. ``interval`` are its
+    95 % limits; the upper one of a lower bound is the error of an adequate model, infinite without one. ``stretches`` are pieces
+    of noise alone with their sample time [s], where the records have any; their spectrum is that of the noise. ``disturbance`` is
+    the force that would cause the error of the diagnosed model above this noise, where the records show one.
     """
 
     output: str

@@ -1,4 +1,4 @@
-"""Every number of a diagnosis that is no numerical tolerance, in one frozen object, each with its reason.
+"""Every threshold and budget of a diagnosis (except numerical tolerances) in one frozen object, each with its reason.
 
 The documentation's page "The numbers of a diagnosis" is made from it.
 """

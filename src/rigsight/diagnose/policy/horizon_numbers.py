@@ -15,84 +15,84 @@ class HorizonNumbers:
         6.0,
         "assumption",
         (
-            "Bandwidth of the closest observer, in units of the typical frequency of the velocity: the harmonics "
-            "of friction that turns with the velocity still show."
+            "Bandwidth of the fastest observer, in units of the typical frequency of the velocity: low enough that the harmonics "
+            "of friction remain visible."
         ),
     )
     observer_loose: float = number(
         0.1,
         "assumption",
-        "The same of the loosest: errors add up for ten periods.",
+        "The same for the slowest observer: errors accumulate over ten periods.",
     )
     observer_step: float = number(
         2.0,
         "budget",
-        "Factor from one observer to the next.",
+        "Ratio of the bandwidths of successive observers.",
     )
     observer_sampling: float = number(
         0.2,
         "convention",
-        "Largest bandwidth times sample time: a closer observer follows the noise of single samples.",
+        "Largest product of bandwidth and sample time: a faster observer follows the noise of single samples.",
     )
     clear_gap: float = number(
         10.0,
         "convention",
-        "Gap, in units of the noise floor, that shows its cause.",
+        "Gap, in units of the noise floor, that is large enough to show its cause.",
     )
     piece: float = number(
         4.0,
         "assumption",
         (
-            "Length of a piece, in periods of the rig, with initial states of its own: a model that is far off "
-            "stays in step with the motion for about as long."
+            "Length of a piece with its own initial state, in periods of the rig: an inaccurate model stays in phase with the "
+            "motion for about this long."
         ),
-        set_by="drawn rigs with play of a few widths: half to two periods did worse",
+        set_by="simulated random rigs with play of several widths: pieces of half to two periods were worse",
     )
     most_pieces: int = number(
         40,
         "budget",
-        "Pieces of all records for each degree of freedom: every piece has initial states of its own.",
+        "Largest number of pieces of all records per degree of freedom: every piece adds its own initial state.",
     )
     died_away: float = number(
         0.99,
         "convention",
         (
-            "Share of the squared steps of an output after which a free motion is smaller than a tenth of what it "
-            "was."
+            "Share of the sum of squared sample-to-sample changes of an output after which a free motion has decayed below a "
+            "tenth."
         ),
     )
     fewest_in_motion: int = number(
         100,
         "convention",
-        "Samples of a free motion that are kept at least.",
+        "Minimum samples of a free motion that are kept.",
     )
     rough_evaluations_of_rig: int = number(
         8,
         "budget",
-        "Evaluations of the rig's equations with other start values.",
+        "Evaluations of the rig's equations from each other set of start values.",
     )
     window_periods: float = number(
         10.0,
         "assumption",
-        "Length of a window in typical periods, where a rig drifts and no sensor shows its motion.",
+        "Length of a window in typical periods, if a rig drifts and no sensor measures its motion.",
     )
     window_samples: int = number(
         100,
         "convention",
-        "Samples of such a window at least.",
+        "Minimum samples of such a window.",
     )
     most_windows: int = number(
         40,
         "budget",
-        "Such windows of a record at most.",
+        "Maximum number of such windows per record.",
     )
     fewest_window_samples: int = number(
         60,
         "convention",
-        "Samples of a window of cycles at least.",
+        "Minimum samples of a window counted in cycles.",
     )
     crossing_above_noise: float = number(
         3.0,
         "convention",
-        "Deviation from the middle, in units of the noise, from which a crossing of it is one of the motion.",
+        "Distance from the mean, in units of the noise, that the signal must reach for a zero crossing to count as motion.",
     )

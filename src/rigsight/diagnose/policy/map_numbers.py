@@ -19,12 +19,12 @@ class MapNumbers:
     segments: int = number(
         8,
         "convention",
-        "Segments of a record whose spectra are averaged.",
+        "Number of segments of a record whose spectra are averaged.",
     )
     fewest_band_samples: int = number(
         64,
         "convention",
-        "Samples of a segment at least.",
+        "Minimum samples of a segment.",
     )
     beyond_the_input: float = number(
         1e-2,
@@ -35,19 +35,19 @@ class MapNumbers:
         1e-3,
         "convention",
         (
-            "Share of the answer's power that may lie above it: after a step the rig rings where the input has "
-            "little power."
+            "Share of the response power that may lie above this range: after a step the rig rings at frequencies where the "
+            "input has little power."
         ),
     )
     stands_out: float = number(
         4.0,
         "convention",
-        "Power over that of the noise at which a frequency counts as answered.",
+        "Ratio of response power to noise power at which a frequency counts as responding.",
     )
     rests: float = number(
         1e-3,
         "convention",
-        "Share of its size within which a signal rests.",
+        "Relative deviation within which a signal counts as constant.",
     )
     cells: int = number(
         9,
@@ -57,12 +57,12 @@ class MapNumbers:
     cutoff_margin: float = number(
         1.5,
         "convention",
-        "Factor of the highest answered frequency at which motions are smoothed.",
+        "Cutoff of the smoothing of motions, in units of the highest responding frequency.",
     )
     highest_cutoff: float = number(
         0.8,
         "convention",
-        "The same in units of the Nyquist frequency at most.",
+        "Upper limit of this cutoff, in units of the Nyquist frequency.",
     )
     filter_order: int = number(
         4,
@@ -77,25 +77,25 @@ class MapNumbers:
     fewest_stretch_samples: int = number(
         20,
         "convention",
-        "Samples of such a stretch at least.",
+        "Minimum samples of such a stretch.",
     )
     least_noise: int = number(
         250,
         "convention",
-        "Samples of noise alone below which its spectrum is not worth a guess.",
+        "Minimum samples of pure noise for an estimate of its spectrum.",
     )
     mapped_samples: int = number(
         8000,
         "budget",
         (
-            "Samples of joint motion that are followed: about a second of processor time per thousand on a drive "
-            "train."
+            "Maximum samples for which the motion of joints is reconstructed: about a second of processor time per thousand on a "
+            "drive train."
         ),
     )
     slowest_rate: float = number(
         1e-3,
         "convention",
-        "Slowest rate looked for on the lateral leg, in units of the inverse length of the longest record.",
+        "Slowest rate searched on the lateral section, in units of the inverse length of the longest record.",
     )
     fastest_rate: float = number(
         1.0,

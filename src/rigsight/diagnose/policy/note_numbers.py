@@ -1,4 +1,4 @@
-"""What is told about records and numbers beside the verdict?"""
+"""Thresholds of the notes on records and parameters."""
 
 from __future__ import annotations
 
@@ -9,55 +9,55 @@ from rigsight.diagnose.policy.number import number
 
 @dataclass(frozen=True)
 class NoteNumbers:
-    """What is told about records and numbers beside the verdict? Each field carries its reason."""
+    """Thresholds of the notes on records and parameters. Each field carries its reason."""
 
     quiet_input: float = number(
         1e-3,
         "convention",
-        "Share of its span within which an input counts as resting.",
+        "Share of its range within which an input counts as constant.",
     )
     quiet_noise: float = number(
         0.01,
         "convention",
-        "Largest noise of an input at rest, relative to its span.",
+        "Largest noise of an input at rest, relative to its range.",
     )
     quiet_deviations: float = number(
         5.0,
         "convention",
-        "Standard deviations of its noise within which the steps of a resting input stay.",
+        "Sample-to-sample changes of a resting input stay within this number of standard deviations of its noise.",
     )
     least_rest: int = number(
         100,
         "convention",
-        "Samples of rest below which it tells no noise.",
+        "Minimum samples at rest for an estimate of the noise.",
     )
     top_of_spectrum: float = number(
         0.85,
         "assumption",
-        "Share of the lines above which no rig responds.",
+        "Share of the spectral lines above which no rig responds.",
     )
     another_amplitude: float = number(
         1.2,
         "convention",
-        "Ratio from which two records have different amplitudes.",
+        "Ratio above which two records count as having different amplitudes.",
     )
     clearly: float = number(
         5.0,
         "convention",
         (
-            "Standard errors from zero at which a response or a shift counts where the residual is not white: "
-            "they take it for white."
+            "Standard errors from zero at which a response or a shift counts as significant; large, because the residual is not "
+            "white and the standard errors assume white noise."
         ),
     )
     line_chance: float = number(
         1e-3,
         "convention",
-        "Chance with which one line of two equal responses would differ as much.",
+        "Probability that one spectral line of two equal responses differs this much.",
     )
     lines_changed: float = number(
         0.15,
         "assumption",
-        "Share of independent lines that must differ: variances of sweeps may be too small on some.",
+        "Share of independent spectral lines that must differ: the variances of sweeps may be too small at some lines.",
     )
     response_change: float = number(
         0.02,
@@ -67,99 +67,97 @@ class NoteNumbers:
     fewest_lines: int = number(
         8,
         "convention",
-        "Lines below which two responses are not compared.",
+        "Minimum common spectral lines to compare two responses.",
     )
     nearly_all: float = number(
         0.8,
         "assumption",
         (
-            "Share of the gap, as power, that a shift of the time base must explain to be told: where hysteresis "
-            "delays the answer, a shift was seen to explain half."
+            "Share of the gap, as power, that a time offset must explain to be reported: with hysteresis, which delays the "
+            "response, a time offset was seen to explain half."
         ),
     )
     least_shift: float = number(
         0.2,
         "convention",
-        "Shift in sample times below which it is taken for none.",
+        "Time offset in sample times below which it is neglected.",
     )
     most_lead: int = number(
         10,
         "convention",
         (
-            "Samples by which outputs may come too early and still be told, where a search for a delay reaches "
-            "that far."
+            "Largest number of samples by which outputs can precede the input and still be found by the search for a delay."
         ),
     )
     shortest_stuck: int = number(
         20,
         "convention",
-        "Samples of one value from which a sensor counts as stuck.",
+        "Number of equal samples from which a sensor counts as stuck.",
     )
     longest_share_still: float = number(
         0.5,
         "convention",
         (
-            "A channel that stands still for longer than this in other places too is a rig at rest, not a stuck "
-            "sensor."
+            "If a channel is constant in more than this share of its samples, the rig is at rest and the sensor is not stuck."
         ),
     )
     abrupt: float = number(
         0.5,
         "convention",
-        "Step into or out of standing still, in root mean square steps, that no mass makes.",
+        "Jump at the start or end of a constant stretch, in RMS sample-to-sample changes, that is impossible for a mass.",
     )
     one_step: float = number(
         1.5,
         "convention",
-        "Least steps of a channel up to which a change is one of them.",
+        "Number of smallest increments of a channel up to which a change counts as quantization.",
     )
     fewest_levels: int = number(
         200,
         "convention",
-        "Levels over the span of a channel below which its resolution is told as coarse.",
+        "Number of levels over the range of a channel below which its resolution is reported as coarse.",
     )
     jump_size: float = number(
         0.05,
         "convention",
-        "Least size of a jump, in standard deviations of the channel.",
+        "Minimum size of a jump, in standard deviations of the channel.",
     )
     jump_contrast: float = number(
         8.0,
         "convention",
-        "Factor by which a jump exceeds what is around it.",
+        "Factor by which a jump must exceed the changes around it.",
     )
     jump_neighborhood: int = number(
         201,
         "convention",
-        "Samples around a jump that it is compared with.",
+        "Number of samples around a jump that it is compared with.",
     )
     first_told: int = number(
         3,
         "convention",
-        "Faults of one kind that a sentence lists.",
+        "Number of faults of one kind listed in a sentence.",
     )
     far_off: float = number(
         100.0,
         "convention",
         (
-            "Factor by which a number of the rig may change beside an effect before it is told: the effect has "
-            "then taken its place."
+            "Factor by which a parameter of the rig may change when an effect is added before it is reported: beyond it, the "
+            "effect has replaced the parameter."
         ),
     )
     disturbance_above: float = number(
         2.0,
         "convention",
         (
-            "Power, in units of the noise, from which a line of a disturbance is read: nine lines of white noise "
-            "reach it once in a hundred times."
+            "Power, in units of the noise, above which a spectral line counts as a disturbance: one of nine lines of white noise "
+            "reaches it with a probability of one in a hundred."
         ),
     )
     advised_amplitudes: tuple[float, ...] = number(
         (0.3, 1.0, 1.5),
         "convention",
         (
-            "Amplitudes of an advised experiment in units of the largest input that was recorded: beyond one and "
-            "a half of it, a rig may not survive the advice."
+            "Amplitudes of an advised experiment in units of the largest input that was recorded: more than 1.5 times the "
+            "largest recorded input could damage the rig."
         ),
     )
     advised_periods: float = number(

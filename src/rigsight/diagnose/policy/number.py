@@ -1,4 +1,4 @@
-"""One number that decides something, with its reason."""
+"""One threshold or budget with its reason."""
 
 from __future__ import annotations
 

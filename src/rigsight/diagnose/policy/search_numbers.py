@@ -1,4 +1,4 @@
-"""How far is searched? Budgets and the order of work; a right model that they lose is lost, a wrong one does not gain."""
+"""Budgets and order of the search. If they are too small, a right model may be missed, but a wrong one gains nothing."""
 
 from __future__ import annotations
 
@@ -14,25 +14,26 @@ class SearchNumbers:
     predictability_draws: int = number(
         4,
         "budget",
-        "Small disturbances that are simulated.",
+        "Number of small disturbances that are simulated.",
     )
     wider_starts: tuple[float, ...] = number(
         (1.0 / 3.0, 1.0, 3.0),
         "budget",
         (
-            "Factors on an effect's inner numbers beside its declared starts: a fit would move on from these, a "
-            "push cannot."
+            "Factors on the inner parameters of an effect, in addition to its declared starts: a fit could move away from its "
+            "start, the screening by a fixed force cannot."
         ),
     )
     few_starts: int = number(
         4,
         "budget",
-        "Declared starts up to which the wider ones are tried: more of them span their range by themselves.",
+        "Largest number of declared starts for which the additional factors are tried: more starts cover the range by "
+        "themselves.",
     )
     fitted_pushes: int = number(
         2,
         "budget",
-        "Pushes of each effect that are fitted, of all its starts.",
+        "Number of trial forces or signals of each effect, over all its starts, that are fitted.",
     )
     push_evaluations: int = number(
         6,
@@ -42,56 +43,56 @@ class SearchNumbers:
     push_substeps: int = number(
         4,
         "budget",
-        "Integration steps per sample of a push.",
+        "Integration steps per sample in the screening.",
     )
     look_evaluations: int = number(
         25,
         "budget",
-        "Evaluations of a first look.",
+        "Evaluations of a first fit.",
     )
     glimpse_evaluations: int = number(
         8,
         "budget",
-        "Evaluations of a glimpse, before the best go on to a first look.",
+        "Evaluations of a very short fit, from which the best go on to a first fit.",
     )
     most_starts: int = number(
         4,
         "budget",
-        "Starts that are all fitted at length.",
+        "Number of starts up to which all are fitted at length.",
     )
     lengthy_starts: int = number(
         2,
         "budget",
-        "Of more starts, those that are fitted at length in pieces, best after a glimpse first.",
-        set_by="hysteresis by sliders, five draws of noise: two to five of nine glimpses led to the best end",
+        "If there are more starts, number of those fitted at length in pieces, the best after the very short fit first.",
+        set_by="hysteresis by sliders, five draws of noise: two to five of nine very short fits led to the best result",
     )
     wide_evaluations: int = number(
         12,
         "budget",
-        "Evaluations of a look at whole records.",
+        "Evaluations of a first fit to whole records.",
     )
     near: float = number(
         25.0,
         "budget",
         (
-            "A candidate whose cost in the liveliest stretches is below this factor of the best (five times its "
-            "RMS) sees whole records."
+            "A candidate whose cost in the most excited stretches is below this factor of the best (five times its RMS) is "
+            "fitted to whole records."
         ),
     )
     alike_starts: float = number(
         1.05,
         "budget",
-        "Starts whose first looks end within this factor of the best cost are all followed.",
+        "All starts whose first fits end within this factor of the best cost are continued.",
     )
     most_restarts: int = number(
         4,
         "budget",
-        "Times that a fit which stopped short is started again.",
+        "Number of times that a fit which stopped too early is restarted.",
     )
     worth_restarting: float = number(
         1e-3,
         "budget",
-        "Share of the cost that a fit from elsewhere must remove to be followed.",
+        "Share of the cost that a fit from another start must remove to be continued.",
     )
     long_piece: float = number(
         20.0,
@@ -102,8 +103,8 @@ class SearchNumbers:
         2.0,
         "budget",
         (
-            "Mean squared error of whole records, in units of that of their liveliest stretches, at which a fit "
-            "counts as stopped short."
+            "Mean squared error of whole records, in units of that of their most excited stretches, above which a fit counts as "
+            "stopped too early."
         ),
     )
     rough_evaluations: int = number(
@@ -114,7 +115,7 @@ class SearchNumbers:
     hopeless_evaluations: int = number(
         8,
         "budget",
-        "Evaluations after which a candidate that is far off is dropped.",
+        "Evaluations after which a candidate far behind the best is dropped.",
     )
     refine_evaluations: int = number(
         150,
@@ -127,135 +128,135 @@ class SearchNumbers:
     fewest_refine_evaluations: int = number(
         15,
         "budget",
-        "The fewest that it gets.",
+        "The minimum that it gets.",
     )
     promising: float = number(
         9.0,
         "budget",
         (
-            "A candidate that costs less than this factor of the best on whole records (three times its RMS) is "
-            "followed to the end."
+            "A candidate whose cost on whole records is below this factor of the best (three times its RMS) is fitted to "
+            "convergence."
         ),
     )
     worth_following: float = number(
         0.85,
         "budget",
-        "Factor by which an effect must lower the cost at a first look to be fitted beside another.",
+        "Factor by which an effect must lower the cost at a first fit to be fitted together with another.",
     )
     most_followed: int = number(
         6,
         "budget",
-        "Effects that are fitted beside another.",
+        "Number of effects that are fitted together with another.",
     )
     near_the_best: float = number(
         2.0,
         "budget",
-        "Models that cost at most this many times the best at a first look are fitted with care.",
+        "Models whose cost is at most this factor of the best at a first fit are fitted carefully.",
     )
     both_ways: int = number(
         6,
         "budget",
-        "Most promising pairs that are looked at from the fit of the second effect as well.",
+        "Number of the most promising pairs that are also tried from the fit of the second effect.",
     )
     joint_starts: int = number(
         18,
         "budget",
-        "Starts of a pair of which no effect starts from a fit of its own, drawn where there are more.",
+        "Number of starts of a pair if neither effect starts from its own fit, drawn at random if there are more.",
     )
     most_added_steps: int = number(
         4,
         "budget",
-        "Integration steps of a first look beyond its parent's: enough for a lag of a fifth of a sample.",
+        "Additional integration steps of a first fit relative to its parent: enough for a lag of a fifth of a sample.",
     )
     beam: float = number(
         1.3,
         "budget",
         (
-            "Singles are grown if their held-out error is within this factor of the best: the simplest, and the "
-            "best that is unlike it."
+            "A second effect is added to singles whose held-out error is within this factor of the best: to the simplest, and to "
+            "the best that differs from it."
         ),
     )
     alike_pairs: float = number(
         1.01,
         "budget",
-        "Pairs within this factor of the best are fitted to the end as well.",
+        "Pairs within this factor of the best are also fitted to convergence.",
     )
     most_finished: int = number(
         2,
         "budget",
-        "Pairs, and triples, that are fitted to the end.",
+        "Number of pairs, and of triples, that are fitted to convergence.",
     )
     most_refitted: int = number(
         2,
         "budget",
-        "Pairs whose parts are fitted alone again.",
+        "Number of pairs whose effects are fitted alone again.",
     )
     most_swaps: int = number(
         2,
         "budget",
-        "Times that a more general effect is put into the best pair: once for each of its two.",
+        "Number of times that an effect of the best pair is replaced by a more general one: once for each of the two.",
     )
     finest_steps: int = number(
         4,
         "budget",
         (
-            "Integration steps per sample up to which another parent than the plainest is grown from: each "
-            "partner of a far stiffer loop would take as fine steps."
+            "Integration steps per sample up to which a second effect is added to a model other than the simplest: pairs with a "
+            "much stiffer model would need equally small steps."
         ),
     )
     most_windowed_pairs: int = number(
         3,
         "budget",
-        "Pairs that are fitted in windows: those nearest to the whole records.",
+        "Number of pairs that are fitted in windows: those with the lowest error on the whole records.",
     )
     most_asked: int = number(
         4,
         "budget",
-        "Models that are asked how predictable the motion is, and that are fitted in windows.",
-        set_by="two drawn rigs with play",
+        "Number of models that are tested for sensitivity of the motion and fitted in windows.",
+        set_by="two simulated random rigs with play",
     )
     smaller_starts: tuple[float, ...] = number(
         (1.0, 0.3),
         "budget",
         (
-            "Factors on the declared starts of an effect in windows: too large a play sticks where a small one "
+            "Factors on the declared starts of an effect in windows: a play that is too large stays stuck where a small one "
             "would not."
         ),
     )
     glimpsed_windows: int = number(
         3,
         "budget",
-        "Every so many windows are read at a first glance.",
+        "Only every n-th window is used in a very short fit.",
     )
     window_evaluations: int = number(
         10,
         "budget",
-        "Evaluations of such a glance.",
+        "Evaluations of such a fit.",
     )
     window_starts: int = number(
         2,
         "budget",
-        "Starts that are followed from there.",
+        "Number of starts that are continued from there.",
     )
     line_neighbors: int = number(
         21,
         "budget",
-        "Frequencies whose median is what a line stands out of.",
+        "Number of frequencies whose median is the background of a spectral line.",
     )
     line_cycles: int = number(
         4,
         "convention",
-        "Cycles in a record that tell a line from a drift.",
+        "Minimum cycles in a record that distinguish a spectral line from a drift.",
     )
     waves_per_line: float = number(
         4.0,
         "budget",
-        "Wave numbers tried while one more wave comes to lie on the way; a fit finds back from half of one.",
+        "Number of wave numbers tried per additional wave over the travel; a fit converges from half a wave away.",
     )
     most_waves: float = number(
         120.0,
         "budget",
-        "Waves on the way up to which lines are looked for: more of them would take as long as the fits.",
+        "Largest number of waves over the travel up to which lines are searched: more would take as long as the fits.",
     )
     most_wave_samples: int = number(
         16000,
@@ -266,21 +267,21 @@ class SearchNumbers:
         15,
         "budget",
         (
-            "Lines over which the spectrum is averaged that the others are weighed by: fewer would flatten what "
-            "is looked for."
+            "Number of lines over which the reference spectrum for whitening is averaged: fewer would flatten the line that is "
+            "searched."
         ),
     )
     lowest_line: int = number(
         2,
         "convention",
-        "First line of a spectrum over time that is used: below is drift, which initial states take.",
+        "First line of a spectrum over time that is used: lower lines are drift, which initial states absorb.",
     )
     traced_samples: int = number(
         3000,
         "budget",
         (
-            "Samples in which forces at joints are traced: they take about ten seconds of processor time per "
-            "thousand on a drive train."
+            "Number of samples in which missing forces at joints are estimated: about ten seconds of processor time per thousand "
+            "on a drive train."
         ),
     )
     offset_evaluations: int = number(
@@ -297,20 +298,20 @@ class SearchNumbers:
         3,
         "budget",
         (
-            "Nearest models that are also fitted from elsewhere; a farther one is named only if these "
-            "are lost."
+            "Number of best models that are also fitted from other starts; a model further behind is named only if these drop "
+            "out."
         ),
     )
     basin_starts: int = number(
         6,
         "budget",
-        "Starts of each of them, drawn about its fit.",
+        "Number of starts of each, drawn around its fit.",
     )
     basin_spread: float = number(
         0.3,
         "measured",
-        "Standard deviation of the logarithms of an effect's numbers at these starts.",
-        set_by="two rigs of the coverage study, seed 1: half of such starts led to the right basin",
+        "Standard deviation of the logarithms of the parameters of an effect at these starts.",
+        set_by="two rigs of the coverage study, seed 1: half of such starts led to the right minimum",
     )
     basin_evaluations: int = number(
         15,
@@ -320,5 +321,5 @@ class SearchNumbers:
     basin_finish_evaluations: int = number(
         60,
         "budget",
-        "Evaluations of the fit in a lower basin.",
+        "Evaluations of the fit in a lower minimum.",
     )

@@ -1,1 +1,1 @@
-"""How do the readings of fitted equations answer to a small push at a place?"""
+"""Responses of fitted equations to a push: a small perturbation of a joint's force, a drive or a sensor's reading."""

@@ -1,13 +1,13 @@
-"""What else could make what a model leaves? The answers of its readings to small pushes that go with one thing each.
+"""Alternatives that could cause the residual of a model: responses of its outputs to small perturbations, each of a single kind.
 
-A force that is another function of a joint's velocity or position, a drive that is another function of its signal or its change,
-another reading of a sensor, a sensor that drifts, something else that changes with time, or a number that differs from record to
-record. Functions are piecewise linear. These are the alternatives of a score test: nothing is fitted for them.
+A force as a function of a joint's velocity or position, a drive as another function of its signal or its rate, another sensor
+characteristic, a sensor that drifts, another change over time, or a parameter that differs from record to record. The functions
+are piecewise linear. These are the alternatives of a score test, so nothing needs to be fitted for them.
 
 References
 ----------
 C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50, for score tests. L. Ljung, *System Identification* (Prentice Hall 1999), section
-16.4, for judging extensions of a model by what goes with its residual.
+16.4, for judging extensions of a model by their correlation with its residual.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _TIMES = 4
 
 
 def law_columns(answers: Answers, effect: Effect) -> Floats:
-    """Return what any other law of the signals that an effect reads would change, at its place; shape (n, n_columns).
+    """Return the responses to any other law of the signals that an effect reads, at its place; shape (n, n_columns).
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
     """
     place = answers.context.rig.acts_at(effect)
     if effect.place in (Place.SENSOR, Place.ACTUATOR):
-        # What is limited or dead at once is no other form of what comes late, nor the other way round.
-        is_late = bool(effect.states) or effect.delay is not None or effect.measured_late is not None
+        # A static nonlinearity is not another form of a delay or lag, nor vice versa.
+        is_late = bool(effect.states) or effect.delay is not None or effect.reading_delay is not None
         if effect.place is Place.SENSOR:
             return (_changes_of if is_late else _readings_of)(answers, place)
         return (_signal_changes_of if is_late else _signals_of)(answers, place)
@@ -62,12 +62,12 @@ def law_columns(answers: Answers, effect: Effect) -> Floats:
 
 
 def alternatives(answers: Answers) -> Iterator[tuple[str, str, Floats]]:
-    """Yield what a remainder may go with, in words, with the place and the answers of all readings, shape (n, n_columns).
+    """Yield each possible cause of a residual in words, with the place and the responses of all readings, shape (n, n_columns).
 
     Parameters
     ----------
     answers
-        Of the equations that leave the remainder. The place is empty for what has none.
+        Of the equations with the residual. The place is empty for a cause without a place.
     """
     rig = answers.context.rig
     for joint in motion_columns(rig):

@@ -1,9 +1,9 @@
-"""How do the readings of fitted equations answer to a small push at a place, beyond what numbers and start states could follow?
+"""Responses of fitted equations to a small perturbation, less what parameters and initial states could compensate.
 
 References
 ----------
-L. Ljung, *System Identification* (Prentice Hall 1999), section 16.4, for judging extensions of a model by what goes with its
-residual.
+L. Ljung, *System Identification* (Prentice Hall 1999), section 16.4, for judging extensions of a model by their correlation with
+its residual.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ _DEPENDENT = 1e-9
 
 @dataclass(frozen=True)
 class Followed:
-    """What parameters and initial states could follow.
+    """Subspace that parameters and initial states could compensate.
 
     Attributes
     ----------
     spans
         Where each record stands in a column of all readings.
     of_states
-        Basis of what the initial states of each record could follow, shape (n_own, n_columns) each.
+        Basis of the subspace of the initial states of each record, shape (n_own, n_columns) each.
     of_parameters
-        Basis of what parameters could follow beside, shape (n, n_columns).
+        Basis of the additional subspace of the parameters, shape (n, n_columns).
     """
 
     spans: tuple[slice, ...]
@@ -69,7 +69,7 @@ class Followed:
         return replace(states, of_parameters=orthonormal(states.without(by_parameter)))
 
     def without(self, columns: Floats) -> Floats:
-        """Return what is left of columns, shape (n,) or (n, m), when parameters and initial states follow."""
+        """Return columns, shape (n,) or (n, m), after projecting out parameters and initial states."""
         left = np.array(columns, dtype=np.float64)
         for span, basis in zip(self.spans, self.of_states, strict=True):
             left[span] -= basis @ (basis.T @ left[span])
@@ -115,7 +115,7 @@ class Answers:
     effects
         Those that the equations hold beside the modelled ones.
     free
-        Parameters whose answers are told from those of a push.
+        Parameters that are projected out of the response to a push.
     """
 
     def __init__(
@@ -156,17 +156,17 @@ class Answers:
 
     @property
     def can_be_compared(self) -> bool:
-        """False where the equations are too stiff for the steps of a fit, so that no answer to a push is known."""
+        """False where the equations are too stiff for the steps of a fit, so that the response to a push is unknown."""
         return all(bool(np.all(np.isfinite(out))) for out in self.calm_outputs)
 
     @cached_property
     def seen_left(self) -> Floats:
-        """What the equations leave, weighted and stacked."""
+        """Residuals of the equations, weighted and stacked."""
         return self.stacked(self._residuals)
 
     @cached_property
     def left(self) -> Floats:
-        """The same without what parameters and initial states could follow."""
+        """The same after projecting out parameters and initial states."""
         return self.without_free(self.seen_left)
 
     @cached_property
@@ -183,7 +183,7 @@ class Answers:
         return found
 
     def seen(self, place: str) -> list[Floats]:
-        """Return what an effect at a place sees along each record: a joint's motion, a drive's signal, a sensor's reading.
+        """Return the signal that an effect at a place reads along each record: motion, drive signal or reading.
 
         A joint's motion is the measured one where the sensors tell it. An observer follows that by itself, and its velocity is
         that of the equations: between the steps of an encoder a measured one is not known.
@@ -193,7 +193,7 @@ class Answers:
         return self.simulated(place)
 
     def simulated(self, place: str) -> list[Floats]:
-        """Return the same as the equations alone have it: free of what disturbs the rig and the sensors."""
+        """Return the same from the equations alone, without disturbances and sensor noise."""
         rig = self.context.rig
         columns = {
             **{signal.name: i for i, signal in enumerate(rig.outputs)},
@@ -236,7 +236,7 @@ class Answers:
         )
 
     def without_free(self, columns: Floats) -> Floats:
-        """Return what is left of columns, shape (n,) or (n, m), when parameters and initial states follow."""
+        """Return columns, shape (n,) or (n, m), after projecting out parameters and initial states."""
         return self._followed.without(columns)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""How did the joints move in a record? As the equations say, corrected by what the sensors show beside them."""
+"""Motion of the joints in a record: that of the equations, corrected by the residuals of the sensors."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _DETERMINED = 1e-6
 
 
 class Corrections:
-    """What the motion of each joint differs from a simulation, given what the sensors' readings differ from it.
+    """Difference of each joint's motion from a simulation, computed from the differences of the sensor readings.
 
-    Only sensors that show a sum of coordinates are asked, and only where they show all degrees of freedom together.
+    Only sensors that read a sum of coordinates are used, and only if together they determine all degrees of freedom.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rigs that tell what an effect would do: an effect alone along a known motion or signal, and a rig with a push at each place."""
+"""Auxiliary rigs for the screening: an effect alone along a known motion, a rig with a push at each place."""
 
 from __future__ import annotations
 

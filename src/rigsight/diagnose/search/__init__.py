@@ -1,1 +1,1 @@
-"""Which effects, alone and together, explain what the equations leave? Screened by place, then fitted."""
+"""Which effects, alone and together, explain the residual of the equations? They are screened by place and then fitted."""

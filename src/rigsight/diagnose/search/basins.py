@@ -1,7 +1,7 @@
-"""Does a candidate's fit end in the lowest of its basins? Fits from numbers of its effects that are some way off tell.
+"""Has the fit of a candidate reached its lowest minimum? This is checked by fits from other start values of its effects.
 
-Where a mass sticks, or play is crossed, one set of numbers explains one part of the records and another one another part: the
-cost has several minima, and the one next to the declared starts need not be the lowest. Two minima are compared by chi square.
+If a mass sticks or play is crossed, one set of parameters may fit one part of the records and another set another part: the cost
+has several minima, and the one nearest to the declared starts need not be the lowest. Two minima are compared by chi square.
 
 References
 ----------
@@ -25,10 +25,10 @@ _SEED = 0
 
 
 def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return the models, the nearest of them in the lowest basin that was found.
+    """Return the models, the best of them in the lowest minimum that was found.
 
-    Each also starts from the numbers that the rig has in the nearest one: what the rig weighs does not depend on what it lacks.
-    Where a model explains the records, that is all that is tried with the others.
+    Each also starts from the rig parameters of the best one, because the mass of the rig does not depend on the missing effect.
+    If a model explains the records, nothing else is tried for the others.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def in_lowest_basins(context: FitContext, models: Sequence[Scored]) -> list[Scor
 def _on_rig_of(leader: Scored, model: Scored) -> dict[str, float]:
     """Return the numbers of a model with those of the rig as another model has them."""
     fit = model.fit
-    # What is held keeps its value: a constant force that somebody knows, beside an effect that would take it up.
+    # Held parameters keep their value, such as a known constant force beside an effect that would absorb it.
     own = {p.name for p in fit.structure.rig.parameters} & set(fit.free)
     return {**fit.values, **{name: value for name, value in leader.fit.values.items() if name in own}}
 
@@ -94,5 +94,5 @@ def _starts(model: Scored) -> list[dict[str, float]]:
 
 
 def _is_lower(one: FitResult, other: FitResult) -> bool:
-    """Return True if one cost is surely lower, in units of the variance that it leaves itself."""
+    """Return True if one cost is significantly lower, in units of its own residual variance."""
     return one.cost + VERDICT.standard_errors**2 * one.cost / max(one.n_samples, 1) < other.cost

@@ -1,14 +1,14 @@
-"""From where is a candidate worth fitting to all records with care? First looks from all its starts.
+"""From which starts is a candidate worth a careful fit to all records? Decided by short first fits from all its starts.
 
-From every start a candidate is fitted to the liveliest stretches of the records: in short pieces with initial states of their
-own, which keeps a model that is far off in step with the motion, then in one piece. Only there starts are compared: in pieces
-the right one may be the worst, as sliders that let go at a wrong sample hold a fit at a place that the next rounding moves.
-From where the best of these ended the candidate is fitted roughly to the whole records.
+From every start a candidate is fitted to the most excited stretches of the records: first in short pieces with their own initial
+states, which keeps an inaccurate model in phase with the motion, then in one piece. Starts are compared only after the second
+fit: in pieces the right one may be the worst, because sliders that slip one sample too early or late trap the fit in a local
+minimum that depends on rounding. From the best of these the candidate is fitted roughly to the whole records.
 
 References
 ----------
 H. G. Bock, in *Modelling of Chemical Reaction Systems* (Springer 1981) 102, for fits in pieces (multiple shooting, here without
-the condition that pieces join).
+continuity between the pieces).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class FirstLook:
     fits
         What was reached.
     nearest
-        Mean squared error that was reached in their liveliest stretches.
+        Mean squared error reached in the most excited stretches.
     """
 
     effects: tuple[Effect, ...]
@@ -70,7 +70,7 @@ def look_at(
     hold: frozenset[str] = frozenset(),
     substeps: Sequence[int] | None = None,
 ) -> FirstLook:
-    """Fit a set of effects to the liveliest stretches of the records, from all starts of the last effect.
+    """Fit a set of effects to the most excited stretches of the records, from all starts of the last effect.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def look_at(
     parents
         Fits with a simpler effect in place of the last, by name of that effect.
     further
-        Own values of the last effect from which it is worth trying beside its declared starts.
+        Further start values of the last effect in addition to its declared starts.
     hold
         Rig parameters to keep at their base value.
     substeps
@@ -113,7 +113,7 @@ def looked_from(
     structure: Structure,
     starts: Sequence[Mapping[str, float]],
 ) -> FirstLook:
-    """Fit a set of effects to the liveliest stretches of the records from given starts.
+    """Fit a set of effects to the most excited stretches of the records from given starts.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _looked(
     starts: Sequence[Mapping[str, float]],
     substeps: Sequence[int] | None = None,
 ) -> tuple[FitResult, ...]:
-    """Fit to the liveliest stretches: in pieces from every start, from the best places in one."""
+    """Fit to the most excited stretches: in pieces from every start, then in one piece from the best results."""
     fit = context.problem(structure, context.look, LOOK_ACCURACY)
     stretches = context.look_in_pieces
     in_pieces = context.problem(structure, [piece for parts in stretches for piece in parts], LOOK_ACCURACY)
@@ -173,7 +173,7 @@ def widened(
     substeps: Sequence[int] | None = None,
     lowest: float = float("inf"),
 ) -> list[FirstLook]:
-    """Fit those looks roughly to the whole records that came near the best one in the liveliest stretches; drop the others.
+    """Fit the first looks that came near the best one in the most excited stretches roughly to whole records; drop the others.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def widened(
     substeps
         Integration steps per sample of each record; None chooses them.
     lowest
-        Mean squared error in the liveliest stretches that a look beside these has reached.
+        Lowest mean squared error in the most excited stretches, including other looks.
     """
     lowest = min([lowest, *(look.nearest for look in looks)])
 
@@ -198,7 +198,7 @@ def widened(
 def looked_again(
     context: FitContext, settled: FitResult, starts: Sequence[Mapping[str, float]]
 ) -> tuple[FitResult, ...]:
-    """Fit from other starts than those of a candidate: to the liveliest stretches, from the best places roughly to all records.
+    """Fit from other starts than those of a candidate: to the most excited stretches, then roughly to all records.
 
     Parameters
     ----------

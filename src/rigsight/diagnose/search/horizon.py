@@ -1,4 +1,4 @@
-"""For how long must a model predict before it is compared with records? As long as the gap needs to show, where a rig drifts."""
+"""Prediction horizon for rigs that drift: as long as the gap needs to become visible."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rigsight.simulate import parameter_vector, simulate_outputs, structure_of_f
 
 
 def brings_back(campaign: Campaign) -> bool:
-    """Return True if a spring brings one mass back before the loosest observer would: weaker ones let errors of force add up."""
+    """Return True if the spring of one mass is stiffer than the slowest observer: else force errors accumulate."""
     if not (campaign.rig.has_one_motion and campaign.rig.is_driven):
         return True
     typical = 2.0 * np.pi / typical_period(campaign.rig, campaign.estimation)
@@ -35,9 +35,9 @@ def windowing_of(
 ) -> tuple[Windowing, dict[str, float]]:
     """Return how records of a rig that drifts are compared with models: by an observer.
 
-    The observer is as close as it may be while the gap is clear, so that errors do not add up for longer than is needed to see
-    it, but not so close that the noise that it follows shows in what a true model leaves. Where no sensor shows the motion by
-    itself, records are cut into windows.
+    The bandwidth of the observer is as high as possible while the gap remains clear, so that errors do not accumulate longer than
+    necessary, but not so high that the tracked noise shows in the error of a true model. If no sensor reads the motion alone,
+    records are cut into windows.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def windowing_of(
     windowing
         How they are compared.
     amplified
-        What a true model then leaves of each output's noise, in units of it; at least 1.
+        Error of a true model due to the noise, by output, in units of the noise; at least 1.
     """
     sensors = followed_sensors(campaign)
     if not sensors:
@@ -79,9 +79,9 @@ def windowing_of(
 
 
 def noise_of_following(context: FitContext, fit: FitResult) -> dict[str, float]:
-    """Return what a true model that follows noisy sensors leaves of the noise of each, in units of it.
+    """Return the error of a true model that tracks noisy sensors, by sensor, in units of the noise.
 
-    The true numbers are unknown: the larger of two, with those that were given and with the fitted ones.
+    The true parameters are unknown: the larger of two values, with the given and with the fitted parameters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""At which frequency does every record leave something, whatever drives it? A line in the spectra of what a model leaves."""
+"""Periodic disturbances: a line at the same frequency in the residual spectra of all records."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rigsight.diagnose.policy import SEARCH
 
 
 def persistent_line(residuals: Sequence[NDArray[np.float64]], dt: Sequence[float]) -> float | None:
-    """Return the angular frequency of the line that stands out most in all records alike [rad/s].
+    """Return the angular frequency of the most prominent line common to all records [rad/s].
 
-    What a wrong model leaves follows the input, sweeps through the band or is spread over it; what pulsates by itself stands at
-    one frequency in all records. The mean of the logarithms of the spectra is large only where all of them are.
+    The residual of a wrong model follows the input, sweeps through the band or is spread over it; a periodic disturbance has the
+    same frequency in all records. The mean of the logarithms of the spectra is large only where all of them are.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which places of a rig, and which effects, are worth the fits? Those whose push takes nearly as much away as the best one."""
+"""Which places of a rig and which effects are fitted? Those that explain nearly as much in the screening as the best one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigsight.effects import Effect
 
 @dataclass(frozen=True)
 class SuspectedPlace:
-    """A joint, drive or sensor, and the share of the squared residual that the best push there takes away."""
+    """A joint, drive or sensor, and the share of the squared residual that the best push there explains."""
 
     name: str
     share: float
@@ -31,9 +31,9 @@ class Search:
     effects
         Candidates that are looked at.
     shares
-        Share of the squared remainder that the best push of an effect takes away, by its name.
+        Share of the squared residual that the best push of an effect explains, by its name.
     starts
-        Own values of an effect with which its push takes most away, by its name.
+        Own values of an effect with which its push explains most, by its name.
     others
         The rest, for a gap that none of these explains.
     """
@@ -46,26 +46,26 @@ class Search:
 
     @property
     def most(self) -> float:
-        """Largest share of the squared remainder that a push takes away."""
+        """Largest share of the squared residual that a push explains."""
         return max(self.shares.values(), default=0.0)
 
 
 def search_places(context: FitContext, model: Scored, effects: Sequence[Effect]) -> Search:
-    """Return the places at which what a model leaves may arise, on a rig with one motion the effects that may make it.
+    """Return the places at which the residual of a model may arise, on a rig with one motion the effects that may cause it.
 
     Parameters
     ----------
     context
         Records, scales and noise.
     model
-        The equations that leave something, fitted.
+        The fitted equations whose residual is to be explained.
     effects
         Candidates at their places.
     """
-    # What pulsates by itself goes with no motion, so that no push along one tells of it; what comes back with the position has
-    # another form at every wave number.
+    # A periodic disturbance is independent of the motion, so that no push represents it; a position-periodic effect has another
+    # form at every wave number.
     pushing = [effect for effect in effects if not _stands_for_itself(effect)]
-    # One mass shows in seconds what goes with its motion; what tells joints apart may stand in one of the records.
+    # For one mass a few seconds of motion are sufficient; for several joints, the evidence may be in only one of the records.
     suspects = Lineup(context, model, liveliest=context.rig.has_one_motion).suspects(pushing)
     own_shares = {suspect.effect.name: suspect.share for suspect in suspects}
     most = max(own_shares.values(), default=0.0)
@@ -92,7 +92,7 @@ def search_places(context: FitContext, model: Scored, effects: Sequence[Effect])
 
 
 def _promising(effects: Sequence[Effect], shares: Mapping[str, float]) -> tuple[Effect, ...]:
-    """Return the effects whose push takes away enough, those that no push tells of, and the simpler ones that they start from."""
+    """Return the effects whose push explains enough or that no push represents, and the simpler ones from which they start."""
     enough = VERDICT.larger_part * max(shares.values(), default=0.0)
     found = [effect for effect in effects if shares.get(effect.name, enough) >= enough]
     parents = {name for effect in found for name in effect.parents}
@@ -100,7 +100,7 @@ def _promising(effects: Sequence[Effect], shares: Mapping[str, float]) -> tuple[
 
 
 def _stands_for_itself(effect: Effect) -> bool:
-    """Return True for what pulsates by itself, comes back with the position, or is no push at a joint, a drive or a sensor."""
+    """Return True for periodic and position-periodic effects, and those that are no push at a joint, a drive or a sensor."""
     return effect.pulsation is not None or effect.wave_number is not None or effect.lateral is not None
 
 

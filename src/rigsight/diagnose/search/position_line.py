@@ -1,9 +1,8 @@
-"""At which wave number does what a model leaves come back with the position? A line in its spectrum over the position.
+"""Position-periodic effects: a line in the residual spectrum over position.
 
-A force that repeats along the way has, at changing speed, no line in any spectrum over time. What a force
-``a sin(kappa s) + b cos(kappa s)`` along the measured way s does to an output is its answer by the linear equations: for each
-wave number a regression with coefficients that all records share. The lines of the highest share are where a fit is worth
-starting.
+At changing speed a force that is periodic in position has no line in a spectrum over time. The response of an output to a force
+``a sin(kappa s) + b cos(kappa s)`` along the measured position s follows from the linear equations: for each wave number, a
+regression with coefficients common to all records. Fits start from the wave numbers that explain the largest share.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ Answer = Callable[[Floats], NDArray[np.complex128]]
 
 @dataclass(frozen=True)
 class Run:
-    """The way along a record and what a model leaves there, shape (n_samples,) each; `dt` is its sample time [s]."""
+    """Position along a record and the residual of a model there, shape (n_samples,) each; `dt` is its sample time [s]."""
 
     way: Floats
     left: Floats
@@ -48,11 +47,11 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
     Parameters
     ----------
     law
-        What comes back with the position.
+        The position-periodic law.
     runs
-        Records; long ones are read in the stretch that leaves most.
+        Records; of long ones only the stretch with the largest residual is used.
     answer
-        What the output makes of it.
+        Response of the output to it.
     count
         Number of lines.
     """
@@ -77,7 +76,7 @@ def position_lines(law: Law, runs: Sequence[Run], answer: Answer, count: int = 2
 
 
 class _Spectrum:
-    """What a run leaves over frequency, and how a force along its way would look there."""
+    """Spectrum of the residual of a run, and that of a force along its position."""
 
     def __init__(self, run: Run, answer: Answer) -> None:
         n = run.way.size

@@ -22,10 +22,10 @@ _ACCURACY = 1e-5
 def growth_of_disturbances(
     context: FitContext, reidentified: Scored, model: Scored, rng: np.random.Generator
 ) -> float:
-    """Return what disturbances do to a model that would change the linear equations' motion by the noise floor.
+    """Return the effect on a model of disturbances that would change the motion of the linear equations by the noise floor.
 
-    Play and stops make another motion of a small change now and then; then even the true model leaves much of a whole record,
-    whatever its first state.
+    With play and stops a small change can lead to a different motion; then even the true model has a large error on a whole
+    record, whatever its initial state.
 
     Parameters
     ----------

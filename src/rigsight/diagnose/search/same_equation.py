@@ -1,4 +1,4 @@
-"""Which models obey the equations of a plainer one? They are left out, wherever other effects stand beside them."""
+"""Models that are equivalent to a simpler one are left out, also in combination with other effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigsight.identify import FitResult
 
 
 def without_repeated_equations(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return the models without those that say what a plainer one among them says.
+    """Return the models without those that are equivalent to a simpler one among them.
 
     Parameters
     ----------
@@ -26,10 +26,10 @@ def without_repeated_equations(context: FitContext, models: Sequence[Scored]) ->
 
 
 def _without_needless_means(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Return the models without those whose mean force nothing asks for.
+    """Return the models without those whose mean force is not needed.
 
-    An effect with a mean force, and a plainer one beside a constant force, are the same equation. Where the plainer one, beside
-    the same others, leaves the constant forces where they are known to be, it is the whole of it.
+    An effect with a mean force and a simpler one with a constant force obey the same equation. If the simpler one, with the same
+    other effects, leaves the constant forces at their known values, the mean force is not needed.
     """
     fits = {frozenset(model.names): model.fit for model in models}
 
@@ -48,7 +48,7 @@ def _without_needless_means(context: FitContext, models: Sequence[Scored]) -> li
 
 
 def _moves(context: FitContext, fit: FitResult, known: Mapping[str, float]) -> bool:
-    """Return True if a fit moves a constant force that is known: farther than others that somebody estimated are wrong."""
+    """Return True if a fit changes a known constant force by more than the errors of other given values."""
     defaults = {p.name: p.default for p in context.rig.parameters}
     estimated = {name: value for name, value in context.given.items() if value != defaults.get(name)}
     others = _moves_of(fit, {name: value for name, value in estimated.items() if name not in known})
@@ -60,7 +60,7 @@ def _moves(context: FitContext, fit: FitResult, known: Mapping[str, float]) -> b
 
 
 def _moves_of(fit: FitResult, known: Mapping[str, float]) -> dict[str, float]:
-    """Return how far a fit lies from known values, in standard errors."""
+    """Return the deviation of a fit from known values, in standard errors."""
     return {
         name: abs(fit.values[name] - value) / fit.standard_errors[name]
         for name, value in known.items()
@@ -69,10 +69,9 @@ def _moves_of(fit: FitResult, known: Mapping[str, float]) -> dict[str, float]:
 
 
 def _without_late_shifts(models: Sequence[Scored]) -> list[Scored]:
-    """Return the models without those whose shift is late where the same model with a late sensor in its place is among them.
+    """Return the models without late time shifts if the same model with a sensor delay instead is among them.
 
-    A reading that is late by its time base and one that is late by its sensor obey one equation; only an early one is surely a
-    shift.
+    A late time base and a sensor delay obey the same equation; only an early reading is certainly a time shift.
     """
     with_late_sensor = {
         _but(model, effect) for model in models for effect in model.effects if _is_late(effect)
@@ -89,7 +88,7 @@ def _without_late_shifts(models: Sequence[Scored]) -> list[Scored]:
 
 
 def _is_late(effect: Effect) -> bool:
-    return effect.measured_late is not None and not effect.shifts_the_record
+    return effect.reading_delay is not None and not effect.shifts_the_record
 
 
 def _but(model: Scored, effect: Effect) -> tuple[frozenset[str], str | None]:

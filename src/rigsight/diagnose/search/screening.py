@@ -1,9 +1,9 @@
-"""Where, before which: how much of what the equations leave would each effect at each place take away?
+"""Screening: how much of the residual of the equations would each effect at each place explain?
 
-Each effect is simulated by itself, from each of its declared starts, along the motion that the records show. The force, the drive
-or the reading that comes out is a known push on the re-identified equations at its place. Of these pushes those that go best with
-what the equations leave, to first order, are fitted: their size, the rig's parameters and the initial states move, no more. One
-kernel serves all of them, and nothing of a candidate but its law alone is compiled.
+Each effect is simulated alone, from each of its declared starts, along the measured motion. The resulting force, drive or reading
+is applied to the re-identified equations at its place as a known perturbation. Those that correlate best with the residual, to
+first order, are fitted; only their size, the parameters of the rig and the initial states are free. A single kernel serves all
+candidates; only the law of each effect itself is compiled.
 
 References
 ----------
@@ -51,16 +51,16 @@ _TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect at a place, and the share of the squared residual that a push of its form takes away.
+    """An effect at a place, and the share of the squared residual that a push of its form explains.
 
     Attributes
     ----------
     effect
         The effect.
     share
-        What the best of its pushes takes away.
+        Share explained by the best of its pushes.
     values
-        Values of its own parameters that make a push of that form and size; empty where there are none.
+        Values of its own parameters for a push of that form and size; empty where there are none.
     """
 
     effect: Effect
@@ -69,16 +69,16 @@ class Suspect:
 
 
 class Lineup:
-    """The re-identified equations along the records, and what pushes at every place do to them.
+    """The re-identified equations along the records, and their responses to pushes at every place.
 
     Parameters
     ----------
     context
         Records, scales and noise.
     model
-        The equations that leave something, fitted.
+        The fitted equations whose residual is to be explained.
     liveliest
-        Look along the liveliest stretches of the records alone.
+        Use only the most excited stretches of the records.
     """
 
     def __init__(self, context: FitContext, model: Scored, liveliest: bool = False) -> None:
@@ -93,13 +93,13 @@ class Lineup:
         self._fit = fit
         self._cost = fit.cost
         if liveliest:
-            # Numbers that suit all records need not suit stretches of them: what other numbers take away no push may claim.
+            # Parameters fitted to all records need not fit stretches of them: the gain of refitting must not count for a push.
             self._cost = min(self._cost, self._pushed(self._answers.records, self._free, 0.0).cost)
         # Known before threads ask for them side by side.
         _ = self._answers.left, self._answers.motions
 
     def suspects(self, effects: Sequence[Effect]) -> list[Suspect]:
-        """Return what each effect takes away, in their order."""
+        """Return the share that each effect explains, in their order."""
         return list(self._context.threads.side_by_side(self._suspect, list(effects)))
 
     def _suspect(self, effect: Effect) -> Suspect:
@@ -117,7 +117,7 @@ class Lineup:
         return Suspect(effect, share, _sized(effect, own, factor))
 
     def _fitted_share(self, place: str, signals: Sequence[Floats], push_size: float) -> tuple[float, float]:
-        """Return the share of the cost that goes when a push of this form, the parameters and the initial states are fitted.
+        """Return the reduction of the cost when a push of this form, the parameters and the initial states are fitted.
 
         With it the size of the push.
         """
@@ -141,7 +141,7 @@ class Lineup:
         )
 
     def _signals(self, effect: Effect) -> list[tuple[dict[str, float], list[Floats]]]:
-        """Return what an effect by itself adds along each record, from each of its starts, with its own values there."""
+        """Return the signal that an effect alone adds along each record, from each of its starts, with its own values there."""
         place = self._context.rig.acts_at(effect)
         if _is_late(effect):
             (delay,) = effect.parameters
@@ -184,7 +184,7 @@ class Lineup:
         return [out[:, load_columns(rig)[place]]] if effect.reads(canonical.load) else []
 
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
-        """Return values of the effect's own parameters from which it is worth trying, with the stiffness of its joint."""
+        """Return start values of the effect's own parameters, with the stiffness of its joint."""
         context = self._context
         composed = context.simplest((effect,))
         declared = [
@@ -222,7 +222,7 @@ class Lineup:
 
 
 def _sized(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str, float]:
-    """Return own values of an effect that makes so many times the push; as they are where that is no size it could have.
+    """Return own values of an effect with a push scaled by a factor; unchanged if the effect cannot have that size.
 
     Where an effect is absent at a value of a parameter, its force grows with the distance from there. A push the other way is the
     same effect only where its parameters may have that sign: a spring may soften, a friction cannot drive.
@@ -240,7 +240,7 @@ def _sized(effect: Effect, own: Mapping[str, float], factor: float) -> dict[str,
 def structures_of_lineup(
     rig: Rig, effects: Iterable[Effect], modelled: tuple[Effect, ...] = ()
 ) -> list[Structure]:
-    """Return what is simulated to find the place of an effect, each once.
+    """Return the structures that are simulated to find the place of an effect, each once.
 
     Parameters
     ----------
@@ -263,4 +263,4 @@ def structures_of_lineup(
 
 
 def _is_late(effect: Effect) -> bool:
-    return effect.delay is not None or effect.measured_late is not None
+    return effect.delay is not None or effect.reading_delay is not None

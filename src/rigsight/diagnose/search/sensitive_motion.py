@@ -1,7 +1,7 @@
-"""Which effect explains a motion in which chance has a part, looked at a few cycles at a time?
+"""Which effect explains a motion that is sensitive to small disturbances? Decided in windows of a few cycles.
 
-Where a disturbance no larger than the noise makes another motion in the end, not even the true model follows a whole record.
-In windows of a few cycles, each with its own initial state, it does, and a wrong one does not.
+If a disturbance as small as the noise eventually leads to a different motion, not even the true model follows a whole record. In
+windows of a few cycles, each with its own initial state, the true model does and a wrong one does not.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def is_predictable(
     at_floor: float,
     rng: np.random.Generator,
 ) -> bool:
-    """Return False if no model explains the records and in a near one chance has a part in the motion.
+    """Return False if no model explains the records and the motion of a good one is sensitive to small disturbances.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def is_predictable(
     near = [
         model for model in usable if model.error_over_noise <= VERDICT.comparable * usable[0].error_over_noise
     ][: SEARCH.most_asked]
-    # What chance makes of a disturbance can be no more than a part of what is left, where much more is left.
+    # If the residual is much larger than the effect of a disturbance, sensitivity does not explain it.
     return all(
         growth_of_disturbances(context, reidentified, model, rng)
         <= max(VERDICT.sensitive, VERDICT.larger_part * model.error_over_noise)
@@ -52,7 +52,7 @@ def is_predictable(
 
 
 def fitted_in_windows(context: FitContext, reidentified: Scored, singles: Sequence[Scored]) -> list[Scored]:
-    """Fit the nearest models in windows; the others are only scored there, with the numbers that they have.
+    """Fit the best models in windows; the others are only scored there, with the parameters that they have.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Which effect causes the gap: every candidate fitted to the estimation records and scored on the validation records.
 
-Each candidate gets a first look. Those that come near the best there are fitted with care, the best of them to full precision.
+Each candidate gets a first fit. Those near the best are fitted carefully, the best of them to full precision.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _HOPELESS_TOLERANCE = 1e-2
 def reidentify(context: FitContext, start: Mapping[str, float]) -> Scored:
     """Re-identify the equations without an effect.
 
-    From numbers that a regression found, or from those of the given simulation where a rig with these cannot be simulated: a
-    coordinate that no sensor reads leaves the regression some of them open.
+    Starts from the parameters of a regression, or from those of the given simulation if the rig cannot be simulated with the
+    former: the regression does not determine all parameters if no sensor reads a coordinate.
     """
     structure = context.composed()
     problem, free = context.problem(structure, context.estimation), context.free_parameters(structure)
@@ -96,7 +96,7 @@ def fit_candidates(
 
 
 def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> Scored:
-    """Fit a candidate from where it is nearly absent: its equations are those of the base there, so that none need be worse."""
+    """Fit a candidate from nearly zero effect, where its equations equal those of the base, so that it cannot end worse."""
     structure, (effect,) = look.structure, look.effects
     start = next(start_values(context, structure, effect, base, {}))
     faint = {
@@ -104,7 +104,7 @@ def _from_hardly_any(context: FitContext, look: FirstLook, base: FitResult) -> S
         for p in effect.parameters
         if p.null is not None
     }
-    # A constant force that is held where somebody knows it stays there.
+    # A constant force that is held at its known value stays there.
     known = context.constant_forces_beside(look.effects)
     begin = replace(base, values={**start, **base.values, **faint, **known})
     return _fitted(context, look.effects, structure, look.free, (begin,), promising=False)
@@ -163,7 +163,7 @@ def fit_candidate(
 
 
 def refine(context: FitContext, models: Sequence[Scored]) -> list[Scored]:
-    """Fit those models to full precision whose held-out error is close to the best; the best of them to the end."""
+    """Fit models with a held-out error close to the best to full precision, the best of them to convergence."""
     best = min((m.error_over_noise for m in models), default=float("inf"))
 
     def one(model: Scored) -> Scored:
@@ -206,7 +206,7 @@ def _refined(context: FitContext, model: Scored, max_evaluations: int) -> Scored
 
 
 def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool = True) -> Scored:
-    """Fit a looked-at candidate to all records: with care if it is promising, else only to place it in the ranking.
+    """Fit a candidate to all records after its first look: carefully if it is promising, else only to rank it.
 
     `finish` is False where many are followed of which only the best are worth fits from elsewhere and more free numbers.
     """
@@ -215,7 +215,7 @@ def followed(context: FitContext, look: FirstLook, promising: bool, finish: bool
 
 
 def finished(context: FitContext, scored: Scored) -> Scored:
-    """Fit on from elsewhere, and with exponents and constant forces free that were fixed so far, where that helps."""
+    """Continue the fit from other starts, and with exponents and constant forces freed, where that helps."""
     scored = restarted(context, scored)
     fixed = scored.fit.structure.fixed
     names = [
@@ -232,7 +232,7 @@ def finished(context: FitContext, scored: Scored) -> Scored:
 
 
 def restarted(context: FitContext, settled: Scored) -> Scored:
-    """Fit from the places to which its effects say that a fit may have to be moved, for as long as that lowers the cost."""
+    """Restart the fit from values suggested by its effects, as long as that lowers the cost."""
     structure, free = settled.fit.structure, settled.fit.free
     for _ in range(SEARCH.most_restarts):
         if settled.error_over_noise <= VERDICT.exact:

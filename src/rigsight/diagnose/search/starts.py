@@ -29,7 +29,7 @@ def start_values(
     base: FitResult,
     parents: Mapping[str, FitResult],
 ) -> Iterator[dict[str, float]]:
-    """Yield values of all parameters from which a fit with `effect` is worth trying.
+    """Yield start values of all parameters for a fit with `effect`.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _plain_starts(
 
 
 def restart_values(structure: Structure, effect: Effect, fit: FitResult) -> Iterator[dict[str, float]]:
-    """Yield values from which a fit with `effect` is worth trying once more, where it may have stopped beside the best one.
+    """Yield further start values for a fit with `effect` that may have stopped in a local minimum.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def with_own_values(
 
 
 def sized(value: float, null: float, factor: float) -> float:
-    """Return a value of a parameter that makes its effect so many times as large as another one.
+    """Return the value of a parameter that scales its effect by a factor relative to another value.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def sized(value: float, null: float, factor: float) -> float:
     null
         Where the effect is absent.
     factor
-        Not zero; a negative one turns the effect around.
+        Not zero; a negative one reverses the effect.
     """
     return null + factor * (value - null) if abs(null) < _ENDLESS else value / factor
 

@@ -1,4 +1,4 @@
-"""From which wave numbers is an effect that comes back with the position worth fitting? From the lines that the records show."""
+"""Start values of the wave number of position-periodic effects, from lines in the residual spectra."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DAMPING_RATIO = 0.5
 
 
 def wave_starts(context: FitContext, effect: Effect, base: FitResult) -> Iterator[dict[str, float]]:
-    """Yield an effect's own values at the lines over the position that a fit without it leaves.
+    """Yield an effect's own values at the position-periodic lines in the residual of a fit without it.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def _law(effect: Effect) -> tuple[list[str], Law]:
 
 
 def _runs(context: FitContext, effect: Effect, base: FitResult) -> tuple[list[Run], float]:
-    """Return the way that an effect sees along each record with what is left there, and the sign of what it adds."""
+    """Return the position that an effect reads along each record with the residual there, and the sign of its contribution."""
     rig = context.rig
     outputs = [signal.name for signal in rig.outputs]
     if effect.place is Place.SENSOR or rig.has_one_motion:
@@ -87,7 +87,7 @@ def _runs(context: FitContext, effect: Effect, base: FitResult) -> tuple[list[Ru
 
 
 def _answer(context: FitContext, effect: Effect, base: FitResult) -> Answer:
-    """Return the answer of what is left to a force at the effect's joint; 1 for a sensor's error or a force that is measured."""
+    """Return the response of the residual to a force at the effect's joint; 1 for a sensor error or a measured force."""
     rig = context.rig
     if effect.place is Place.SENSOR or not rig.is_driven:
         return lambda omega: np.ones(omega.size, dtype=np.complex128)

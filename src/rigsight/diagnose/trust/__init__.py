@@ -1,1 +1,1 @@
-"""Can the numbers of the verdict's model be trusted? Estimated again by record, amplitude, constant and window, and compared."""
+"""Trust in parameters: estimated again by record, amplitude, constant and window."""

@@ -1,4 +1,4 @@
-"""Which numbers does the fit move together, so that one makes up for the other?"""
+"""Which parameters are strongly correlated, so that one compensates for the other?"""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigsight.identify import FitResult
 
 
 def entangled(fit: FitResult) -> tuple[Entangled, ...]:
-    """Return the pairs of numbers whose errors go together, the closest first.
+    """Return the pairs of parameters with correlated errors, the highest correlation first.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ def _text(fit: FitResult, names: tuple[str, str], block: np.ndarray, correlation
             together = float(np.sqrt(max(relative[0, 0] + relative[1, 1] - 2.0 * sign * relative[0, 1], 0.0)))
             what = f"ratio {first}/{second}" if sign > 0.0 else f"product {first}*{second}"
             return (
-                f"{first} and {second} are known as the {what} ({_percent(together)}); each alone only to "
+                f"{first} and {second} are determined only as the {what} ({_percent(together)}); each alone only to "
                 f"{_percent(float(max(alone)))}."
             )
     freer = 1.0 / np.sqrt(max(1.0 - correlation**2, 1e-12))
     return (
-        f"{first} and {second} are hardly told apart (correlation {correlation:.4f}): if one were known, the other would be "
-        f"{freer:.2g} times surer."
+        f"{first} and {second} can hardly be separated (correlation {correlation:.4f}): if one were known, the standard error of "
+        f"the other would be {freer:.2g} times smaller."
     )
 
 

@@ -1,4 +1,4 @@
-"""Which numbers do some records or windows alone speak for, and how sure is that? One Gauss-Newton step from the common fit.
+"""Estimates from some records or windows alone, with their uncertainty: one Gauss-Newton step from the common fit.
 
 References
 ----------
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimates:
-    """Numbers as some pieces alone have them.
+    """Parameters estimated from some pieces alone.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Estimates:
 
 
 def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
-    """Return the numbers that some pieces speak for.
+    """Return the parameters estimated from some pieces.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: ND
     spectra
         Of the noise of each record.
     kept
-        Which numbers are estimated; the others stand at the common fit, shape (n_free,).
+        Which parameters are estimated; the others are held at the common fit, shape (n_free,).
     """
     inverse, infinite = _inverse(of, some, kept)
     away = -inverse @ sum((piece.rows.T @ piece.residuals for piece in some), start=np.zeros(len(of.free)))
@@ -71,7 +71,7 @@ def estimates(of: Pieces, some: Sequence[Piece], spectra: NoiseSpectra, kept: ND
 
 
 def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: NDArray[np.bool_]) -> Estimates:
-    """Return how windows, pooled, differ from the whole records that they are made of (Hausman).
+    """Return the difference between pooled windows and the whole records that they cover (Hausman).
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def beyond(of: Pieces, windows: Sequence[Piece], spectra: NoiseSpectra, kept: ND
     spectra
         Of the noise of each record.
     kept
-        Which numbers are estimated; the others stand at the common fit, shape (n_free,).
+        Which parameters are estimated; the others are held at the common fit, shape (n_free,).
 
     References
     ----------
@@ -125,10 +125,10 @@ def mean(several: Sequence[Estimates]) -> Estimates:
 
 
 def told_by_most(of: Pieces, groups: Sequence[Sequence[Piece]]) -> NDArray[np.bool_]:
-    """Return which numbers most groups determine by themselves once the others are held at the common fit, shape (n_free,).
+    """Return which parameters most groups determine alone when the others are held at the common fit, shape (n_free,).
 
-    A number that follows another in most groups, as the two terms of a friction do under one load, takes no part; the other then
-    tells of both.
+    A parameter that is equivalent to another in most groups, such as the two terms of a friction under a single load, is left
+    out; the other then represents both.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def told_by_most(of: Pieces, groups: Sequence[Sequence[Piece]]) -> NDArray[np.bo
 
 
 def _loosest(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> int | None:
-    """Return the number that takes the largest part in what pieces do not determine; None where they determine all."""
+    """Return the parameter with the largest part in the undetermined directions of pieces; None if there are none."""
     normal = _normal(of, some)[np.ix_(kept, kept)]
     if not np.any(np.isinf(np.diag(sandwich_covariance(normal, normal, of.derivative_error)))):
         return None
@@ -174,7 +174,7 @@ def _inverse(of: Pieces, some: Sequence[Piece], kept: NDArray[np.bool_]) -> tupl
 
 
 def _widened(of: Pieces, variances: Floats, unknown: NDArray[np.bool_]) -> Floats:
-    """Return variances that allow for the accuracy of the simulations in a fit; infinite where nothing is known."""
+    """Return variances that include the accuracy of the simulations in a fit; infinite where nothing is known."""
     return np.where(unknown, np.inf, variances + (DEFAULT_ACCURACY * of.values) ** 2)
 
 

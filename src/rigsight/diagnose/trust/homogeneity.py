@@ -1,11 +1,11 @@
-"""Is a number the same in every group, and if not, does it grow or fall in an order of the groups?
+"""Is a parameter the same in every group, and if not, does it rise or fall with an ordering of the groups?
 
 References
 ----------
 W. G. Cochran, J. R. Stat. Soc. Suppl. 4 (1937) 102, for the test of homogeneity by weighted squares. B. L. Welch, Biometrika 38
 (1951) 330, for the same where the variances are estimated, each with its degrees of freedom. S. Holm, Scand. J. Stat. 6 (1979)
 65, for several tests. R. E. Barlow, D. J. Bartholomew, J. M. Bremner and H. D. Brunk, *Statistical Inference under Order
-Restrictions* (Wiley 1972), for the best monotonic course.
+Restrictions* (Wiley 1972), for the best monotonic trend.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spread:
-    """How a number differs between groups.
+    """Difference of a parameter between groups.
 
     Attributes
     ----------
     p_value
-        Probability of such differences where the number is the same in all.
+        Probability of such differences if the parameter is the same in all.
     largest
-        The largest difference from the mean of all groups, in standard errors of that difference; where these are known from few
-        degrees of freedom, as many as make it as rare.
+        The largest difference from the mean of all groups, in standard errors of that difference; with few degrees of freedom,
+        the equivalent number of standard errors with the same probability.
     """
 
     p_value: float
@@ -43,7 +43,7 @@ class Spread:
 
 
 def spread(values: Floats, variances: Floats, freedom: Floats) -> Spread:
-    """Return how values of one number differ between groups.
+    """Return the differences of one parameter between groups.
 
     Parameters
     ----------
@@ -62,12 +62,12 @@ def spread(values: Floats, variances: Floats, freedom: Floats) -> Spread:
 
 
 def standard_errors(ratio: float, freedom: float) -> float:
-    """Return how many errors of a known variance are as rare as this many of an estimated one (Student)."""
+    """Return the number of known standard errors with the same probability as this number of estimated ones (Student)."""
     return float(-norm.ppf(np.maximum(t_distribution.sf(ratio, freedom), np.finfo(float).tiny)))
 
 
 def adjusted(p_values: Sequence[float]) -> list[float]:
-    """Return p-values that allow for their number (Holm): below a level only where the family is, with that probability."""
+    """Return p-values adjusted for multiple tests (Holm)."""
     order, found, largest = np.argsort(p_values), [1.0] * len(p_values), 0.0
     for rank, index in enumerate(order):
         largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[int(index)]))
@@ -77,14 +77,14 @@ def adjusted(p_values: Sequence[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class Course:
-    """How a number goes along a quantity.
+    """Trend of a parameter with a quantity.
 
     Attributes
     ----------
     direction
-        1 where it grows, -1 where it falls, 0 where it does neither.
+        1 if it rises, -1 if it falls, 0 otherwise.
     left
-        Weighted squares that the best monotonic course leaves.
+        Weighted sum of squares about the best monotonic trend.
     """
 
     direction: int
@@ -92,7 +92,7 @@ class Course:
 
 
 def course(values: Floats, variances: Floats, along: Floats) -> Course:
-    """Return whether values of one number grow or fall along a quantity.
+    """Return whether values of one parameter rise or fall with a quantity.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Along what may a number change from record to record? Amplitude, constants of the records, and the order of the records."""
+"""Quantities with which a parameter may change between records: amplitude, constants, order in time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Order:
     Attributes
     ----------
     pattern
-        What a number does that goes along it.
+        Pattern of a parameter that changes with it.
     name
         In words, such as ``"amplitude"`` or the name of a constant.
     unit
@@ -37,7 +37,7 @@ class Order:
 
 
 def orders(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) -> tuple[Order, ...]:
-    """Return the quantities by which records differ; first what was set, the order of the records last.
+    """Return the quantities by which records differ; set values first, the order of the records last.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def orders(rig: Rig, records: Sequence[Record], constants: Mapping[str, float]) 
 
 
 def _amplitudes(rig: Rig, records: Sequence[Record]) -> Order:
-    """Return the stated amplitude of each record where all state one, else its measured one in levels."""
+    """Return the stated amplitude of each record if all have one, else the measured one, grouped in levels."""
     moving = [s for s in rig.inputs if all(s.name in r and np.ptp(r[s.name]) > 0.0 for r in records)]
     # A free motion has no amplitude but its own.
     outputs = {signal.name: signal for signal in rig.outputs}
@@ -84,5 +84,5 @@ def _amplitudes(rig: Rig, records: Sequence[Record]) -> Order:
 
 
 def _told(unit: str) -> str:
-    """Return a unit as it stands behind a number; an axis calls the unit of its input just that."""
+    """Return a unit as written behind a number; the unit of an axis' input is called "input"."""
     return "" if unit in ("input", "1") else unit

@@ -1,12 +1,13 @@
-"""What does it point to where a number is not the same everywhere? Pattern -> likely cause -> next experiment.
+"""What does it mean if a parameter is not the same everywhere? Pattern -> likely cause -> next experiment.
 
-Causes are likely ones, not proven: the table says what most often makes a number of a wrong or incomplete model differ like that.
+Causes are likely, not proven: the table gives the most frequent reason why a parameter of a wrong or incomplete model differs in
+this way.
 
 References
 ----------
-A. Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions and Nonlinear System Design* (McGraw-Hill 1968): stiffness
-and damping that a linear model needs where a law bends, as functions of the amplitude. Coulomb friction acts as a damping
-4 T_c / (pi omega A), quadratic damping as one that grows with omega A, a clearance g as a spring that is absent below g.
+A. Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions and Nonlinear System Design* (McGraw-Hill 1968): equivalent
+stiffness and damping of nonlinear laws as functions of the amplitude. Coulomb friction acts as a damping 4 T_c / (pi omega A),
+quadratic damping as one that grows with omega A, a clearance g as a spring that is absent below g.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from rigsight.rigs import Rig
 
 
 class Pattern(StrEnum):
-    """How a number differs."""
+    """Pattern in which a parameter differs."""
 
     STABLE = "stable"
     AMPLITUDE = "with amplitude"
@@ -33,7 +34,7 @@ class Pattern(StrEnum):
 
 
 class Role(StrEnum):
-    """What a number is in the equations."""
+    """Role of a parameter in the equations."""
 
     DAMPING = "damping"
     STIFFNESS = "stiffness"
@@ -46,14 +47,14 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a pattern points to.
+    """Likely meaning of a pattern.
 
     Attributes
     ----------
     cause
         Likely cause, a main clause without a full stop.
     experiment
-        What would tell, a sentence.
+        The experiment that would decide, a sentence.
     """
 
     cause: str
@@ -69,41 +70,42 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
         "damping depends on the motion: dry friction is missing, or has another form", _LADDER
     ),
     (Pattern.AMPLITUDE, Role.DAMPING, 1): Meaning(
-        "damping depends on the motion: one that grows with speed or displacement is missing, or has another form",
+        "damping depends on the motion: damping that grows with speed or displacement is missing, or has another form",
         _LADDER,
     ),
-    # Within the sliding range a spring of hysteresis or presliding lets go.
+    # In the sliding range the spring of a hysteresis or of presliding friction slips.
     (Pattern.AMPLITUDE, Role.STIFFNESS, -1): Meaning(
         "stiffness depends on the motion: a softening spring, hysteresis or presliding friction is missing, or has another form",
         _LADDER,
     ),
-    # A clearance takes the spring away from small motions.
+    # Within a clearance the spring does not act on small motions.
     (Pattern.AMPLITUDE, Role.STIFFNESS, 1): Meaning(
         "stiffness depends on the motion: a hardening spring, an end stop or free play is missing, or has another form",
         _LADDER,
     ),
     (Pattern.AMPLITUDE, Role.DRIVE, -1): Meaning(
-        "the drive gives less than in proportion: a saturation is missing, or has another form",
+        "the output of the drive grows less than its input: a saturation is missing, or has another form",
         "Record steps of the input up to its largest value.",
     ),
     (Pattern.AMPLITUDE, Role.DRIVE, 1): Meaning(
-        "the drive gives more than in proportion: a dead zone or dry friction is missing, or has another form",
-        "Record slow steps of the input from its smallest value on.",
+        "the output of the drive grows more than its input: a dead zone or dry friction is missing, or has another form",
+        "Record slow steps of the input, starting from its smallest value.",
     ),
     (Pattern.AMPLITUDE, Role.EFFECT, None): Meaning(
-        "the effect has not quite the form of the rig's: its equation answers otherwise to amplitude", _LADDER
+        "the equation of the effect does not quite fit the rig: it depends on amplitude in another way",
+        _LADDER,
     ),
-    # No mass depends on the amplitude: it makes up for a law that does.
+    # A mass does not depend on the amplitude: it compensates for a law that does.
     (Pattern.AMPLITUDE, None, None): Meaning(
-        "it makes up for something that depends on the motion and is missing or has another form", _LADDER
+        "it compensates for an effect that depends on the motion and is missing or has another form", _LADDER
     ),
-    # What a load presses on rubs: the constant stands in a place where the equations do not have it.
+    # A load increases friction: the constant acts at a place where the equations do not contain it.
     (Pattern.CONSTANT, Role.DAMPING, None): Meaning(
-        "friction depends on it, as that of a loaded joint does, and the equations do not say so",
+        "friction depends on it, like the friction of a loaded joint, which the equations do not include",
         "Record three values of it with the same input.",
     ),
     (Pattern.CONSTANT, Role.EFFECT, None): Meaning(
-        "the effect depends on it, as the friction of a loaded joint does, and its equation does not say so",
+        "the effect depends on it, like the friction of a loaded joint, which its equation does not include",
         "Record three values of it with the same input.",
     ),
     (Pattern.CONSTANT, None, None): Meaning(
@@ -112,31 +114,31 @@ _MEANINGS: Mapping[tuple[Pattern, Role | None, int | None], Meaning] = {
     ),
     (Pattern.TIME, Role.OFFSET, None): Meaning("a zero drifts from record to record", _REPEAT),
     (Pattern.TIME, None, None): Meaning(
-        "something changes slowly that is not recorded, such as temperature or wear", _REPEAT
+        "something unrecorded changes slowly, such as temperature or wear", _REPEAT
     ),
     (Pattern.RECORD, Role.OFFSET, None): Meaning(
         "the zero of a sensor or a constant load differs from record to record",
         'Write offsets = "per_record" in campaign.toml, or record a rest before each run.',
     ),
     (Pattern.RECORD, None, None): Meaning(
-        "something changes that is not recorded, such as temperature, load or mounting",
-        "Record one input several times without touching the rig, then again after mounting it anew.",
+        "something unrecorded changes, such as temperature, load or mounting",
+        "Record one input several times without touching the rig, then again after remounting it.",
     ),
     # Along a sweep frequency changes with time, along a decay amplitude does.
     (Pattern.PORTION, None, None): Meaning(
         "it depends on what changes along a record: the frequency of a sweep, the amplitude of a decay, or warming up",
-        "Record the same input backwards: what goes with time stays, what goes with frequency turns round.",
+        "Record the same input reversed in time: a dependence on time stays, a dependence on frequency reverses.",
     ),
     # A window's own initial state takes up what is slow.
     (Pattern.WINDOW, None, None): Meaning(
-        "slow errors of the model are absorbed in it where records are long: a drift, a disturbance or a slow effect is missing",
-        "Trust the short windows for this number, and record the slow part alone: very slow motion, or rest after a step.",
+        "in long records it absorbs slow errors of the model: a drift, a disturbance or a slow effect is missing",
+        "Trust the value from short windows, and record the slow part separately: very slow motion, or rest after a step.",
     ),
 }
 
 
 def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
-    """Return what a pattern points to, the most special entry first; None where nothing differs.
+    """Return the likely meaning of a pattern, from the most specific entry; None where nothing differs.
 
     Parameters
     ----------
@@ -145,7 +147,7 @@ def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
     role
         What it is in the equations.
     direction
-        1 where it grows, -1 where it falls, 0 where it does neither.
+        1 if it rises, -1 if it falls, 0 otherwise.
     """
     for known_role, known_direction in ((role, direction), (role, None), (None, None)):
         found = _MEANINGS.get((pattern, known_role, known_direction))
@@ -155,7 +157,7 @@ def meaning(pattern: Pattern, role: Role, direction: int) -> Meaning | None:
 
 
 def roles(rig: Rig, effects: Iterable[str]) -> dict[str, Role]:
-    """Return what each number is in the equations.
+    """Return the role of each parameter in the equations.
 
     Parameters
     ----------

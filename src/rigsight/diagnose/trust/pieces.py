@@ -1,12 +1,12 @@
-"""What does each record, and each window of it, say of the fitted numbers? One linearization at the common fit.
+"""Information of each record, and of each window of it, on the fitted parameters, linearized at the common fit.
 
-With the initial state of a window free, what its residual says of the numbers is what is left of residual and derivatives when
-that state has followed both (Frisch and Waugh): normal equations of a piece then add up to those of any group of pieces.
+The free initial state of a window is projected out of residual and derivatives (Frisch and Waugh); the normal equations of pieces
+then add up to those of any group of pieces.
 
 References
 ----------
-R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for free numbers of a piece's own. L. Ljung, *System Identification*
-(Prentice Hall 1999), chapter 9, for the covariance beside colored residuals.
+R. Frisch and F. V. Waugh, Econometrica 1 (1933) 387, for projecting out free parameters of a piece. L. Ljung, *System
+Identification* (Prentice Hall 1999), chapter 9, for the covariance beside colored residuals.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ class Piece:
     place
         Which window of it, counted from 0, and of how many.
     rows
-        Derivatives without what its initial state follows, shape (n_measured * n_samples, n_free).
+        Derivatives after projecting out its initial state, shape (n_measured * n_samples, n_free).
     residuals
-        Left of the residuals likewise, shape (n_measured * n_samples,): of a whole record at the common numbers, of a window at
-        those of its record alone, as records that differ are no matter of windows.
+        Residuals after the same projection, shape (n_measured * n_samples,): of a whole record at the common parameters, of a
+        window at those of its record alone, so that differences between records do not affect windows.
     noise
-        Left of the residuals when numbers and state of this piece alone follow, same shape.
+        Residuals after projecting out parameters and state of this piece, same shape.
     n_measured
-        Outputs that stand one after the other.
+        Number of stacked outputs.
     n_own
-        Numbers that follow in it: free parameters and initial states.
+        Number of projected parameters: free parameters and initial states.
     """
 
     record: str
@@ -75,9 +75,9 @@ class Pieces:
     values
         Of the common fit, shape (n_free,).
     place
-        The same in the coordinates in which rows are counted, shape (n_free,).
+        The same in the coordinates of the rows, shape (n_free,).
     coordinates
-        From there to the values.
+        Conversion from coordinates to values.
     derivative_error
         Relative error of the rows.
     whole
@@ -85,7 +85,7 @@ class Pieces:
     cut
         Number of windows in a record -> the windows of all records; without those too short.
     portions
-        Number of windows in each record from which something may be read of each, 1 where they are too short for that.
+        Number of windows in each record that can be evaluated individually, 1 where they are too short.
     """
 
     free: tuple[str, ...]
@@ -99,7 +99,7 @@ class Pieces:
 
 
 def pieces(context: FitContext, model: Scored) -> Pieces | None:
-    """Return what records and their windows say; None where the model cannot be simulated in one of them.
+    """Return the information of records and their windows; None where the model cannot be simulated in one of them.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
         own.append(alone)
     values = np.array([fit.values[name] for name in free])
     made = Pieces(free, values, found.place, found.coordinates, found.error, tuple(whole), {})
-    # The memory with which a window begins sticks and slips: no straight line tells what it does.
+    # The initial state of a hysteresis sticks and slips: its effect is not linear.
     remembers = bool(np.any(context.problem(fit.structure, records[:1]).data.limited))
     if remembers or any(WINDOW in record.name for record in records):
         return made
@@ -150,7 +150,7 @@ def pieces(context: FitContext, model: Scored) -> Pieces | None:
 
 
 def pseudo_inverse(rows: Floats) -> Floats:
-    """Return what makes numbers of residuals by least squares, shape (n_free, n); nothing in directions that rows do not tell.
+    """Return the pseudoinverse that maps residuals to parameters, shape (n_free, n); zero in undetermined directions.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _in_windows(
     whole: Piece,
     common: Floats,
 ) -> tuple[Piece, ...] | None:
-    """Return the windows of a record with what they say beyond the whole record's own numbers."""
+    """Return the windows of a record, evaluated at the parameters of the whole record."""
     problem = context.problem(alone.structure, windows)
     started = problem.fit(
         alone.values, [], max_evaluations=TRUST.state_evaluations, tolerance=_TOLERANCE, finish=False

@@ -1,4 +1,4 @@
-"""What is known of the trust that each number deserves, as data: values by group, p-value, pattern and what it points to."""
+"""Result of the trust analysis as data: for each parameter values by group, p-value, pattern and likely cause."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigsight.diagnose.trust.patterns import Meaning, Pattern
 
 @dataclass(frozen=True)
 class GroupValue:
-    """A number as one group alone has it.
+    """A parameter estimated from one group alone.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class GroupValue:
 
 @dataclass(frozen=True)
 class ParameterTrust:
-    """How far one number can be trusted.
+    """Trust in one parameter.
 
     Attributes
     ----------
@@ -41,17 +41,18 @@ class ParameterTrust:
         True for a number of an effect, False for one of the rig.
     groups
         Values by kind of group: ``"record"``, ``"amplitude"``, a constant by name, ``"portion"``, ``"window"``. Groups that do
-        not determine it by themselves are left out.
+        not determine it alone are left out.
     p_value
-        Probability of such differences, all tests of all numbers allowed for, where it is the same everywhere.
+        Probability of such differences if it is the same everywhere, adjusted for all tests of all parameters.
     largest
         Largest difference between groups, in standard errors of that difference.
     pattern
         How it differs.
     direction
-        1 where it grows along `goes_with`, -1 where it falls, else 0.
+        1 if it rises with `goes_with`, -1 if it falls, else 0.
     goes_with
-        With what it goes: ``"amplitude"``, the name of a constant, ``"time"``; of several that cannot be told apart all of them.
+        What it changes with: ``"amplitude"``, the name of a constant, ``"time"``; if several cannot be distinguished, all of
+        them.
     points_to
         Likely cause and next experiment; None where it is stable.
     """
@@ -71,7 +72,7 @@ class ParameterTrust:
 
     @property
     def stable(self) -> bool:
-        """True where nothing contradicts that it is the same everywhere."""
+        """True if nothing contradicts that it is the same everywhere."""
         return self.pattern in (Pattern.STABLE, Pattern.UNKNOWN)
 
     @property
@@ -82,7 +83,7 @@ class ParameterTrust:
 
 @dataclass(frozen=True)
 class Entangled:
-    """Two numbers that a fit moves together.
+    """Two strongly correlated parameters.
 
     Attributes
     ----------
@@ -91,7 +92,7 @@ class Entangled:
     correlation
         Of their errors.
     text
-        What is known of them, a sentence.
+        Description, a sentence.
     """
 
     names: tuple[str, str]
@@ -101,7 +102,7 @@ class Entangled:
 
 @dataclass(frozen=True)
 class Trust:
-    """Whether the numbers of the verdict's model are the same wherever they are estimated.
+    """Whether the parameters of the diagnosed model are the same wherever they are estimated.
 
     Attributes
     ----------
@@ -110,7 +111,7 @@ class Trust:
     parameters
         One each, those that differ first.
     entangled
-        Pairs that can hardly be told apart.
+        Pairs that can hardly be separated.
     """
 
     statement: str
@@ -119,7 +120,7 @@ class Trust:
 
     @property
     def stable(self) -> bool:
-        """True where no number differs anywhere beyond its errors."""
+        """True if no parameter differs significantly anywhere."""
         return all(parameter.stable for parameter in self.parameters)
 
     def to_json(self) -> dict[str, Any]:

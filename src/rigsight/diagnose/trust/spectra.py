@@ -1,7 +1,7 @@
-"""What spectrum has the noise of each record? That of an autoregression, which is as sharp as a resonance.
+"""Noise spectrum of each record from an autoregressive model, which can resolve a resonance.
 
-An average over neighboring lines of a short record is wider than the resonance at which a disturbance shows most, and so calls
-what is read there surer than it is.
+An average over neighboring lines of a short record is wider than the resonance, where a disturbance is strongest, and so
+underestimates the uncertainty there.
 
 References
 ----------
@@ -26,17 +26,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class NoiseSpectra:
-    """Spectra of what whole records leave, by the name of the record.
+    """Residual spectra of whole records, by the name of the record.
 
     Attributes
     ----------
     filters
         Whitening filters by output, first of each number of outputs that a record holds.
     powers
-        Power of what is new at each sample, by record and output.
+        Power of the innovations, by record and output.
     taken
-        By record: what the power was before the fit took its part of it, in units of what is left, in the band from which each
-        number is read, shape (n_free,).
+        By record: ratio of the noise power before the fit to the residual power, in the band that determines each parameter,
+        shape (n_free,).
     """
 
     filters: dict[int, list[Floats]]
@@ -45,7 +45,7 @@ class NoiseSpectra:
 
     @classmethod
     def of(cls, whole: Sequence[Piece]) -> NoiseSpectra:
-        """Return the spectra of what records leave when their own numbers follow.
+        """Return the residual spectra of records with their own parameters refitted.
 
         Parameters
         ----------

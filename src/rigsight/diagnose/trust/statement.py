@@ -1,4 +1,4 @@
-"""How is the trust in numbers said in a few sentences?"""
+"""The statement on the trust in parameters, in a few sentences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigsight.diagnose.trust.patterns import Pattern
 from rigsight.diagnose.trust.result import Entangled, GroupValue, ParameterTrust
 from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH
 
-_ONE_RECORD = "One record cannot tell whether they hold at another amplitude."
+_ONE_RECORD = "A single record cannot show whether they hold at another amplitude."
 
 
 def statement(
@@ -22,26 +22,26 @@ def statement(
     asked: Sequence[str],
     left_open: Sequence[str] = (),
 ) -> str:
-    """Return what is known of the numbers, in a few sentences.
+    """Return the statement on the parameters, in a few sentences.
 
     Parameters
     ----------
     numbers
         Those that differ first.
     pairs
-        Numbers that go together.
+        Correlated parameters.
     n_records
         Number of records.
     asked
         Kinds of groups that were compared.
     left_open
-        Numbers that all records together do not determine.
+        Parameters that all records together do not determine.
     """
     differing = [number for number in numbers if not number.stable]
     sentences = [_differs(alike) for alike in _alike(differing)[: TRUST.told]]
     if len(_alike(differing)) > TRUST.told:
         rest = [number.name for alike in _alike(differing)[TRUST.told :] for number in alike]
-        sentences.append(f"{_listed(rest)} {'differs' if len(rest) == 1 else 'differ'} too.")
+        sentences.append(f"{_listed(rest)} also {'differs' if len(rest) == 1 else 'differ'}.")
     compared = [number for number in numbers if number.pattern is Pattern.STABLE]
     if compared:
         sentences.append(_same(compared, bool(differing), len(compared) == len(numbers), asked))
@@ -63,7 +63,7 @@ def statement(
 
 
 def _alike(numbers: Sequence[ParameterTrust]) -> list[list[ParameterTrust]]:
-    """Return numbers that differ in one way and point to one thing together, in their order."""
+    """Return parameters grouped by pattern and likely cause, in their order."""
 
     def way(number: ParameterTrust) -> tuple[str, tuple[str, ...], str]:
         return number.pattern, number.goes_with, number.points_to.cause if number.points_to else ""
@@ -81,14 +81,12 @@ def _differs(alike: Sequence[ParameterTrust]) -> str:
     text = f"{'; '.join(told)}: {cause}." if cause else f"{'; '.join(told)}."
     first, *others = alike[0].goes_with or ("",)
     if others:
-        text += (
-            f" In these records {first} and {_listed(others)} go together, so that they cannot be told apart."
-        )
+        text += f" In these records {first} and {_listed(others)} change together, so their influences cannot be separated."
     return text
 
 
 def _course(number: ParameterTrust) -> str:
-    """Return how a number differs, with values at both ends of its course."""
+    """Return how a parameter differs, with values at both ends of its trend."""
     moves = number.moves
     if number.pattern is Pattern.WINDOW:
         return f"{number.name} {moves} when windows get shorter{_ends(number, number.groups[WINDOW_LENGTH], 'in')}"
@@ -97,10 +95,10 @@ def _course(number: ParameterTrust) -> str:
     if number.pattern is Pattern.TIME:
         return f"{number.name} {moves} from record to record{_ends(number, number.groups[RECORD], 'in')}"
     if number.pattern is Pattern.RECORD:
-        return f"{number.name} differs from record to record without order{_extremes(number)}"
+        return f"{number.name} differs from record to record without a trend{_extremes(number)}"
     what = number.goes_with[0]
     if not number.direction:
-        return f"{number.name} differs with {what}, in no order{_extremes(number, what)}"
+        return f"{number.name} differs with {what}, without a trend{_extremes(number, what)}"
     return f"{number.name} {moves} with {what}{_ends(number, number.groups[what], 'at')}"
 
 
@@ -162,12 +160,12 @@ def _same(numbers: Sequence[ParameterTrust], is_rest: bool, are_all: bool, asked
             if len(vague) > 1
             else ""
         )
-        text += f" But single groups know {name} only to {_percent(vague[name])}{more}: smaller differences do not show."
+        text += f" But single groups determine {name} only to {_percent(vague[name])}{more}: smaller differences would not show."
     return text
 
 
 def _vagueness(number: ParameterTrust) -> float:
-    """Return the typical relative error of a number in groups; nothing of one that may be zero."""
+    """Return the typical relative error of a parameter in groups; zero for one that may be zero."""
     errors = [one.std for groups in number.groups.values() for one in groups]
     if not errors or abs(number.value) <= TRUST.may_be_zero * number.std:
         return 0.0

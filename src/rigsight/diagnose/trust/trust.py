@@ -1,6 +1,6 @@
-"""Are the numbers of the verdict's model the same in every record, at every amplitude, in shorter windows? And if not, why?
+"""Are the parameters of the diagnosed model the same in every record, at every amplitude and in shorter windows? If not, why?
 
-Nothing is fitted anew: estimates by group follow from one Gauss-Newton step out of the common fit.
+Nothing is refitted: estimates by group follow from one Gauss-Newton step from the common fit.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from rigsight.diagnose.trust.views import PORTION, RECORD, WINDOW_LENGTH, View, 
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records.record import Record
 
-_NOT_SIMULATED = "Whether the numbers hold in each record could not be asked: the model cannot be simulated in one of them."
-_NOTHING_FITTED = "No number was fitted, so none can differ from record to record."
+_NOT_SIMULATED = "Whether the parameters hold in each record could not be tested: the model cannot be simulated in one of them."
+_NOTHING_FITTED = "No parameter was fitted, so none can differ from record to record."
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def trust(
     constants: Mapping[str, float],
     std: Mapping[str, float] | None = None,
 ) -> Trust:
-    """Return how far the numbers of a model can be trusted.
+    """Return the trust in the parameters of a model.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def trust(
     constants
         Of the campaign.
     std
-        Standard errors of the numbers by the bootstrap, where there are any. Where they exceed those of the formula, errors
-        by group are wider by the same factor: a force from outside moves the events from which numbers are read.
+        Standard errors of the parameters by the bootstrap, where available. If they exceed those of the formula, errors by group
+        are increased by the same factor, because disturbance forces shift the events that determine the parameters.
     """
     if not model.fit.free:
         return Trust(_NOTHING_FITTED)
@@ -103,9 +103,9 @@ def trust(
 
 
 def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) -> tuple[ParameterTrust, ...]:
-    """Return the numbers with one cause for mass, stiffness and damping that all grow or all fall with amplitude.
+    """Return the parameters with a single cause if mass, stiffness and damping all rise or all fall with amplitude.
 
-    They stand in one equation with the drive: where it gives less, all of them seem to be more.
+    They share one equation with the drive: if the drive gives less force, all of them appear larger.
     """
     moved = [n for n in numbers if own.get(n.name) in (Role.MASS, Role.STIFFNESS, Role.DAMPING)]
     directions = {n.direction if n.pattern is Pattern.AMPLITUDE else 0 for n in moved}
@@ -116,7 +116,7 @@ def _of_the_drive(numbers: tuple[ParameterTrust, ...], own: Mapping[str, Role]) 
 
 
 def _wider(model: Scored, std: Mapping[str, float]) -> NDArray[np.float64]:
-    """Return by which factor the bootstrap's standard errors exceed the formula's, at least 1, shape (n_free,)."""
+    """Return the factor by which bootstrap standard errors exceed those of the formula, at least 1, shape (n_free,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         formula = np.array([model.fit.standard_errors[name] for name in model.fit.free])
         ratios = np.array([std[name] for name in model.fit.free]) / formula
@@ -124,7 +124,7 @@ def _wider(model: Scored, std: Mapping[str, float]) -> NDArray[np.float64]:
 
 
 def _left_open(model: Scored) -> tuple[str, ...]:
-    """Return the numbers that cannot be negative and that all records together do not determine."""
+    """Return the positive parameters that all records together do not determine."""
     fit, lower = model.fit, {p.name: p.lower for p in model.fit.structure.parameters}
     return tuple(
         name
@@ -141,7 +141,7 @@ def _effect_parameters(model: Scored) -> set[str]:
 
 
 def _told(view: View, index: int) -> Spread | None:
-    """Return how a number differs in a view; None where nothing can be compared or another view is of the same groups."""
+    """Return how a parameter differs in a view; None if nothing can be compared or another view has the same groups."""
     known = view.known(index)
     if not view.is_tested or known.size < 2:
         return None

@@ -1,4 +1,4 @@
-"""By what is a number estimated again? By record, by level of what was set, by portion of a record, in shorter windows."""
+"""Groupings for repeated estimates: by record, amplitude or constant, portion of a record, and window length."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NAMES = ("half", "quarter")
 
 @dataclass(frozen=True)
 class View:
-    """Numbers estimated in several groups.
+    """Parameters estimated in several groups.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class View:
     sizes
         Of the numbers of the common fit, without sign, shape (n_free,).
     apart
-        Where groups share samples, as windows of each length do: how the last differs from the first. Else None.
+        For groups that share samples, such as windows of each length: difference of the last from the first. Else None.
     is_tested
         False where the groups are those of another view.
     """
@@ -50,7 +50,7 @@ class View:
     is_tested: bool = True
 
     def known(self, index: int) -> NDArray[np.intp]:
-        """Return which groups determine a number by themselves."""
+        """Return which groups determine a parameter alone."""
         errors = np.sqrt([estimate.variances[index] for estimate in self.found])
         told = np.isfinite(errors) & (errors > 0.0)
         if np.any(told):
@@ -109,7 +109,7 @@ def _by_record(of: Pieces, records: Sequence[str], spectra: NoiseSpectra) -> Vie
 
 
 def _by_level(alone: View, order: Order) -> View:
-    """Return the means of what records of each level say alone, each record with the weight of its own error."""
+    """Return the means of the estimates of single records by level, weighted by their errors."""
     levels = sorted(set(order.levels.values()))
     own = [
         [one for name, one in zip(alone.labels, alone.found, strict=True) if order.levels[name] == level]
@@ -127,7 +127,7 @@ def _by_level(alone: View, order: Order) -> View:
 
 def _portions(of: Pieces) -> View:
     count = of.portions
-    # What one number leaves of a record along which it changes is no noise of its parts.
+    # The residual of a common parameter in a record along which it changes is not noise of its parts.
     spectra = NoiseSpectra.of(of.cut[count])
     parts = [[piece for piece in of.cut[count] if piece.place[0] == i] for i in range(count)]
     labels = tuple(f"{_NAMES[TRUST.windows.index(count)]} {i + 1}" for i in range(count))

@@ -1,1 +1,1 @@
-"""How well are the numbers of a diagnosis known? A parametric bootstrap with a force from outside and with sensor noise."""
+"""Uncertainty of the parameters of a diagnosis: a parametric bootstrap with disturbance forces and sensor noise."""

@@ -1,15 +1,15 @@
-"""Standard errors by a parametric bootstrap: the fitted model is simulated with forces from outside and noise of its sensors.
+"""Standard errors by a parametric bootstrap: the fitted model is simulated with disturbance forces and sensor noise.
 
-The formula takes what is left for noise of a certain spectrum beside the readings. A force from outside is more than that where
-it decides when friction lets a mass go, when play is crossed or a stop is met: it moves the very events from which the numbers
-were read. So many draws of what disturbs the rig are put through the model with its effects, and each is what one Gauss-Newton
-step of the fit makes of it.
+The covariance formula treats the residual as noise of a certain spectrum added to the outputs. This is not sufficient if a
+disturbance force decides when friction slips, play is crossed or a stop is hit: it shifts the events that determine the
+parameters. So many draws of the disturbance are simulated with the model and its effects, and one Gauss-Newton step of the fit
+gives the parameters of each draw.
 
 References
 ----------
 B. Efron and R. J. Tibshirani, *An Introduction to the Bootstrap* (Chapman and Hall 1993), sections 6.5 and 19.3, for the
 parametric bootstrap and the number of draws. A. C. Davison and D. V. Hinkley, *Bootstrap Methods and their Application*
-(Cambridge 1997), section 2.7, for one step in the place of a new fit.
+(Cambridge 1997), section 2.7, for one step instead of a new fit.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from rigsight.identify import FitResult, OneStep
 
 Floats = NDArray[np.float64]
 _Shown = list[tuple[Floats, Floats]]
-"""A white force along each record and what it leaves, shapes (n_samples, n_draws) and (n_samples, n_outputs, n_draws)."""
+"""A white force along each record and its effect on the residual, shapes (n_samples, n_draws) and (n_samples, n_outputs,
+n_draws)."""
 
 _AT_ONCE = 4_000_000
 """Readings that are kept at a time: 32 MB."""
@@ -39,9 +40,9 @@ _UNIT_DRAWS = 4
 _SETTING_DRAWS = 8
 """Draws by which sizes are set right."""
 _FIRST = 1e-3
-"""Part of what is left that a force of the first size shows, which tells which size would leave all of it."""
+"""Part of the residual that a force of the first trial size must cause, to extrapolate the size that causes all of it."""
 _SIZING_ROUNDS, _MOST_GROWN = 4, 100.0
-"""In how many steps, of which factor at most, a first size grows: a tenth of a billionth of what is left can be reached."""
+"""Number and largest factor of the steps in which a first size grows, starting as low as a ten-billionth of the residual."""
 _MOST_CHANGED = 10.0
 """Factor by which sizes of forces are set right at most."""
 _SHOWS = 0.05
@@ -61,7 +62,7 @@ class Uncertainty:
     method
         ``"bootstrap"``, or ``"formula"`` where the model cannot be simulated under such forces, or not in reasonable time.
     sources
-        The forces and the noise that were drawn, noise in SI units; None for the formula.
+        The disturbance forces and the noise of the draws, noise in SI units; None for the formula.
     """
 
     std: dict[str, float]
@@ -113,7 +114,7 @@ def uncertainty_of(
     covariance = step.covariance(np.hstack(gradients))
     if np.any(np.isnan(covariance)):
         return by_formula
-    # What the formula calls undetermined stays so.
+    # Parameters that the covariance formula calls undetermined stay undetermined.
     unknown = np.isinf(np.diag(fit.covariance))
     covariance[unknown, :] = covariance[:, unknown] = 0.0
     covariance[unknown, unknown] = np.inf
@@ -124,9 +125,9 @@ def uncertainty_of(
 def _sources(
     context: FitContext, fit: FitResult, step: OneStep, replicates: Replicates, rng: np.random.Generator
 ) -> Sources:
-    """Return the forces and the noise that leave what the model leaves."""
+    """Return the forces and the noise that explain the residual of the model."""
     names = [signal.name for signal in fit.structure.rig.outputs]
-    # What no record holds has no floor; its residuals are left out.
+    # Outputs in no record have no floor; their residuals are left out.
     noise = np.array([context.noise.get(name, 1.0) for name in names])
     records = context.estimation
     left = [np.nan_to_num(own) / noise for own in fit.residuals]
@@ -135,7 +136,7 @@ def _sources(
     corners = np.array([np.inf, *(slower * typical for slower in SLOWER)])
 
     def shown(joint: int, size: float, n_draws: int) -> _Shown:
-        """Return white forces of one size at a joint and what they leave, by record."""
+        """Return white forces of one size at a joint and their effect on the residual, by record."""
         forces = [np.zeros((r.n_samples, n_joints, n_draws)) for r in records]
         for own in forces:
             own[:, joint] = size * rng.standard_normal((own.shape[0], n_draws))
@@ -143,7 +144,7 @@ def _sources(
         return [(force[:, joint], rest) for force, rest in zip(forces, left, strict=True)]
 
     def heard(sensor: int) -> _Shown:
-        """Return white noise of a sensor, in units of its size, and what it leaves, by record."""
+        """Return white noise of a sensor, in units of its size, and its effect on the residual, by record."""
         unit = [np.zeros((r.n_samples, noise.size, _UNIT_DRAWS)) for r in records]
         for own in unit:
             own[:, sensor] = rng.standard_normal((own.shape[0], _UNIT_DRAWS))
@@ -168,9 +169,9 @@ def _sources(
 def _size_at(
     joint: int, context: FitContext, shown: Callable[[int, float, int], _Shown], whole: float
 ) -> float:
-    """Return the white force at a joint that would leave about all that is left; 0 where it shows in no sensor.
+    """Return the white force at a joint that would cause about the whole residual; 0 where it shows in no sensor.
 
-    In small steps of size: friction that holds the mass hides a small force.
+    The size is increased in small steps, because sticking friction hides a small force.
     """
     name = context.rig.mechanism.joints[joint].name
     size = _FIRST * context.scales[f"force@{name}"]
@@ -192,7 +193,7 @@ def _set_right(
     replicates: Replicates,
     rng: np.random.Generator,
 ) -> float:
-    """Return the factor of the forces with which draws leave as much as the model does."""
+    """Return the factor of the forces with which draws have the same residual as the model."""
     drawn = _mean_square(step.left(replicates.drawn(found, _SETTING_DRAWS, rng)))
     heard = [found.noise(r.n_samples, _SETTING_DRAWS, rng) for r in replicates.context.estimation]
     own = _mean_square(step.left(replicates.with_noise(heard)))
@@ -203,7 +204,7 @@ def _set_right(
 
 
 def _mean_square(left: Sequence[Floats]) -> float:
-    """Return the mean square of what is left where it was measured; outputs that were not are 0 throughout."""
+    """Return the mean square residual where it was measured; unmeasured outputs are 0 throughout."""
     total, count = 0.0, 0
     for own in left:
         seen = np.any(own != 0.0, axis=tuple(i for i in range(own.ndim) if i != 1))

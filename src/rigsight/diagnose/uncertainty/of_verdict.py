@@ -1,4 +1,4 @@
-"""Which standard errors stand beside the numbers of the diagnosed simulation? Those of the bootstrap, if it can be done."""
+"""Standard errors of the diagnosed simulation: from the bootstrap if possible."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What would a fitted model have shown under another force from outside and other noise of its sensors?
+"""Simulated outputs of a fitted model under another disturbance force and other sensor noise.
 
-A force acts at the joints and moves the model with all its effects: where friction holds a mass it does nothing, where a mass is
-about to let go it does much. Its response is the difference to the same simulation without it. An observer follows the readings
-that were measured, and of another noise only what it hands on: an error dies away in it as one of the rig's own motion would.
+The force acts at the joints on the model with all its effects: while friction holds a mass it has no effect, when a mass is about
+to slip a large one. The response is the difference to the same simulation without the force. An observer follows the measured
+outputs, so other sensor noise also enters through its correction, and decays in it like an error of the motion.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Replicates:
 
     @cached_property
     def _undisturbed(self) -> list[tuple[Floats, int]]:
-        """Readings of each record without a force, and how many steps of integration they take."""
+        """Readings of each record without a force, and their number of integration steps."""
 
         def of_record(index: int) -> tuple[Floats, int]:
             record = self.context.estimation[index]
@@ -77,11 +77,11 @@ class Replicates:
 
     @property
     def n_steps(self) -> int:
-        """Steps of integration of one replicate: how long it takes, on any machine."""
+        """Integration steps of one replicate: a measure of its cost that does not depend on the computer."""
         return sum(steps for _, steps in self._undisturbed)
 
     def responses(self, forces: Sequence[Floats]) -> list[Floats]:
-        """Return by how much forces at the joints change what is left of each record.
+        """Return the change of the residuals of each record by forces at the joints.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Replicates:
         return self._of_each_record(lambda i: self._response(i, forces[i], None))
 
     def with_noise(self, noise: Sequence[Floats]) -> list[Floats]:
-        """Return by how much noise of the sensors changes what is left of each record: itself, less what an observer makes of it.
+        """Return the change of the residuals of each record by sensor noise: the noise itself less the response of the observer.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Replicates:
         return self._of_each_record(lambda i: self._changed(i, None, noise[i]))
 
     def drawn(self, sources: Sources, n_replicates: int, rng: np.random.Generator) -> list[Floats]:
-        """Return changes of what is left of each record as forces and sensors of these sizes make them.
+        """Return random changes of the residuals of each record for forces and sensor noise of these sizes.
 
         Parameters
         ----------
@@ -144,7 +144,8 @@ class Replicates:
             if not record.observed:
                 return noise
             force = np.zeros((record.n_samples, len(self.fit.structure.rig.mechanism.joints), noise.shape[2]))
-        # What is left is the reading less its prediction. A force moves the reading; an observer's prediction follows the noise.
+        # The residual is the reading less its prediction. A force changes the reading; the prediction of an observer tracks the
+        # noise.
         sign = -1.0 if record.observed else 1.0
         return noise + sign * self._response(index, force, noise)
 

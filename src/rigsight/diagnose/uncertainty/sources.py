@@ -1,15 +1,15 @@
-"""Which forces from outside and which sensor noise leave what a model leaves?
+"""Which disturbance forces and sensor noise explain the residual of a model?
 
-What is left is taken for white noise of each sensor and a force at each joint, which is a sum of white noise and of slower forces
-whose spectra fall above a corner. How each of them shows in each sensor is simulated, initial states and numbers following as
-they do in a fit; their sizes are those under which the spectra are likeliest. Friction that holds a mass hides a force, so sizes
-are set right once by simulating what was found.
+The residual is modelled as white noise of each sensor and a force at each joint, the sum of white noise and of low-pass noise
+with several corner frequencies. The response of each sensor to each of them is simulated, less what initial states and parameters
+compensate in a fit; the sizes follow by maximum likelihood of the spectra. Sticking friction hides a force, so the sizes are
+corrected once by simulating the result.
 
 References
 ----------
 P. Whittle, Ark. Mat. 2 (1953) 423, for the likelihood of a spectrum. C. Fevotte, N. Bertin and J.-L. Durrieu, Neural Comput. 21
 (2009) 793, for its maximum over sums of given spectra. C. Gourieroux, A. Monfort and E. Renault, J. Appl. Econometrics 8 (1993)
-S85, for sizes that are set right by simulation.
+S85, for sizes that are corrected by simulation.
 """
 
 from __future__ import annotations
@@ -41,16 +41,16 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Sources:
-    """Sizes of what disturbs a rig and its sensors.
+    """Sizes of disturbance forces and sensor noise.
 
     Attributes
     ----------
     noise_std
         Of each sensor's white noise, shape (n_outputs,).
     force_std
-        Of each joint's force by its corner, shape (n_joints, n_corners), in the unit of the joint's force.
+        Of the force at each joint by corner frequency, shape (n_joints, n_corners), in the unit of the joint's force.
     corners
-        Angular frequency above which each falls [rad/s], infinite for white forces, shape (n_corners,).
+        Corner frequencies of the low-pass noise [rad/s], infinite for white forces, shape (n_corners,).
     """
 
     noise_std: Floats
@@ -76,7 +76,7 @@ class Sources:
 
 
 def colored(shape: tuple[int, ...], corner: float, rng: np.random.Generator) -> Floats:
-    """Draw forces of variance 1 that fall above a corner [rad per sample], white ones for an infinite corner; time is axis 0."""
+    """Draw low-pass forces of variance 1 with a corner [rad per sample], white ones for an infinite corner; time is axis 0."""
     white = rng.standard_normal(shape)
     pole = np.exp(-corner)
     white[1:] *= np.sqrt(1.0 - pole**2)
@@ -90,13 +90,13 @@ def likeliest_sources(
     dts: Sequence[float],
     corners: Floats,
 ) -> Sources:
-    """Return the sizes of sources under which the spectra of a remainder are likeliest.
+    """Return the maximum likelihood sizes of sources from the spectra of a residual.
 
     Parameters
     ----------
     left
-        What a model leaves of each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout where
-        it was not measured.
+        Residuals of a model on each record, in units of the noise of each sensor, shape (n_samples, n_outputs); 0 throughout
+        where it was not measured.
     of_noise
         White noise of each sensor, shape (n_samples, n_replicates), and what it leaves of each record, shape (n_samples,
         n_outputs, n_replicates), both in units of the noise; outer sequence over sensors.
@@ -148,7 +148,7 @@ def likeliest_sources(
 
 
 def _likeliest(power: Floats, gains: Floats, weights: Floats) -> Floats:
-    """Return the powers of sources, shape (n_sources,), under which averaged lines, shape (n,), are likeliest.
+    """Return the maximum likelihood powers of sources, shape (n_sources,), from averaged spectral lines, shape (n,).
 
     Each update lowers the weighted sum of ``log(expected) + power / expected`` and keeps powers positive.
     """

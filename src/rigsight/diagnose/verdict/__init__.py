@@ -1,1 +1,1 @@
-"""Which model is the cause, how surely, and what does it still leave?"""
+"""Which model is the cause, with which probability, and what does it not explain?"""

@@ -1,8 +1,8 @@
-"""How probable is what a diagnosis names? Two small logistic models, trained on drawn rigs whose cause is known.
+"""Probability of the named cause: two small logistic models, trained on simulated random rigs whose cause is known.
 
-The first says how probable it is that the cause is among the models tried at all, the second how probable it is that it is the
-first of them. Both read a handful of figures of the diagnosis, see `Situation`. Coefficients stand in ``calibration.json``,
-which ``make calibrate`` makes anew from the table of training trials in ``experiments/calibration``.
+The first gives the probability that the cause is among the models tried, the second the probability that it is the first of them.
+Both use a few figures of the diagnosis, see `Situation`. The coefficients are in ``calibration.json``, which ``make calibrate``
+regenerates from the table of training trials in ``experiments/calibration``.
 
 References
 ----------
@@ -32,7 +32,7 @@ _STEEPEST = 6.0
 
 @dataclass(frozen=True)
 class Situation:
-    """What the probability of a verdict is told from.
+    """Figures from which the probability of a verdict is computed.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class Situation:
     first_share
         Share of the first model in the ranking of those with an effect, 0 to 1.
     left, gap
-        What that model and what the re-identified equations leave, in units of the noise floor.
+        Errors of that model and of the re-identified equations, in units of the noise floor.
     n_effects
         Number of its effects.
     adequate
-        Whether what it leaves counts as noise and disturbance.
+        Whether its residual counts as noise and disturbance.
     lower_bound
         Whether the noise floor is only a lower bound.
     several_places
@@ -62,7 +62,7 @@ class Situation:
     several_places: bool
 
     def figures(self) -> dict[str, float]:
-        """Return what the logistic models read, by name."""
+        """Return the inputs of the logistic models by name."""
         has_effect = self.verdict in ("effect", "unknown")
         share = min(max(self.first_share, 0.0), 1.0)
         log_odds = math.log((share + 1e-12) / (1.0 - share + 1e-12))
@@ -90,7 +90,7 @@ class Calibration:
         Coefficients by figure, with ``"intercept"``: that the cause is among the models tried, and that it is the first of them
         if it is.
     least_probability
-        Models at least so probable belong to the set; it holds the cause of nine trials in ten.
+        Models with at least this probability belong to the set, which contains the cause in nine trials of ten.
     n_trials
         Training trials.
     """
@@ -109,7 +109,7 @@ class Calibration:
         return _logistic(self.first, situation.figures())
 
     def probabilities(self, situation: Situation, shares: Sequence[float]) -> list[float]:
-        """Return the probability of each model with an effect; what is left of 1 is that of all else.
+        """Return the probability of each model with an effect; the rest to 1 is that of all other causes.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Calibration:
 
 @functools.cache
 def trained() -> Calibration:
-    """Return the calibration that the package brings."""
+    """Return the calibration included in the package."""
     text = resources.files(__package__).joinpath(FILE).read_text(encoding="utf-8")
     return Calibration(**json.loads(text))
 

@@ -23,7 +23,7 @@ class Judgement:
 
 
 def most_left(gap: float) -> float:
-    """Return what a named cause may leave, in units of a measured noise floor, of a gap in the same units."""
+    """Return the error that a named cause may leave, in units of a measured noise floor, for a gap in the same units."""
     return min(max(VERDICT.least_left, 1.0 + VERDICT.left_of_gap * (gap - 1.0)), VERDICT.most_left)
 
 
@@ -39,47 +39,49 @@ def judge(
 
     Parameters
     ----------
-    before_excess
+    error_before
         RMS that the given simulation leaves.
     reidentified
         The re-identified equations.
     best
         The best model with an effect.
     is_adequate
-        Says whether what a model leaves goes with nothing, see `adequacy`.
+        Says whether the residual of a model is correlated with nothing, see `adequacy`.
     cause
-        Says how much of the gap the best model takes, and what contradicts it.
+        Says how much of the gap the best model explains, and what contradicts it.
     lower_bound
-        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances
-        may stand well above it, so that a modest rest which no model lowers is taken for noise.
+        True if the noise floor is only a lower bound (white noise at the top of the spectrum): colored noise and disturbances may
+        stand well above it, so that a modest error that no model reduces is taken for noise.
     """
     at_floor = VERDICT.at_lower_bound if lower_bound else VERDICT.at_floor
     helps = best.error_over_noise * VERDICT.worthwhile < reidentified.error_over_noise
     retuned = reidentified.error_over_noise * VERDICT.worthwhile < error_before
     needs_effect = helps and reidentified.error_over_noise > VERDICT.at_floor
-    # Numbers that were fitted to a record like the held-out ones suit them by chance where no numbers suit all records.
+    # Parameters fitted to a record similar to the held-out ones may fit these by chance although no parameters fit all records.
     if not needs_effect and (error_before <= VERDICT.at_floor or (error_before <= at_floor and not retuned)):
-        return Judgement(
-            "none", reidentified, "The simulation in question leaves no more than the noise floor."
-        )
+        return Judgement("none", reidentified, "The error of the given simulation is within the noise floor.")
     if not needs_effect and reidentified.error_over_noise <= at_floor:
         if retuned:
             return Judgement(
-                "parameters", reidentified, "Better numbers for the same equations reach the noise floor."
+                "parameters",
+                reidentified,
+                "The same equations with refitted parameters reach the noise floor.",
             )
         return Judgement(
-            "none", reidentified, "The gap is too small against the noise floor to have a cause."
+            "none", reidentified, "The gap is too small, compared with the noise floor, to find a cause."
         )
     if not helps:
         if not is_adequate(reidentified):
-            return Judgement("unknown", reidentified, "No effect of the catalogue lowers the held-out error.")
+            return Judgement(
+                "unknown", reidentified, "No effect of the catalogue lowers the validation error."
+            )
         noisy = (
-            f"What the equations leave, {reidentified.error_over_noise:.3g} times the noise floor, goes with nothing: "
-            "the floor is too low."
+            f"The error of the equations, {reidentified.error_over_noise:.3g} times the noise floor, correlates with no signal "
+            f"that was tested: the noise floor is too low."
         )
         if retuned:
             return Judgement(
-                "parameters", reidentified, f"{noisy} Better numbers explain the rest of the gap."
+                "parameters", reidentified, f"{noisy} Refitted parameters explain the rest of the gap."
             )
         return Judgement("none", reidentified, noisy)
     closed = (reidentified.error_over_noise - best.error_over_noise) / (reidentified.error_over_noise - 1.0)
@@ -94,8 +96,8 @@ def judge(
         return Judgement(
             "effect",
             best,
-            f"{nearest}; the {best.error_over_noise:.3g} times {floor} that it leaves go with nothing, "
-            "so that they count as noise and disturbance.",
+            f"{nearest}; its error, {best.error_over_noise:.3g} times {floor}, correlates with no signal that was tested and "
+            f"counts as noise and disturbance.",
         )
     taken = cause()
     if taken.clear:
@@ -105,21 +107,21 @@ def judge(
         return Judgement(
             "effect",
             best,
-            f"{nearest}: the main cause, or its nearest relative{place}. It leaves {best.error_over_noise:.3g} times {floor}, "
-            "which still goes with something.",
+            f"{nearest}: the main cause, or the most similar effect of the catalogue{place}. It leaves "
+            f"{best.error_over_noise:.3g} times {floor}, and this error still correlates with a signal of the rig.",
         )
     if taken.contradicted_by:
         return Judgement(
             "unknown",
             best,
             f"{nearest}, but effects at other places close as much and explain another part of it "
-            f"({_listed(taken.contradicted_by)}): they contradict each other.",
+            f"({_listed(taken.contradicted_by)}): the explanations contradict each other.",
         )
     return Judgement(
         "unknown",
         best,
-        f"The best candidate, {', '.join(best.names)}, takes {taken.share:.0%} of the squared gap (at least "
-        f"{taken.at_least:.0%}, 95 %): a main cause must take the larger part.",
+        f"The best candidate, {', '.join(best.names)}, explains {taken.share:.0%} of the squared gap (at least "
+        f"{taken.at_least:.0%} with 95 % confidence): a main cause must explain more than half.",
     )
 
 

@@ -1,7 +1,7 @@
-"""Does one model surely take the larger part of the gap, and does no other that is as good take another part of it?
+"""Main cause: does one model certainly explain more than half of the gap, and no equally good model another part?
 
-Models that act elsewhere contradict each other where they explain different parts of the gap. Where they explain the same part,
-such as a late drive and a late sensor, the cause is known but for its place.
+Models at different places contradict each other if they explain different parts of the gap. If they explain the same part, such
+as a delayed drive and a delayed sensor, only the place of the cause is open.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from rigsight.rigs import Rig
 
 @dataclass(frozen=True)
 class MainCause:
-    """How much of the re-identified gap a model takes.
+    """The share of the re-identified gap that a model explains.
 
     Attributes
     ----------
     share
         Of the squared gap above the noise floor.
     at_least
-        What it is in all but one of twenty resamplings of the records' stretches.
+        Lower limit of the share in 95 % of the resamplings of the records' stretches.
     contradicted_by
-        Models that are as good, act at other places and take another part of the gap.
+        Equally good models that act at other places and explain another part of the gap.
     equalled_by
-        Models that are as good and act at other places, but take the same part.
+        Equally good models that act at other places but explain the same part.
     """
 
     share: float
@@ -41,7 +41,7 @@ class MainCause:
 
     @property
     def clear(self) -> bool:
-        """True where the model surely takes the larger part and nothing that is as good contradicts it."""
+        """True if the model certainly explains more than half and no equally good model contradicts it."""
         return self.at_least > VERDICT.larger_part and not self.contradicted_by
 
 
@@ -53,7 +53,7 @@ def main_cause(
     noise: NDArray[np.float64],
     rng: np.random.Generator,
 ) -> MainCause:
-    """Say how much of what the equations leave a model takes.
+    """Determine the share of the residual of the equations that a model explains.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def main_cause(
     best
         The model with an effect.
     tied
-        Models whose held-out error cannot be told from that of the best.
+        Models whose held-out error does not differ significantly from that of the best.
     noise
         Noise floor of each output, shape (n_outputs,).
     rng
@@ -83,7 +83,7 @@ def main_cause(
 
 
 def _common_part(reidentified: Scored, one: Scored, other: Scored, noise: NDArray[np.float64]) -> float:
-    """Return the share of what one model explains of the gap that another explains as well, of squares."""
+    """Return the share of the squared gap explained by one model that another explains too."""
     explained = differing = 0.0
     for gap, left, others_left in zip(reidentified.residuals, one.residuals, other.residuals, strict=True):
         explained += float(np.nansum(((gap - left) / noise) ** 2))

@@ -1,4 +1,4 @@
-"""Are the numbers of a fitted model ones that a rig can have, and do the records determine them?"""
+"""Are the parameters of a fitted model physically possible, and do the records determine them?"""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ _AT_BOUND = 1e-6
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why a number of a fitted model is not believed; `grave` where it counts against the model."""
+    """Why a parameter of a fitted model is implausible; `grave` if it counts against the model."""
 
     text: str
     grave: bool
 
 
 def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
-    """Return what is implausible about a model's numbers.
+    """Return the implausible parameters of a model.
 
     Parameters
     ----------
     model
         Fitted and scored.
     reidentified
-        The re-identified equations, whose numbers are those of the rig without an effect.
+        The re-identified equations, with the parameters of the rig without an effect.
     """
     fit = model.fit
     parameters = {p.name: p for p in fit.structure.parameters}
     own = {fit.structure.parameter_name(e, p.name) for e in model.effects for p in e.parameters}
     found = []
     if not fit.success:
-        found.append(Doubt("Its fit did not come to an end.", True))
+        found.append(Doubt("Its fit did not converge.", True))
     unknown = [name for name in fit.free if name in own and not np.isfinite(fit.standard_errors[name])]
     if unknown:
         found.append(Doubt(f"The records do not determine {', '.join(unknown)}.", True))
@@ -52,7 +52,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
                 and np.isfinite(bound)
                 and (zero or abs(value - bound) < _AT_BOUND * abs(bound))
             ):
-                found.append(Doubt(f"{name} = {value:.3g} stands at the bound of its search.", False))
+                found.append(Doubt(f"{name} = {value:.3g} is at the bound of its search range.", False))
         before = reidentified.fit.values.get(name, 0.0)
         if name not in own and declared.lower >= 0.0 and before > 0.0 and value > 0.0:
             ratio = value / before
@@ -69,7 +69,7 @@ def doubts(model: Scored, reidentified: Scored) -> tuple[Doubt, ...]:
 
 
 def plausible_first(ranking: Ranking, reidentified: Scored, places: Mapping[str, str]) -> Ranking:
-    """Return the ranking with a plausible model in front of an implausible one that is hardly better and at the same place.
+    """Return the ranking with a plausible model before an implausible one that is hardly better and at the same place.
 
     Parameters
     ----------

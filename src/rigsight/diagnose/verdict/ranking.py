@@ -1,4 +1,4 @@
-"""How sure the ranking is: paired block bootstrap of the held-out errors, parsimony, tempered evidence, ambiguity."""
+"""Certainty of the ranking: paired block bootstrap of the held-out errors, parsimony, tempered evidence, ambiguity."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rigsight.effects.effect import Place
 
 @dataclass(frozen=True)
 class Grounds:
-    """What the probability of one model rests on.
+    """Basis of the probability of one model.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Grounds:
     held_out
         Share of the resamplings of the held-out errors in which it is the simplest of the best.
     evidence
-        Logarithm of its evidence, less that of the likeliest model [nats]; None where its fit was not finished.
+        Logarithm of its evidence relative to the most probable model [nats]; None where its fit was not finished.
     """
 
     share: float
@@ -44,15 +44,15 @@ class Ranking:
     order
         Models, the chosen one first, then by held-out error.
     probabilities
-        Of each to be the cause among those tried.
+        Probability of each to be the cause among those tried.
     tied
-        Models whose held-out error cannot be told from the chosen one's.
+        Models whose held-out error does not differ significantly from that of the chosen one.
     grounds
-        What each probability rests on, in the same order.
+        Basis of each probability, in the same order.
     error_of_choice
-        What the model with the best held-out errors in a resampling leaves of the stretches that were not drawn, in units of the
-        noise floor, root mean square of all resamplings. Evidence, which knows all records, has no part in that choice. Not a
-        number where a model was chosen by other means, or nothing was left out.
+        Error, on the stretches not drawn in a resampling, of the model with the best held-out errors in it, in units of the noise
+        floor; RMS over all resamplings. Evidence, which uses all records, does not affect this selection. NaN if a model was
+        selected by other means, or nothing was left out.
     """
 
     order: tuple[Scored, ...]
@@ -72,8 +72,8 @@ def rank(
 ) -> Ranking:
     """Rank models by held-out error and evidence; the simplest of those that tie with the best is chosen.
 
-    Held-out errors say what an engineer sees, and little where noise or a force from outside leaves much of every model. There
-    the spectrum of what is left says more.
+    Held-out errors are what an engineer sees, but they say little if noise or a disturbance force dominates the error of every
+    model. Then the spectrum of the residual says more.
 
     Parameters
     ----------
@@ -84,11 +84,11 @@ def rank(
     rng
         Source of the resampling.
     gap
-        What the rig's own equations leave, re-identified, in units of the noise floor.
+        Error of the re-identified equations of the rig, in units of the noise floor.
     criterion
         Minus twice the log of a model's evidence, see `evidence`; None ranks by held-out errors alone.
     evidence_counts
-        False where what the likeliest model leaves is no noise: then evidence is told and ranks nothing.
+        False if the residual of the most likely model is not noise: then the evidence is reported but not used for the ranking.
 
     References
     ----------
@@ -108,7 +108,7 @@ def rank(
     best = float(np.min(errors))
     inexact = (VERDICT.model_error * max(best - 1.0, 0.0) + VERDICT.inexact * gap) / best
     tolerance = np.hypot(VERDICT.tie, inexact)
-    # Far above the floor no form is exact, and a small difference is no hint of the true one.
+    # Far above the floor no model is exact, and a small difference does not indicate the true one.
     fine = VERDICT.inexact + VERDICT.model_error * max(best - VERDICT.at_floor, 0.0) / best
     resampled = np.sqrt(means)
     floor = np.min(resampled, axis=1, keepdims=True)
@@ -173,7 +173,7 @@ def _error_of_choice(
 def _evidence_of(
     models: Sequence[Scored], errors: NDArray[np.float64], criterion: Callable[[Scored], float] | None
 ) -> list[float | None]:
-    """Return the log evidence of each model less that of the likeliest; None for those far off, not fitted to their end."""
+    """Return the log evidence of each model relative to the most probable one; None if not fitted to convergence."""
     if criterion is None:
         return [None] * len(models)
     told = [
@@ -197,7 +197,7 @@ def _shared(winners: NDArray[np.bool_], prior: NDArray[np.float64]) -> NDArray[n
 
 
 def _likened(model: Scored, others: Sequence[Scored]) -> bool:
-    """Return True if an effect of this model is only another shape of one that a model with as many numbers has."""
+    """Return True if an effect of this model is only another form of one in a model with equally many parameters."""
     return any(
         other.n_free == model.n_free
         and len(other.effects) == len(model.effects)
@@ -208,9 +208,9 @@ def _likened(model: Scored, others: Sequence[Scored]) -> bool:
 
 
 def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
-    """Return True if a model stands beside a constant force that nobody knew of, where another explains that force too.
+    """Return True if a model needs an unknown constant force that another model explains.
 
-    Those whose mean force nothing asks for are no rivals, see `with_a_mean_that_is_needed`.
+    Models whose mean force is not needed have been removed before, see `same_equation`.
     """
     return any(
         other.n_free == model.n_free
@@ -223,7 +223,7 @@ def _beside_a_new_force(model: Scored, others: Sequence[Scored]) -> bool:
 
 
 def _unidentifiable_sensor_effect(model: Scored) -> bool:
-    """Return True for a linear effect of the sensor of a rig with one output: it is one of the drive in the same records."""
+    """Return True for a linear effect of the sensor of a rig with one output: it is equivalent to one of the drive."""
     one_output = len(model.fit.structure.rig.outputs) == 1
     return one_output and any(effect.place is Place.SENSOR and is_linear(effect) for effect in model.effects)
 

@@ -1,4 +1,4 @@
-"""What does a named cause leave, how much of the gap is that, and with what does it still go?"""
+"""The error that a named cause does not explain: its share of the gap and the signal with which it correlates."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from rigsight.diagnose.pushes.alternatives import BY_RECORD
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the model of the verdict leaves above noise and disturbance.
+    """Error of the diagnosed model above noise and disturbance.
 
     Attributes
     ----------
     share
-        Of the squared gap of the re-identified equations; 0 where it goes with nothing and so counts as noise and disturbance.
+        Of the squared gap of the re-identified equations; 0 where it correlates with nothing and so counts as noise and
+        disturbance.
     where
-        Joint, drive or sensor at which it arises; empty where it goes with nothing, or with no place.
+        Joint, drive or sensor at which it arises; empty where it correlates with nothing, or with no place.
     goes_with
-        Signal, time or record; empty where it goes with nothing.
+        Signal, time or record with which it correlates; empty where there is none.
     p_value
-        Probability that noise and disturbance alone would agree as well with anything that was looked at.
+        Probability that noise and disturbance alone correlate this well with anything that was tested.
     beside_a_cause
-        True where the verdict names one: then what is left is something beside it.
+        True if the verdict names a cause: then the remaining error is in addition to it.
     """
 
     share: float
@@ -40,26 +41,24 @@ class Remainder:
         """The same in one sentence."""
         if not self.goes_with:
             return (
-                "What is left goes with no motion, drive, reading, time or record that was looked at "
-                f"(p = {self.p_value:.2g}): it counts as noise and disturbance."
+                f"The remaining error correlates with no motion, drive, reading, time or record that was tested (p = "
+                f"{self.p_value:.2g}): it counts as noise and disturbance."
             )
         if self.share == 0.0:
             return (
-                f"What is left is no more than the noise floor, but it still goes with {_in_words(self.goes_with)} "
-                f"(p = {self.p_value:.2g}): numbers may be off by more than their standard errors."
+                f"The remaining error is within the noise floor, but it still correlates with {_in_words(self.goes_with)} (p = "
+                f"{self.p_value:.2g}): parameters may be off by more than their standard errors."
             )
         percent = float(f"{100.0 * self.share:.2g}")
         left = (
-            f"What is left, {percent:g} % of the squared gap, still goes with {_in_words(self.goes_with)} "
-            f"(p = {self.p_value:.2g})"
+            f"The remaining error, {percent:g} % of the squared gap, still correlates with {_in_words(self.goes_with)} (p = "
+            f"{self.p_value:.2g})"
         )
         if self.share > VERDICT.larger_part:
-            return f"{left}: the larger part of the gap is not explained."
+            return f"{left}: more than half of the gap is not explained."
         if not self.beside_a_cause:
             return f"{left}."
-        return (
-            f"{left}: something smaller is missing too, or the equation has not quite the form of the rig's."
-        )
+        return f"{left}: a smaller effect is missing too, or the equation does not quite fit the rig."
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry ``remainder`` of ``diagnosis.json``."""
@@ -73,15 +72,15 @@ class Remainder:
 
 
 def _in_words(goes_with: str) -> str:
-    """Return with what a remainder goes as a part of a sentence."""
+    """Return the correlated signal as part of a sentence."""
     kind, _, what = goes_with.partition(BY_RECORD)
-    return goes_with if kind else f"the record: {what} differs from one to another"
+    return goes_with if kind else f"the record: {what} differs from record to record"
 
 
 def remainder_of(
     reidentified: Scored, model: Scored, found: Adequacy, lower_bound: bool, beside_a_cause: bool
 ) -> Remainder:
-    """Return what a model leaves.
+    """Return the remaining error of a model.
 
     Parameters
     ----------
@@ -90,9 +89,9 @@ def remainder_of(
     model
         The model of the verdict.
     found
-        Whether what it leaves goes with anything.
+        Whether its residual is correlated with anything.
     lower_bound
-        True if the noise floor is only a lower bound: then only what surely goes with something counts as remainder.
+        True if the noise floor is only a lower bound: then only a significant correlation counts as remaining error.
     beside_a_cause
         True where the verdict names one.
     """

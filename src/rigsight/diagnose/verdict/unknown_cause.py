@@ -1,4 +1,4 @@
-"""Which force is missing, and at which joint, where no effect explains the gap?"""
+"""Which force is missing, and at which joint, if no effect explains the gap?"""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rigsight.rigs import Rig
 
 
 def force_of_one_motion(
-    context: FitContext, reidentified: Scored, no_spring: bool, rng: np.random.Generator
+    context: FitContext, reidentified: Scored, has_stiffness: bool, rng: np.random.Generator
 ) -> MissingForce | None:
-    """Return the shape of the force that a rig with one motion lacks; None for any other rig.
+    """Return the shape of the force missing on a rig with one motion; None for any other rig.
 
     There is none beside effects that are modelled already either: the rig's own terms do not stand alone there.
 
@@ -25,8 +25,8 @@ def force_of_one_motion(
     ----------
     context, reidentified
         Records, and the re-identified equations on them.
-    no_spring
-        True for an axis that has none.
+    has_stiffness
+        False for an axis without a spring.
     rng
         Source of the ensemble.
     """
@@ -34,19 +34,19 @@ def force_of_one_motion(
         return None
     noise = context.noise[context.rig.outputs[0].name]
     return missing_force(
-        context.rig, context.estimation, reidentified.fit.values, context.scales, noise, rng, no_spring
+        context.rig, context.estimation, reidentified.fit.values, context.scales, noise, rng, has_stiffness
     )
 
 
 def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointForce, ...]:
-    """Return the force that would have to be missing at each joint, the likeliest first; none of a rig with one motion.
+    """Return the force that would have to be missing at each joint, the most likely first; none for a rig with one motion.
 
     There are none beside effects that are modelled already either.
 
     Parameters
     ----------
     context, reidentified
-        Records, of which the liveliest stretches are looked at, and the re-identified equations on them.
+        Records, of which the most excited stretches are used, and the re-identified equations on them.
     """
     if context.modelled or context.rig.has_one_motion:
         return ()
@@ -59,14 +59,14 @@ def forces_at_joints(context: FitContext, reidentified: Scored) -> tuple[JointFo
             context.noise,
         )
     except (SimulationError, np.linalg.LinAlgError):
-        # What is not known of the cause is no reason to have no diagnosis.
+        # A diagnosis is still useful if the missing force cannot be found.
         return ()
 
 
 def traced_to(rig: Rig, forces: Sequence[JointForce]) -> tuple[str, ...]:
-    """Return the places of the only missing force that agrees with all sensors; empty where none or several do.
+    """Return the places of the only missing force that agrees with all sensors; empty if none or several agree.
 
-    Those are a joint, and the drives that act along its very motion.
+    These are a joint, and the drives that act along the same motion.
 
     Parameters
     ----------

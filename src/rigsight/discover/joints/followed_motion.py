@@ -1,7 +1,7 @@
-"""How does a rig move that follows its sensors, and which forces at its joints does that take?
+"""Motion of a rig that follows its sensors, and the forces at its joints that this requires.
 
-A rig carries an unknown force at some of its joints. The equations are linearized about the motion found so far, a smoother finds
-a better one, and so on.
+The rig has an unknown force at some of its joints. The equations are linearized about the current estimate of the motion, a
+smoother improves the estimate, and this is repeated.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class FollowedMotion:
     jumps: list[NDArray[np.bool_] | None] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Keep the values known beforehand, to which an estimate is held where the records say nothing."""
+        """Keep the prior values, to which an estimate is held where the records do not determine it."""
         self.known = dict(self.values)
         self.jumps = [None] * len(self.motions)
 

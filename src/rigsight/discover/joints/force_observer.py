@@ -1,9 +1,9 @@
-"""Which motion and which unknown force agree best with the sensors? Kalman filter and smoother about a reference motion.
+"""Motion and unknown force that agree best with the sensors: Kalman filter and smoother about a reference motion.
 
 The unknown force is a state of the structure, an integrated random walk. Many cases (joints, records, intensities of the walk)
-go through time side by side. Whatever else might have moved the sensors (a changed parameter, a force of known course) passes
-the same filter as a further column: the columns that leave it are whitened, and plain least squares on them is the likeliest
-estimate with the unknown force averaged out.
+are filtered side by side. Other possible causes (a changed parameter, a force with a known time history) pass through the same
+filter as further columns: these are then whitened, and ordinary least squares on them is the maximum likelihood estimate with the
+unknown force marginalized.
 
 References
 ----------

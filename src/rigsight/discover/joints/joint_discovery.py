@@ -1,7 +1,7 @@
-"""The whole discovery on a rig of several joints: records and a rig -> missing force per joint, its law, polished equations.
+"""The whole discovery on a rig of several joints: records and a rig -> missing force per joint, its law, refitted equations.
 
-Linearized responses propose joint and law; output error polishes the rig with the law at its place, and free runs of records it
-has not seen decide.
+Linearized responses propose joint and law; the rig with this law is refitted by output error, and free runs on held-out records
+decide.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def discover_at_joints(
     joints = missing_forces(data.rig, centered, known, data.noise, np.random.default_rng(seed))
     say("missing forces")
     found = [alone]
-    # The law of a joint that is ruled out is not polished.
+    # The law of a joint that is ruled out is not refitted.
     for force in not_contradicted(joints):
         if force.law.terms:
             start = {**known, **force.parameters}
@@ -184,7 +184,7 @@ def _assembled(
     rig, held_out = data.rig, polisher.held_out
     finest = min(found, key=lambda one: one.error_over_noise)
     if not math.isfinite(finest.error_over_noise):
-        raise SimulationError("The polished equations cannot be simulated on the held-out records.")
+        raise SimulationError("The refitted equations cannot be simulated on the held-out records.")
     independent = _independent(rig, finest)
 
     def criterion(one: _Polished) -> float:
@@ -254,7 +254,7 @@ def _terms(
         names = [structure.parameter_name(effect, p.name) for p in effect.parameters]
         own = {name: coefficients[name] for name in names if name in coefficients}
         vague = [n for n, c in own.items() if not c.std < abs(c.value) / _VAGUE]
-        doubt = f"{' and '.join(vague)} cannot be told from zero" if vague else ""
+        doubt = f"{' and '.join(vague)} cannot be distinguished from zero" if vague else ""
         found.append(
             Term(
                 kind_of(effect.name),
@@ -329,8 +329,8 @@ def _warnings(
     ruled_out = [force.joint for force in joints if force not in agreeing]
     if ruled_out:
         found.append(
-            f"No force at {' or '.join(ruled_out)} alone explains what all sensors show; at {first.joint} one does, "
-            f"but for {first.error_over_noise:.2g} noise floors."
+            f"No force at {' or '.join(ruled_out)} alone explains the readings of all sensors; a force at {first.joint} explains "
+            f"them up to {first.error_over_noise:.2g} noise floors."
         )
     rivals = [
         one
@@ -339,11 +339,13 @@ def _warnings(
     ]
     if rivals:
         listed = "; ".join(", ".join(term.effect.name for term in one.terms) for one in rivals)
-        found.append(f"With {listed} the held-out error is no larger, but not smaller by more than chance.")
+        found.append(
+            f"{listed} does not increase the held-out error, but does not lower it significantly either."
+        )
     if chosen.error_over_noise > _FLOOR:
         found.append(
             f"The equations leave {chosen.error_over_noise:.1f} times the noise floor in free run on the held-out records: "
-            "something is still missing, or disturbances are larger than the floor says."
+            "an effect is still missing, or disturbances are larger than the noise floor."
         )
     unknown = [name for name, c in coefficients.items() if not math.isfinite(c.std)]
     if unknown:

@@ -1,7 +1,7 @@
-"""Which force is missing at each joint of a rig, how much of what the sensors contradict would it explain, and which law has it?
+"""The force missing at each joint of a rig, how much of the sensor errors it would explain, and its law.
 
-For rigs of several joints, degrees of freedom, inputs or sensors. Each joint in turn carries all that is missing. Law and
-parameters of the rig are estimated together, and the likelihood of what all sensors showed ranks the joints.
+For rigs of several joints, degrees of freedom, inputs or sensors. For each joint in turn, everything missing is assumed to act
+there. Law and parameters of the rig are estimated together, and the joints are ranked by the likelihood of all sensor readings.
 """
 
 from __future__ import annotations
@@ -122,9 +122,12 @@ class JointForce:
     def sentence(self) -> str:
         """The finding in words."""
         if not self.law.terms:
-            return f"No law of the motion of {self.joint} describes a force that is missing there."
+            return f"No function of the motion of {self.joint} describes the force missing there."
         told = " and ".join(term.text for term in self.law.terms)
-        return f"Of a force that is missing at {self.joint}, {told} explains {self.law.share:.0%} (x and v of the joint)."
+        return (
+            f"The force missing at {self.joint} is best described by {told}, which explains {self.law.share:.0%} (x and v of "
+            f"the joint)."
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data without the traces."""
@@ -171,7 +174,7 @@ def missing_forces(
         If there is no record.
     """
     if not records:
-        raise InputError("A missing force is traced in records; there is none.")
+        raise InputError("Finding a missing force needs at least one record; there is none.")
     floors = noise_of(rig, noise)
     found = joint_motions(rig, records, values, noise)
     before = _free_run_square(rig, records, values, floors, found[0].followed)
@@ -205,7 +208,7 @@ def missing_forces(
 
 
 def not_contradicted(forces: Sequence[JointForce]) -> tuple[JointForce, ...]:
-    """Return the missing forces that the sensors contradict no more than a few times as much as the one they contradict least.
+    """Return the missing forces whose error over all sensors is at most a few times that of the best one.
 
     Parameters
     ----------

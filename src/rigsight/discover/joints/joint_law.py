@@ -1,7 +1,7 @@
-"""Which law does the missing force at a joint obey? Sparse regression in the sensors' own noise, on terms of that joint's motion.
+"""Law of the missing force at a joint: sparse regression on terms of the motion of the joint, weighted by the sensor noise.
 
-Whatever part of the force no term explains stays an unknown force, whose intensity competes with the terms: the likelihood
-decides, and it is the same quantity for all joints, so that it also says at which of them the law acts.
+The part of the force that no term explains remains an unknown force, whose intensity competes with the terms. The likelihood
+decides; it is comparable between joints and so also shows at which joint the law acts.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ STRONG = 10.0
 """Difference of the criterion that counts as decided (Kass and Raftery 1995: very strong evidence)."""
 _MOST_TERMS = 4
 _SAME_COLUMN = 1.0 - 1e-7
-"""Correlation of terms that no record of this length could tell apart; of others the likelihood decides."""
+"""Correlation above which terms cannot be distinguished by a record of this length; otherwise the likelihood decides."""
 _SAME_STIFFNESS = 0.5
 """Relative difference within which a coefficient is the stiffness of the spring: play leaves it as it is."""
 _WORTH = 0.05
@@ -81,7 +81,7 @@ class LawTerm:
         return f"{shape} ({kind}: {numbers})"
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain data; what stands inside a term has no standard error of its own, nor has what is not determined."""
+        """Return plain data; nonlinear and undetermined parameters have no standard error."""
         known = {name: std for name, std in self.std.items() if math.isfinite(std)}
         return {
             "name": kind_of(self.effect.name),
@@ -330,7 +330,7 @@ def _law(
         std = {n: abs(share) * float(error) for n, share in candidate.linear.items()}
         if any(values[name] < named[name].lower for name in candidate.linear):
             return None
-        # What stands between motion and spring takes the spring's own stiffness off.
+        # An effect between motion and spring replaces the stiffness of the spring.
         if not candidate.linear and abs(value - stiffness) > _SAME_STIFFNESS * abs(stiffness):
             return None
         units = {n: rig.with_unit(p, found.joint.name).unit for n, p in named.items()}

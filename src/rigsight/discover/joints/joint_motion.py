@@ -1,7 +1,7 @@
-"""Which force at one joint alone would make a rig follow its sensors, and how does that joint move?
+"""The force at one joint alone that would make a rig follow its sensors, and the motion of that joint.
 
-First all joints carry an unknown force, so that the motion follows the sensors wherever the missing force acts. From there each
-joint carries it alone: what the sensors still contradict then speaks against the joint.
+First all joints have an unknown force, so that the motion follows the sensors wherever the missing force acts. Then each joint
+has it alone: the remaining sensor errors are evidence against this joint.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def _sizes(
     linear: LinearizedMotion,
     omega: float,
 ) -> Floats:
-    """Return the size of every state: what the sensors say of it, by its rate or by its coordinate, else that of the others."""
+    """Return the size of every state: from sensors of it, its rate or its coordinate, else from the other states."""
     seen = np.max(np.abs(linear.seen), axis=0)
     spreads = np.array(
         [max((float(np.std(r[s.name])) for r in records if s.name in r), default=0.0) for s in rig.outputs]
@@ -190,7 +190,7 @@ def _sizes(
     size[:n] = np.where(size[:n] > 0.0, size[:n], np.max(moving) if moving.size else 1.0)
     size[n : 2 * n] = np.maximum(size[n : 2 * n], omega * size[:n])
     size = np.where(size > 0.0, size, 1.0)
-    # What a force has to be that moves its joint as far as it moves, within one radian of the motion.
+    # Size of a force that moves its joint by its motion within one radian of the motion.
     rates = (linear.transition[0] - np.eye(n_states)) / linear.dt
     for joint, (force, rate) in zip(rig.mechanism.joints, forces, strict=True):
         motion = joint_motion(equations.structure, joint)[0]

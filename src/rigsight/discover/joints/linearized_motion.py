@@ -1,4 +1,4 @@
-"""How do a structure's motion and readings answer to small changes of state and parameters along a record?
+"""Sensitivity of the motion and readings of a structure to small changes of state and parameters along a record.
 
 The equations are flattened once into functions of arrays. From sample to sample they are integrated together with their
 derivatives (Runge-Kutta of fourth order), each sample anew from a reference motion: nothing grows where a rig is unstable.

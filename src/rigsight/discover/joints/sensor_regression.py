@@ -1,6 +1,7 @@
-"""What would forces of known course at a joint have shown on the sensors? Rows for a regression, whitened like what they showed.
+"""Sensor responses to forces with known time histories at a joint: rows for a regression, whitened like the measurements.
 
-The terms pass the rig's linearized equations instead of the records passing an inverse of them: nothing is differentiated.
+The terms are filtered through the linearized equations of the rig instead of applying an inverse to the records: nothing is
+differentiated.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is a force of which nothing is known? An effect like any other: it resists a joint, and its course is a state."""
+"""An unknown force, declared as an effect: it resists a joint, and its time history is a state."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _RATE = sp.Symbol("missing_force_rate", real=True)
 UNKNOWN_FORCE = Effect(
     name="missing_force",
     place=Place.DYNAMICS,
-    summary="A force of unknown course resists the motion.",
+    summary="A force of unknown shape over time resists the motion.",
     parameters=(),
     energy=Energy.ACTIVE,
     signature=Signature(gain_trend=GainTrend.STEADY),

@@ -1,7 +1,7 @@
-"""What do the states of an effect do along a measured motion, where they follow it linearly?
+"""States of an effect along a measured motion, if they depend on it linearly.
 
-Rates that are linear in states and signals, with coefficients that the parameters alone make, are a filter: its step from
-sample to sample is exact for the hold of the record, and one filter serves every effect that is declared so.
+Rates that are linear in states and signals, with coefficients that depend only on parameters, are a linear filter: its step from
+sample to sample is exact for the hold of the record, and the same code serves every effect of this kind.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How is a structure written as equations that people read? Plain text, and LaTeX."""
+"""Equations of a structure as plain text and LaTeX."""
 
 from __future__ import annotations
 

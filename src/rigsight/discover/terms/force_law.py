@@ -1,10 +1,10 @@
-"""Which equation does a hidden force with memory obey, as far as the records show it?
+"""The equation of a hidden force with memory, as far as the records show it.
 
-What the drive leaves after inertia, damping and the spring without memory is the hysteretic force F itself. It is the loop's
-state times a stiffness, so the rate that the effect declares for its state, ``z' = A x' - ...``, is an equation of F with other
-coefficients. Its terms, those of each parameter in which it is linear, are regressed like any other, beside a force that
-relaxes and one without memory; that says which of them the records show. Two derivatives of a noisy displacement make this
-look blind long before the loop itself is.
+The drive less inertia, damping and the spring without memory is the hysteretic force F itself. It is the loop's state times a
+stiffness, so the rate that the effect declares for its state, ``z' = A x' - ...``, is an equation of F with other coefficients.
+Its terms, those of each parameter in which it is linear, are found by regression like any other, together with a relaxing force
+and one without memory; this shows which of them the records support. Because a noisy displacement is differentiated twice, this
+test fails at noise levels at which the loop itself is still found.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Is there a hidden force with memory? The states of a loop follow from the measured motion alone, so it is a column.
+"""Hidden forces with memory: the states of a loop follow from the measured motion, so it is a regression column.
 
-Any effect that puts states in the place of the spring's deflection is such a loop. What stands inside it is read from its
-declaration and found by variable projection: a grid outside, linear regression inside, and a descent from the best point.
+Any effect that replaces the deflection of the spring by states is such a loop. Its nonlinear parameters are taken from its
+declaration and found by variable projection: a grid over them, linear regression for the rest, and a descent from the best point.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def is_loop(effect: Effect) -> bool:
     known |= {sp.Symbol(p.name, real=True) for p in effect.parameters} | {s.symbol for s in effect.states}
     return (
         effect.spring is not None
-        and effect.elastic_share is not None
+        and effect.post_yield_stiffness_ratio is not None
         and bool(effect.states)
         and all(state.rate.free_symbols <= known for state in effect.states)
     )
@@ -88,7 +88,11 @@ class LoopShape:
     def of(cls, effect: Effect) -> LoopShape:
         """Read the coordinates from a declaration."""
         paired = {name for pair in effect.searched_as for name in (pair.first, pair.second)}
-        inside = [p for p in effect.parameters if p.fitted and p.name not in {effect.elastic_share, *paired}]
+        inside = [
+            p
+            for p in effect.parameters
+            if p.fitted and p.name not in {effect.post_yield_stiffness_ratio, *paired}
+        ]
         return cls(
             pairs=effect.searched_as,
             single=tuple(p for p in inside if p.name not in effect.special_cases),
@@ -152,7 +156,7 @@ class Loop:
     column
         Rows of the loop's own deflection of all records, shape (n_rows,).
     share
-        Share of what the rig's own terms leave that the loop explains.
+        Share of the residual of the rig's own terms that the loop explains.
     """
 
     values: Mapping[str, float]
@@ -174,7 +178,7 @@ def best_loop(
     driven: bool,
     threads: IdleThreads,
 ) -> Loop | None:
-    """Return the loop that explains most of what the rig's own terms leave, None where none explains anything.
+    """Return the loop that explains most of the residual of the rig's own terms, None where none explains anything.
 
     Parameters
     ----------
@@ -222,7 +226,7 @@ def best_loop(
         seen: dict[bytes, NDArray[np.float64]] = {}
 
         def around(theta: NDArray[np.float64]) -> NDArray[np.float64]:
-            """Return what is left at a point and at a step along each axis: a few loops cost as much as one."""
+            """Return the residual at a point and at a step along each axis: a few loops cost as much as one."""
             key = theta.tobytes()
             if key not in seen:
                 seen.clear()
@@ -279,8 +283,8 @@ def _columns(
     motion_of_element = structure.rig.motion
     fixed = {p.name: 0.0 for p in structure.rig.parameters} | {motion_of_element.stiffness.name: 1.0}
     fixed |= {p.name: p.default for p in effect.parameters if p.default is not None}
-    assert effect.elastic_share is not None
-    values = [{**fixed, effect.elastic_share: 0.0, **inner} for inner in shapes]
+    assert effect.post_yield_stiffness_ratio is not None
+    values = [{**fixed, effect.post_yield_stiffness_ratio: 0.0, **inner} for inner in shapes]
     p = np.array([[v[name] for v in values] for name in structure.names])
 
     def block(index: int) -> NDArray[np.float64]:

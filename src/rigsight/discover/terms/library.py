@@ -1,8 +1,8 @@
-"""Which terms may the equation hold, and what is each along the measured motion?
+"""Library of terms that the equation may contain, evaluated along the measured motion.
 
-Every candidate comes from an effect's own declaration. Where its torque is linear in its parameters, those become
-coefficients; what stands inside (a clearance, a dead time, the shape of a loop) is found by variable projection: a grid
-outside, linear regression inside. Each effect then brings one column to the library, at its best inner values.
+Every candidate comes from an effect's own declaration. Parameters in which the torque is linear become coefficients; nonlinear
+ones (a clearance, a dead time, the shape of a loop) are found by variable projection: a grid over them, linear regression for the
+rest. Each effect then contributes one column to the library, at its best nonlinear parameters.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Candidate:
         return self.effect.name
 
 
-def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
+def offered_effects(rig: Rig, has_stiffness: bool) -> list[Effect]:
     """Return the effects that a regression can hold as terms on this rig.
 
     A state has no signal of its own along a measured motion; loops, and what filters the drive, are the exceptions, because
@@ -76,14 +76,14 @@ def offered_effects(rig: Rig, has_spring: bool) -> list[Effect]:
         effect
         for effect in (*CATALOGUE, *MONOMIALS)
         if rig.offers(effect)
-        and (has_spring or effect not in changes_spring)
+        and (has_stiffness or effect not in changes_spring)
         and (is_loop(effect) or _filters_drive(effect) or _is_static(effect))
     ]
 
 
-def plain_terms(rig: Rig, has_spring: bool) -> list[Effect]:
+def plain_terms(rig: Rig, has_stiffness: bool) -> list[Effect]:
     """Return those of the offered effects that are a torque with one coefficient and nothing inside."""
-    return [effect for effect in offered_effects(rig, has_spring) if _is_plain(effect)]
+    return [effect for effect in offered_effects(rig, has_stiffness) if _is_plain(effect)]
 
 
 def _is_static(effect: Effect) -> bool:
@@ -118,7 +118,7 @@ def candidates(
     driven: bool,
     threads: IdleThreads | None = None,
 ) -> list[Candidate]:
-    """Return one candidate per effect, at the inner values that explain most of what the rig's own terms leave.
+    """Return one candidate per effect, at the nonlinear parameters that explain most of the residual of the rig's own terms.
 
     Parameters
     ----------

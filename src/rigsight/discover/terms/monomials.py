@@ -1,7 +1,7 @@
-"""Which torques of displacement and velocity can a discovered equation hold that no effect of the catalogue describes?
+"""Torques of displacement and velocity for discovered equations that no effect of the catalogue describes.
 
-The products ``x^i x'^j`` up to the third degree, each declared as an effect so that the engine simulates a discovered model
-like any other. They describe; they name no cause, and a diagnosis does not offer them.
+The products ``x^i x'^j`` up to the third degree, each declared as an effect so that the engine simulates a discovered model like
+any other. They are descriptive and not causes, so a diagnosis does not use them.
 """
 
 from __future__ import annotations

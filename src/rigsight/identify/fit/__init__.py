@@ -1,1 +1,1 @@
-"""Output-error fits: which numbers make a simulation follow its records, and how sure are they?"""
+"""Output-error fits: the parameters with which a simulation follows its records, and their uncertainty."""

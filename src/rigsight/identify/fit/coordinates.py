@@ -1,8 +1,8 @@
-"""Search coordinates: parameters in characteristic units, logarithms of positive ones, and what records tell apart.
+"""Search coordinates: parameters in characteristic units, logarithms of positive ones, and well-determined combinations.
 
-Those are sum and difference of a pair, by how much one parameter is larger than another that it never falls below, and of a
-spring with memory the stiffness without memory and the one with it: where the latter is large, the product of the spring's
-stiffness and its elastic share is known far better than either.
+Such combinations are the sum and difference of a pair, the excess of one parameter over another that it never falls below, and
+for a hysteretic spring the post-yield stiffness and the hysteretic remainder: if the latter is large, the product of the
+stiffness and its post-yield ratio is known far better than either.
 """
 
 from __future__ import annotations
@@ -218,15 +218,15 @@ class Coordinates:
 
 
 def _split(structure: Structure, free: Sequence[str]) -> _Split | None:
-    """Return where a spring's stiffness and its elastic share stand, if a search moves both; of several effects the first.
+    """Return where a spring's stiffness and its post-yield ratio stand, if a search moves both; of several effects the first.
 
     The spring is that of the joint at which the effect acts; one whose stiffness is no plain parameter has no such place.
     """
     rig = structure.rig
     stiffness_at = {joint.name: joint.stiffness for joint in rig.mechanism.joints}
     for effect in structure.effects:
-        if effect.elastic_share is not None:
-            share = structure.parameter_name(effect, effect.elastic_share)
+        if effect.post_yield_stiffness_ratio is not None:
+            share = structure.parameter_name(effect, effect.post_yield_stiffness_ratio)
             stiffness = stiffness_at[rig.acts_at(effect)]
             if stiffness.is_Symbol and stiffness.name in free and share in free:
                 return _Split(free.index(stiffness.name), free.index(share))

@@ -21,7 +21,7 @@ An assumption: ten times as much as for the direction itself; an arm with three 
 _TAKES_PART = 1e-9
 SMOOTHED = 15
 """Lines over which a residual spectrum is averaged. A number of lines, not a share of them: lines lie one per duration of the
-record however fast it is sampled, and what a disturbance leaves of a resonance is some of them wide."""
+record however fast it is sampled, and the resonance excited by a disturbance is some of them wide."""
 
 
 def colored_covariance(
@@ -100,7 +100,7 @@ def sandwich_covariance(
     known = vectors[:, seen]
     inverse = (known / eigenvalues[seen]) @ known.T
     covariance = inverse @ (filling / np.outer(size, size)) @ inverse / np.outer(size, size)
-    # A coordinate that takes part in an unseen direction may be anything, however well its share in the seen ones is known.
+    # A coordinate with a component in an undetermined direction is undetermined, however well its other components are known.
     takes_part = max(_TAKES_PART, (_MIXED * derivative_error) ** 2)
     undetermined = np.sum(vectors[:, ~seen] ** 2, axis=1) > takes_part
     covariance[undetermined, :] = 0.0

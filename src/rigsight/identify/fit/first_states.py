@@ -1,4 +1,4 @@
-"""In which state does a record begin? Guesses from its first samples, for a fit to start from."""
+"""Initial states of a record: estimates from its first samples, as start values of a fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does a fit see of its records, and what is left of them? Measured samples with their weights, residuals."""
+"""Data of a fit: measured samples with their weights, residuals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Has this very fit been done before? Its key, and what is remembered of its outcome."""
+"""Cache of fits: the key of a fit and its stored result."""
 
 from __future__ import annotations
 

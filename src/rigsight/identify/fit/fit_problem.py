@@ -1,7 +1,7 @@
 """Cost, derivatives and Gauss-Newton matrix of an output-error fit as functions of its coordinates and initial states.
 
-They come from one call of the kernel for all records. It carries the derivatives along with the motion, or, where that takes
-longer, the current parameters and every shifted one are lanes of its side-by-side integrator.
+They come from one call of the kernel for all records. It integrates the derivatives together with the motion or, where that takes
+longer, the current parameters and every shifted set in parallel lanes.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class Problem:
     def _put_together(
         self, products: NDArray[np.float64], projections: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what all records say of all coordinates, given what each says of the parameters and its own initial states.
+        """Return the normal equations of all coordinates from those of each record for the parameters and its own initial states.
 
         Parameters
         ----------

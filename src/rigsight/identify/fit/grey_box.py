@@ -27,8 +27,8 @@ from rigsight.identify.fit.fit_problem import MOST_SUBSTEPS, Problem
 from rigsight.identify.fit.fit_result import FitResult
 from rigsight.identify.fit.idle_threads import IdleThreads
 from rigsight.identify.fit.search import FINE_TOLERANCE, off_kinks, searched
-from rigsight.identify.fit.separate_states import SeparateStates
 from rigsight.identify.fit.settled_states import guessed_states
+from rigsight.identify.fit.variable_projection import VariableProjection
 from rigsight.records.record import Record
 from rigsight.simulate import (
     Structure,
@@ -187,7 +187,7 @@ class GreyBoxFit:
             if finish and tolerance <= FINE_TOLERANCE and np.any(self.data.limited):
                 settled = off_kinks(problem, theta, (lower, upper), self.n_samples)
                 if settled is not None:
-                    return settled, True, "Steps made of long differences have vanished."
+                    return settled, True, "Steps from coarse finite differences have become zero."
             return theta, bool(solution.status > 0), str(solution.message)
 
         settings = (max_evaluations, tolerance, list(map(int, problem.substeps)))
@@ -223,13 +223,13 @@ class GreyBoxFit:
         """
         begin = self._begin(start, free, None)
         coordinates, n_free = begin.coordinates, len(free)
-        problem = SeparateStates(self.data, coordinates, begin.places, begin.lower, begin.upper)
+        problem = VariableProjection(self.data, coordinates, begin.places, begin.lower, begin.upper)
         problem.choose_substeps(begin.theta)
         if not np.isfinite(problem.settle_anew(begin.theta[:n_free])):
             return self._failed(problem, begin.theta, "The start values cannot be simulated.")
 
         def search() -> _Outcome:
-            own, success, message = begin.theta[:n_free], True, "Nothing to fit but initial states."
+            own, success, message = begin.theta[:n_free], True, "Only initial states to fit."
             bounds, cost = (coordinates.lower, coordinates.upper), float("inf")
             for _ in range(most_rounds if free else 0):
                 solution = searched(problem, own, bounds, tolerance, max_evaluations)
@@ -246,7 +246,7 @@ class GreyBoxFit:
         return self._result(together, *outcome, finish=True)
 
     def information(self, start: Mapping[str, float], free: Sequence[str]) -> NDArray[np.float64]:
-        """Return what the records say of parameters at their start, with all initial states as unknown as they are.
+        """Return the information of the records on parameters at their start, with unknown initial states.
 
         The Fisher information of relative changes, of changes in units of their size where a value is zero; NaN where the start
         cannot be simulated.

@@ -1,8 +1,8 @@
-"""Which threads do which fit, and which help with the records of one? Those that no other fit keeps busy.
+"""Distribution of threads: idle threads help with the records of a running fit.
 
-Candidates are fitted side by side as long as there are as many of them as jobs. Before the first and after the last of them, and
-where one takes far longer than the others, the jobs that are left take a share of the records of a fit that runs: simulations
-do not hold the interpreter. What is computed, and the order in which it is summed, is the same with any number of jobs.
+Candidates are fitted side by side as long as there are at least as many of them as jobs. Otherwise, and when one takes much
+longer than the others, idle jobs take a share of the records of a running fit, because simulations release the interpreter lock.
+The results and the order of summation do not depend on the number of jobs.
 """
 
 from __future__ import annotations

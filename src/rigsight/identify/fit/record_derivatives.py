@@ -1,4 +1,4 @@
-"""How do the residuals of each record answer to the fitted numbers and to its initial state? At the end of a fit."""
+"""Derivatives of the residuals of each record by the fitted parameters and its initial state, at the end of a fit."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def own_derivatives(
             there = theta + share * step
             there[:n_free] = np.clip(there[:n_free], coordinates.lower, coordinates.upper)
             tried = evaluated.sensitivities(there)[0]
-            # A motion that leaves the range of numbers is no improvement.
+            # A motion that diverges is no improvement.
             with np.errstate(over="ignore", invalid="ignore"):
                 if float(tried[0] @ tried[0]) < float(residual @ residual):
                     ahead = tried

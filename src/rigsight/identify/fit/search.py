@@ -1,9 +1,9 @@
-"""How does a fit get from its start to its end? A bounded trust region, and where sliders make its cost rough a way off kinks.
+"""Optimizer of a fit: a bounded trust region, with coarse finite differences where friction sliders make the cost nonsmooth.
 
-Where a slider lets go one sample later the cost has a kink, and a descent along derivatives stops at one of many, by rounding at
-another one each time. Differences over steps as long as the noise makes them see past kinks and are continuous in the parameters
-and in the data: the place where Gauss-Newton steps made of them vanish moves no more than the data do. This is another need than
-that of derivatives, and what is carried along with a motion cannot serve it.
+When a slider slips one sample later, the cost has a kink, and a descent along exact derivatives stops at one of many kinks,
+depending on rounding. Finite differences over steps as large as the standard errors average over kinks and are continuous in the
+parameters and the data: the point at which Gauss-Newton steps from them vanish is stable. Derivatives integrated along with the
+motion cannot do this.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rigsight.identify.fit.fit_problem import Evaluation, Problem
 from rigsight.simulate import simulate_outputs
 
 FINE_TOLERANCE = 1e-6
-"""A search that stops at larger changes of the cost is a rough one: kinks are the least of what it leaves."""
+"""A search that stops at larger changes of the cost is only a rough one, for which kinks do not matter."""
 _SETTLED = 3e-3
 """Length of a step, in standard errors, after which no more are made: with steps that halve, a hundredth is left at most."""
 _MOST_STEPS = 20

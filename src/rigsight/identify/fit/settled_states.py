@@ -1,8 +1,8 @@
-"""Which initial state does the beginning of a record speak for? From a guess over ever longer stretches to the whole record.
+"""Initial state of a record: fitted from an estimate over longer and longer stretches up to the whole record.
 
-What a state does is known over a short stretch better than over a long one, above all where the motion is unstable or chaotic: a
-descent that begins with the whole record would not come back from a guess that is a little off. Where what a state does dies
-away, the fit itself comes back, and longer stretches are left to it.
+The effect of an initial state is simpler over a short stretch than over a long one, above all if the motion is unstable or
+chaotic: a descent on the whole record would fail from a slightly wrong estimate. If the effect of the initial state decays, the
+fit itself converges, and longer stretches are left to it.
 """
 
 from __future__ import annotations

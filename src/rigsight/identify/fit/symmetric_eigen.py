@@ -1,4 +1,4 @@
-"""Eigenvalues and eigenvectors of a symmetric matrix, also where LAPACK's divide and conquer gives up."""
+"""Eigenvalues and eigenvectors of a symmetric matrix, also if LAPACK's divide and conquer fails."""
 
 from __future__ import annotations
 

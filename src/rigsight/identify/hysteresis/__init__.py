@@ -1,4 +1,4 @@
-"""Calibration of hysteresis: to records, to families of frequency responses, and what the numbers mean."""
+"""Calibration of hysteresis to records or to families of frequency responses, and derived quantities."""
 
 from rigsight.identify.hysteresis.calibration import Calibration as Calibration
 from rigsight.identify.hysteresis.calibration import Minimum as Minimum

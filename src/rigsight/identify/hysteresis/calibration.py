@@ -1,4 +1,4 @@
-"""What did a calibration of hysteresis find?"""
+"""Result of a calibration of hysteresis."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What do hysteresis parameters mean? Saturation, the pair that shapes the loop, and energy per cycle, with intervals.
+"""Quantities derived from hysteresis parameters: saturation, the pair that shapes the loop, and energy per cycle, with intervals.
 
-Intervals come from draws of the parameters' covariance: saturation and pair are anything but linear in the parameters.
+Intervals come from draws of the parameters' covariance: saturation and pair are strongly nonlinear in the parameters.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ def loop_area(structure: Structure, p: NDArray[np.float64], amplitude: float) ->
     effects = [e for e in structure.effects if e.spring is not None or e.deflection is not None]
     if not any(effect.spring is not None for effect in effects):
         raise InputError(
-            f"No hysteresis of the spring among the effects ({', '.join(structure.effect_names) or 'none'}): there is no loop."
+            f"No spring hysteresis among the effects ({', '.join(structure.effect_names) or 'none'}): there is no loop."
         )
     if not 0.0 < amplitude < np.inf:
         raise InputError(f"The amplitude of a loop must be positive, got {amplitude:g}.")
@@ -282,8 +282,8 @@ def _in_words(saturation: Derived, total: str) -> str:
         return f"{total} is not positive: z grows without bound, and the spring never saturates."
     if not np.isfinite(saturation.upper):
         return (
-            f"The records do not tell {total} from zero: z may saturate from {saturation.lower:.3g} {saturation.unit} on, or "
-            "never. A larger amplitude would tell."
+            f"In these records {total} cannot be distinguished from zero: z may saturate from {saturation.lower:.3g} "
+            f"{saturation.unit} on, or never. Record a larger amplitude to find out."
         )
     return (
         f"z saturates at {saturation.value:.3g} {saturation.unit} ({saturation.lower:.3g} to {saturation.upper:.3g} with "

@@ -1,4 +1,4 @@
-"""How high is the peak of a frequency response, and where does it break?"""
+"""Peak and break frequency of a frequency response."""
 
 from __future__ import annotations
 

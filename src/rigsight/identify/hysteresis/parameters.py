@@ -1,4 +1,4 @@
-"""Which parameters does a calibration of hysteresis move, and which special cases does it begin with?"""
+"""Free parameters of a calibration of hysteresis, and the special cases from which it starts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def free_parameters(
     rest = {symbol.name for symbol in motion.rest.free_symbols}
     bias = {symbol.name for symbol in motion.bias.free_symbols}
     if with_rest:
-        # A spring cannot tell a constant force from a shifted rest position; a bench has no rest position.
+        # With a spring a constant force is equivalent to a shifted rest position; a bench has no rest position.
         moved |= rest or bias
     for state, rate in rig.downstream.items():
         if state.name in outputs:

@@ -1,4 +1,4 @@
-"""Which frequency response does a structure have at one amplitude? From the sweep that was measured, or from steady sines.
+"""Frequency response of a structure at one amplitude: from the measured sweep, or from steady sines.
 
 The steady response is that of harmonic balance with all harmonics: each sine is simulated until it repeats, and the first
 harmonic of the response is taken.
@@ -121,7 +121,7 @@ class SweptResponse:
         first, last = self.measured.omega[[0, -1]]
         if found.omega[0] > first * (1.0 + 1e-9) or found.omega[-1] < last * (1.0 - 1e-9):
             raise InputError(
-                f"The estimator reaches from {found.omega[0]:.4g} to {found.omega[-1]:.4g} rad/s and the measured response from "
+                f"The estimator covers {found.omega[0]:.4g} to {found.omega[-1]:.4g} rad/s and the measured response from "
                 f"{first:.4g} to {last:.4g} rad/s: cut the measured response with band()."
             )
         level = np.interp(self.measured.omega, found.omega, np.log(np.maximum(found.magnitude, _SMALLEST)))
@@ -222,7 +222,9 @@ def _check_signals(structure: Structure, measured: FrequencyResponse) -> None:
     check_option("The source", measured.source, [signal.name for signal in rig.inputs])
     check_option("The response", measured.response, [signal.name for signal in rig.outputs])
     if not measured.magnitude.all():
-        raise InputError(f"{measured.source} -> {measured.response} is zero at some frequency: leave it out.")
+        raise InputError(
+            f"{measured.source} -> {measured.response} is zero at some frequency: leave that frequency out."
+        )
 
 
 def _output(structure: Structure, measured: FrequencyResponse) -> int:

@@ -1,4 +1,4 @@
-"""Where in the whole range of its parameters does a model fit? Differential evolution with all sets side by side."""
+"""Global search over the whole range of the parameters: differential evolution with all sets side by side."""
 
 from __future__ import annotations
 
@@ -106,8 +106,7 @@ class Found:
         usable = self.coordinates[self.costs < _UNUSABLE]
         if usable.size == 0:
             raise InputError(
-                "No parameter set of the searched range can be simulated. Give start values nearer to the rig, or a smaller "
-                "spread."
+                "No parameter set in the search range can be simulated. Give better start values or a smaller spread."
             )
         return usable
 

@@ -1,4 +1,4 @@
-"""What frequency response does a sweep give at chosen frequencies? An estimator that is linear in the response."""
+"""Frequency response of a sweep at chosen frequencies, by an estimator that is linear in the response."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ class SpectralRatio:
         lines = 2.0 * np.pi * np.fft.rfftfreq(record.n_samples, record.dt)
         if self.omega[-1] >= lines[-1]:
             raise InputError(
-                f"Record '{record.name}' has a Nyquist frequency of {lines[-1]:.4g} rad/s, and {self.omega[-1]:.4g} rad/s is "
-                "asked for: sample faster, or cut the band."
+                f"Record '{record.name}' has a Nyquist frequency of {lines[-1]:.4g} rad/s, but {self.omega[-1]:.4g} rad/s is "
+                f"requested: sample faster, or reduce the band."
             )
         spectrum = np.fft.rfft(record[self.source])
         for omega in self.omega:

@@ -1,4 +1,4 @@
-"""Which hysteresis parameters do records show? Search over the whole range by simulation, then output-error refinement."""
+"""Hysteresis parameters from records: global search by simulation, then output-error refinement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which hysteresis parameters does a family of frequency responses show, one response per amplitude?"""
+"""Hysteresis parameters from a family of frequency responses, one per amplitude."""
 
 from __future__ import annotations
 

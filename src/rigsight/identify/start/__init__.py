@@ -1,1 +1,1 @@
-"""Start values: which numbers do the records show before any simulation, and in which units is searched?"""
+"""Start values: estimates from the records without simulation, and the units of the search."""

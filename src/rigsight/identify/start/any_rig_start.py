@@ -1,8 +1,8 @@
 """Parameters of a rig of any shape straight from its records, as start values of a grey-box fit.
 
-Where sensors show all states, the error of the equations of motion is made small (`weak_equations`); in any case that of the
-linearization against the spectra (`linearized_responses`). Both search over decades and cost no simulation. The best few of their
-minima are fitted roughly by simulation, and the one that leaves least is the start.
+If sensors show all states, the error of the equations of motion is minimized (`weak_equations`); in any case also that of the
+linearization relative to the spectra (`linearized_responses`). Both search over decades and need no simulation. The best few
+minima are fitted roughly by simulation, and the one with the lowest error is the start.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def any_rig_start(
         return dict(known)
     defaults = {p.name: p.default for p in sought if p.default is not None}
     if rig.mechanism.bodies_are_nonlinear and len(defaults) == len(sought):
-        # Another program answers to these numbers, so the error of its equations costs as much as simulations do.
+        # Another program evaluates these equations, so their error is as costly as simulations.
         return {**known, **defaults}
     values = {**constants, **known}
     rough = _Rough(rig, records, values, [p.name for p in sought])
@@ -99,7 +99,7 @@ def any_rig_start(
                 break
             pieces, whole = rough.lengthening(start)
             if pieces is not None and not rough.explains(whole):
-                # The motion is chaotic: no search finds values that a simulation of the whole could follow any better.
+                # The motion is chaotic: no search finds values with which a simulation of the whole record is better.
                 best = pieces
                 break
             found = min(found, whole, key=lambda fit: fit.cost)
@@ -207,7 +207,7 @@ class _Rough:
         for record in self._records:
             edges = np.unique(np.linspace(0, record.n_samples, count + 1).astype(int))
             pieces += [record.slice(int(a), int(b)) for a, b in pairwise(edges)]
-        # Each has an initial state of its own: of many, some say enough.
+        # Each has its own initial state: of many, some are sufficient.
         if count > 1:
             pieces = pieces[:: max(1, -(-len(pieces) // _MOST_PIECES))]
         problem = GreyBoxFit(compose(self._rig), pieces, scales, self._noise)
@@ -216,7 +216,7 @@ class _Rough:
 
 
 def _told(information: Floats, free: Sequence[str]) -> list[str]:
-    """Return parameters that the records tell if the others are held: as many as they tell combinations."""
+    """Return as many parameters as the records determine combinations; they are determined if the others are held."""
     if not np.all(np.isfinite(information)):
         return list(free)
     values, vectors = np.linalg.eigh(information)
@@ -254,6 +254,6 @@ def _check_moves(rig: Rig, records: Sequence[Record]) -> None:
     held = [record[s.name] for record in records for s in rig.outputs if s.name in record]
     if not held:
         listed = ", ".join(signal.name for signal in rig.outputs)
-        raise InputError(f"No estimation record holds a sensor of the rig '{rig.name}'. It has: {listed}.")
+        raise InputError(f"No estimation record contains a sensor of the rig '{rig.name}'. It has: {listed}.")
     if all(np.ptp(signal) <= 1e-12 * np.max(np.abs(signal)) for signal in held):
         raise InputError("No sensor moves in any estimation record; nothing can be identified.")

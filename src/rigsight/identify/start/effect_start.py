@@ -1,7 +1,7 @@
-"""Start values of an effect from the spectra of the records: grid over what is inside, linear regression for the rest.
+"""Start values of an effect from the spectra of the records: grid over its nonlinear parameters, linear regression for the rest.
 
-The measured motion stands for the simulated one, so that torque, play and drive of an effect become known signals. Effects with
-states, and delays, have no such signal and get none.
+The measured motion replaces the simulated one, so that torque, play and drive of an effect become known signals. Effects with
+states, and delays, have no such signal and get no start values.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Least squares on an equation of motion in the frequency domain, weighted so that its error becomes the output's.
 
-The equation is linear in its coefficients, so it has no local minima: the place where fits get their start values. A
-polynomial per record takes up what its ends do to the spectra.
+The equation is linear in its coefficients, so it has no local minima and is suitable for start values. A polynomial per record
+accounts for the transients at its ends.
 
 References
 ----------

@@ -28,7 +28,7 @@ from rigsight.rigs import Follower, Rig, evaluated
 from rigsight.simulate.prescribed_motion import smooth_motion
 
 _UNKNOWN = 1.0
-"""Value of a parameter of which the records say nothing."""
+"""Value of a parameter that the records do not determine."""
 _STILL = 1e-12
 """Range of a signal relative to its size that is rounding."""
 
@@ -58,7 +58,7 @@ def linear_start(
         return any_rig_start(rig, records, constants, known)
     driven = [record for record in records if not is_constant(record[rig.inputs[0].name])]
     if rig.is_driven and not driven:
-        # A free decay is nothing but its ends, and this start takes those for what is to be left out.
+        # A free decay consists only of end terms, which this method treats as transients to be removed.
         return any_rig_start(rig, records, constants, {**_one_offset(rig), **known})
     records = driven
     found = _driven(rig, records, constants, known) if rig.is_driven else _prescribed(rig, records)
@@ -82,9 +82,9 @@ def _driven(
 ) -> dict[str, float]:
     motion, source, response = rig.motion, rig.inputs[0].name, rig.outputs[0].name
     gain = evaluated(motion.drive_gain, constants)
-    no_spring = known.get(str(motion.stiffness)) == 0.0
-    inertia, damping, stiffness = second_order(records, source, response, gain, no_spring)
-    offset = 0.0 if no_spring else _mean(records, response) - gain * _mean(records, source) / stiffness
+    has_stiffness = known.get(str(motion.stiffness)) != 0.0
+    inertia, damping, stiffness = second_order(records, source, response, gain, has_stiffness)
+    offset = _mean(records, response) - gain * _mean(records, source) / stiffness if has_stiffness else 0.0
     assert motion.inertia is not None
     numbers = ((motion.inertia, inertia), (motion.damping, damping), (motion.stiffness, stiffness))
     found: dict[str, float] = {}
@@ -168,7 +168,7 @@ def _check_moves(records: Sequence[Record], name: str) -> None:
 
 
 def second_order(
-    records: Sequence[Record], source: str, response: str, gain: float, no_spring: bool = False
+    records: Sequence[Record], source: str, response: str, gain: float, has_stiffness: bool = True
 ) -> tuple[float, float, float]:
     """Return inertia, damping and stiffness of ``m x'' + d x' + k x = gain u`` that fit best.
 
@@ -177,11 +177,11 @@ def second_order(
     InputError
         If input or response do not move.
     """
-    orders = (2, 1) if no_spring else (2, 1, 0)
+    orders = (2, 1, 0) if has_stiffness else (2, 1)
     solution = _equation_error(records, source, response, orders, gain)
     inertia, damping = solution[0], solution[1]
-    stiffness = 0.0 if no_spring else solution[2]
-    if inertia <= 0.0 or (stiffness <= 0.0 and not no_spring):
+    stiffness = solution[2] if has_stiffness else 0.0
+    if inertia <= 0.0 or (has_stiffness and stiffness <= 0.0):
         inertia, stiffness = abs(inertia) or 1.0, abs(stiffness) or 1.0
     smallest = 1e-4 * np.sqrt(stiffness * inertia) if stiffness > 0.0 else 0.0
     return float(inertia), float(max(damping, smallest)), float(stiffness)

@@ -1,8 +1,8 @@
-"""How far is a rig's linearization from the spectra of its records? Frequency responses to all inputs, and what the ends add.
+"""Error of the linearization of a rig relative to the spectra of its records: frequency responses to all inputs, with transients.
 
 ``j omega X = A X + B U + (x(0) - x(T))`` holds for the Fourier integrals over a record whatever its states do at its ends; the
-difference is solved for in each record by linear least squares. That needs no periodicity, no stability and no input: a free
-decay is nothing but its ends.
+difference is solved for in each record by linear least squares. This needs no periodicity, no stability and no input: a free
+decay consists of these end terms alone.
 
 References
 ----------
@@ -31,8 +31,8 @@ _USABLE_BAND = 0.8
 _MOST_LINES = 200
 """Lines of all records together, evenly chosen among those that say something."""
 _RELATIVE_ERROR = 0.05
-"""Share of each line by which a linearization may be beside it: weak lines then count as much as strong ones, and a resonance
-that is not yet where it belongs does not outweigh all else."""
+"""Relative error of each line that a linearization may have: weak lines then count as much as strong ones, and a resonance that
+is not yet where it belongs does not outweigh all else."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class LinearizedResponses:
         driven = (through @ (b @ record.inputs).T[:, :, None])[:, :, 0].T
         answer = driven + d[record.seen] @ record.inputs
         left = (record.shown - answer) * record.weights
-        # What the ends add: one column for each state, and a constant for each sensor for what sampling makes of them.
+        # End terms: one column for each state, and a constant for each sensor for their aliasing.
         ends = np.moveaxis(through, 0, 1) * record.weights[:, :, None]
         own = np.eye(len(record.seen))[:, None, :] * record.weights[:, :, None]
         columns = np.concatenate([ends, own], axis=2).reshape(-1, n + len(record.seen))

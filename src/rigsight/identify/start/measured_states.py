@@ -1,7 +1,7 @@
-"""Which states of a rig do the sensors of a record show? Coordinates, rates and own states as signals, and their noise.
+"""States of a rig that the sensors of a record measure: coordinates, rates and own states as signals, and their noise.
 
-A coordinate is shown by what reads it, or, up to a constant, by what reads its rate. Sensors whose reading is no sum of these
-with known factors tell nothing here.
+A coordinate is measured by a sensor that reads it or, up to a constant, its rate. Sensors whose reading is not a sum of these
+with known factors are not used here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Which products of unknown parameters does a long expression hold, and what multiplies each of them?
+"""Products of unknown parameters in a long expression, and the factor of each.
 
-What is known is not multiplied out: the forces of an arm of six joints have some twenty products of its parameters, and tens of
+Known factors are not expanded: the forces of an arm with six joints have some twenty products of its parameters, but tens of
 thousands of terms.
 """
 
@@ -15,7 +15,7 @@ _MOST_FACTORS = 6
 
 
 class MixedError(ValueError):
-    """Unknown parameters and signals cannot be told apart."""
+    """Unknown parameters and signals cannot be separated."""
 
 
 def parameter_products(

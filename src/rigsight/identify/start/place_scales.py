@@ -1,6 +1,6 @@
-"""How large are motion, force, drive and time at each joint, drive and sensor of a rig, and each of its own numbers?
+"""Characteristic sizes of motion, force, drive and time at each joint, drive and sensor of a rig, and of its parameters.
 
-They come from how the rig moves in the records according to its equations, so that it does not matter what sensors show.
+They follow from the motion of the rig in the records according to its equations, so they do not depend on which sensors exist.
 """
 
 from __future__ import annotations

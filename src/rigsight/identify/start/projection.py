@@ -1,4 +1,4 @@
-"""Which lines of which stretches of a record say something, and what are signals there? Windowed Fourier integrals."""
+"""Informative spectral lines of stretches of a record, and the signals there: windowed Fourier integrals."""
 
 from __future__ import annotations
 

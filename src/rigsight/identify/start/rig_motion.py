@@ -1,4 +1,4 @@
-"""How does a rig without effects move in a record? States and inputs at its samples."""
+"""Motion of a rig without effects in a record: states and inputs at its samples."""
 
 from __future__ import annotations
 

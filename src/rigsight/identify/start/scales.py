@@ -1,4 +1,4 @@
-"""How large each base quantity is in a campaign, so that searches start and step in characteristic units."""
+"""Characteristic size of each base quantity in a campaign, as units of searches."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _of_one_motion(rig: Rig, records: Sequence[Record], values: Mapping[str, flo
     return {
         "x": displacement,
         "input": drive_input,
-        # Where nothing drives, what the spring does is the size of every force.
+        # Without a drive, the spring force is the characteristic size of every force.
         "drive": abs(gain) * drive_input if is_driven else float(spring),
         "force": float(spring),
         "time": float(1.0 / omega),

@@ -1,4 +1,4 @@
-"""Where may a search over decades start, and where does it end? Starts about sizes at which the terms of equations balance."""
+"""Search over decades: starts around sizes at which the terms of the equations balance."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""What is left of a rig's equations in measured motion? Their error in the weak form, weighted by what noise makes of it.
+"""Error of the equations of a rig along the measured motion, in the weak form and weighted by its noise.
 
 ``d/dt P = R`` for each coordinate (P its momentum, R all forces) and each own state, multiplied by ``w(t) e^{-j omega t}`` on
 overlapping stretches and integrated by parts, so that no second derivative of a measured signal is taken. Nothing is simulated:
-the error costs a sum, and large motion is as good as small. Its covariance follows from the noise of the sensors through the
-linearized equations, so that the minimum is that of errors in variables: a stiff shaft whose twist is below the noise is not
-taken for a soft one.
+the error is a cheap sum and valid for large motion. Its covariance follows from the sensor noise through the linearized
+equations, so that this is an errors-in-variables estimate: a stiff shaft whose twist is below the noise is not estimated as soft.
 
 References
 ----------
@@ -95,7 +94,7 @@ class WeakEquations:
     equations
         The rig's.
     records
-        Estimation records; those that do not show all states say nothing here.
+        Estimation records; those that do not show all states are not used here.
     values
         Value of each known constant and parameter.
     free
@@ -178,7 +177,7 @@ class WeakEquations:
         return found
 
     def _separated(self, measured: MeasuredStates) -> tuple[list[_Term], list[_Term]]:
-        """Return the terms of all equations, and those in which signals and unknown parameters cannot be told apart."""
+        """Return the terms of all equations, and those in which signals and unknown parameters cannot be separated."""
         equations = self._equations
         structure = equations.structure
         symbols = dict(zip(structure.names, structure.parameter_symbols, strict=True))

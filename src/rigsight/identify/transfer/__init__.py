@@ -1,1 +1,1 @@
-"""Transfer functions: which PT1 or PT2 does a record show, and which physical parameters does it stand for?"""
+"""Transfer functions: PT1 or PT2 of a record, and the physical parameters that follow from it."""

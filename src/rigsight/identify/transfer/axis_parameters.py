@@ -1,11 +1,11 @@
-"""Which mass, damping and stiffness a PT2 of an axis stands for, or a PT1 of its velocity where it has no spring."""
+"""Mass, damping and stiffness of an axis from a PT2, or from a PT1 of its velocity if it has no spring."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rigsight.identify.fit.covariance import propagated_covariance
-from rigsight.identify.transfer.physical import PhysicalEstimates, check_fit, motion_parameters
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates, check_fit, motion_parameters
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.rigs import AXIS
 

@@ -1,10 +1,10 @@
-"""What records tell about the equivalent conicity delta_0, and what they cannot.
+"""What records can and cannot determine about the equivalent conicity delta_0.
 
 delta_0 enters the equations of the rig only inside the product v c_y, with ``c_y = cos^2 d - (2 r_0 / b) sin d cos d`` (thesis,
-2.12). So in every record, whatever drives it, the sensitivity to delta_0 is the sensitivity to ln c_y times
-``(dc_y/dd) / c_y``, and the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 %
-of c_y, of the speed v, or of the ratio of the two sensors' scales is one of 0.014 rad. No record or static relation evades
-this; what can be chosen is how well c_y is known, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
+2.12). So in every record, whatever drives it, the sensitivity to delta_0 is the sensitivity to ln c_y times ``(dc_y/dd) / c_y``,
+and the Cramer-Rao bound of delta_0 is that of c_y over ``|dc_y/dd|``, about 0.7 on this rig: an error of 1 % of c_y, of the speed
+v, or of the ratio of the two sensors' scales is one of 0.014 rad. No record or static relation avoids this; only the accuracy of
+c_y can be improved, see `creep_error_of_sine` and `lateral_parameters` with a known l_0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from rigsight.errors import InputError
-from rigsight.identify.transfer.physical import LEVEL
+from rigsight.identify.transfer.running_gear_parameters import LEVEL
 from rigsight.rigs import ROLLING, evaluated
 from rigsight.rigs.conicity import conicity_slope, creep_factor
 
@@ -95,7 +95,7 @@ def estimate_conicity(
     value = _bounded(c_y, largest, r_0, b)
     unbounded = _unbounded(c_y, largest, r_0, b)
     slope = abs(conicity_slope(value if unbounded is None else unbounded, r_0, b))
-    # At its maximum c_y is flat in delta_0, and the delta method says nothing.
+    # At its maximum c_y is flat in delta_0, and the delta method fails.
     error = standard_error / slope if unbounded is not None and slope > 0.0 else math.inf
     percent = f"{100.0 * level:g} %"
     if low_c >= 1.0:
@@ -107,7 +107,7 @@ def estimate_conicity(
             level,
             False,
             f"c_y = {c_y:.4g} lies above 1 with its whole {percent} interval ({low_c:.4g} to {high_c:.4g}): no positive conicity "
-            "gives this. Speed, sensor scales, or a lag between the sensors are off by more than the noise; delta_0 is not "
+            "gives this. Speed, sensor scales, or a lag between the sensors are wrong by more than the noise; delta_0 is not "
             "determined.",
         )
     interval = (_bounded(high_c, largest, r_0, b), _bounded(low_c, largest, r_0, b))
@@ -122,7 +122,7 @@ def estimate_conicity(
             level,
             False,
             f"The records do not determine delta_0: its {text} covers every plausible conicity (up to {plausible:g} rad). "
-            f"It would take c_y to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %.",
+            f"c_y would have to be known to {100.0 * 0.1 * 0.024 * slope / c_y:.1g} % to know a conicity of 0.024 rad to 10 %.",
         )
     if interval[0] <= 0.0:
         statement = f"The records give an upper limit only: delta_0 is below {interval[1]:.3g} rad ({percent}); zero is possible."

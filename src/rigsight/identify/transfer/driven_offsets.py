@@ -1,7 +1,7 @@
-"""Where would a driven rig rest? Offsets of a sweep from what its fitted transfer functions leave.
+"""Rest positions of a driven rig: offsets from the residuals of the fitted transfer functions of a sweep.
 
-A sweep is no noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis hold for what
-remains when the motion is taken away.
+A sweep is not noise about its offset, and the mean of its current moves the rig: (2.26) and (2.27) of the thesis apply to the
+record after the motion is subtracted.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.stats import norm, t
 
 from rigsight.errors import InputError
 from rigsight.identify.fit.covariance import SMOOTHED, colored_covariance
-from rigsight.identify.transfer.physical import LEVEL, PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.records.record import Hold, Record
 
@@ -56,7 +56,8 @@ def driven_offsets(
     """
     if record.n_samples < _LEAST_SAMPLES:
         raise InputError(
-            f"Record '{record.name}': {record.n_samples} samples show no offset; at least {_LEAST_SAMPLES} are needed."
+            f"Record '{record.name}': {record.n_samples} samples are too few to find an offset; at least {_LEAST_SAMPLES} are "
+            f"needed."
         )
     # psi is measured: it is smooth between its samples, whatever the current does.
     parts: list[tuple[str, TransferFit, Hold]] = [(name, motion, record.hold)]
@@ -83,7 +84,7 @@ def driven_offsets(
         tuple(values),
         values,
         covariance,
-        f"(2.26), (2.27) from what the fits leave of record '{record.name}'",
+        f"(2.26), (2.27) from the residuals of the fits in record '{record.name}'",
     )
 
 

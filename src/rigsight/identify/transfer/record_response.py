@@ -1,4 +1,4 @@
-"""Which frequency response does a record show, by which method, and how fine is it?"""
+"""Frequency response of a record: method and resolution."""
 
 from __future__ import annotations
 
@@ -107,9 +107,9 @@ def record_response(
     least_clearness
         Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
     with_coherence
-        False where nobody reads the coherence: it takes as long as a third of a local model.
+        False if the coherence is not needed: it takes a third of the time of a local model.
     wanted
-        Frequencies [rad/s] that somebody reads; a local method leaves out other lines. None for all.
+        Required frequencies [rad/s]; a local method skips other lines. None for all.
     instrument
         The reference of a closed loop: a local method divides the responses to it, unless the source does not answer it.
 
@@ -121,7 +121,7 @@ def record_response(
     check_option("The method", method, METHODS)
     unused = ""
     if instrument is not None and method not in _BAND_LINES:
-        unused, instrument = f"The method '{method}' has no use for it; local_rational has.", None
+        unused, instrument = f"The method '{method}' does not use it; local_rational does.", None
     coherence = _coherence(record, source, response, hold) if with_coherence else None
     if method == "thesis":
         periodic, note = _mean_period(record, None)

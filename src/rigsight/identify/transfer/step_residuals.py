@@ -1,8 +1,9 @@
-"""How do the residuals of a fitted step hang together in time, and what does that make of the parameters' covariance?
+"""Autocorrelation of the residuals of a fitted step, and the resulting covariance of the parameters.
 
-A disturbance in front of the rig rings in the response as the rig itself does. In a short window a resonance is narrower than
-the lines of a spectrum, so no smoothed spectrum shows it; but its shape is known from the fit. Residuals are taken as a
-low-passed disturbance behind the fitted form plus white noise, with both sizes and the corner by restricted maximum likelihood.
+An input disturbance rings in the response like the rig itself. In a short window a resonance is narrower than the lines of a
+spectrum, so a smoothed spectrum cannot show it; but its shape is known from the fit. Residuals are modelled as a low-pass
+disturbance filtered by the fitted transfer function plus white noise, with both sizes and the corner frequency from restricted
+maximum likelihood.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What a fit of a PT1 or PT2 found."""
+"""Result of a fit of a PT1 or PT2."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class TransferFit:
             return rational
         if pade_order < 1 or not self.form.with_dead_time:
             raise InputError(
-                f"A Pade approximation of order {pade_order} was asked for; it needs an order of at least 1 and a fit with dead "
-                "time. Leave pade_order away for the rational part."
+                f"A Pade approximation of order {pade_order} needs an order of at least 1 and a fit with dead time. Omit "
+                f"pade_order to get the rational part."
             )
         return rational * control.tf(*control.pade(self.values["dead_time"], pade_order))

@@ -1,4 +1,4 @@
-"""What a PT1 or a PT2 with dead time answers: over frequency with derivatives, and over time.
+"""Response of a PT1 or a PT2 with dead time: over frequency with derivatives, and over time.
 
 ``G(s) = k e^(-s T) / (1 + s / omega_b)`` (PT1, thesis equation 2.7) and
 ``G(s) = k e^(-s T) omega_b^2 / (s^2 + 2 zeta omega_b s + omega_b^2)`` (PT2, thesis equation 2.9).

@@ -1,4 +1,4 @@
-"""Which PT1 or PT2 a measured frequency response shows: bounded grid search, then weighted least squares.
+"""PT1 or PT2 from a measured frequency response: bounded grid search, then weighted least squares.
 
 References
 ----------
@@ -243,8 +243,8 @@ def _problem(
         raise InputError(f"The longest dead time must be at least 0 s and finite, got {longest_dead_time!r}.")
     if magnitude_only and longest_dead_time > 0.0:
         raise InputError(
-            "A dead time changes the phase only, so magnitudes cannot tell it. Fit the complex values (magnitude_only=False) "
-            "or leave the dead time away."
+            "A dead time changes the phase only, so it cannot be found from magnitudes. Fit the complex values "
+            "(magnitude_only=False) or omit the dead time."
         )
     form = TransferForm(order, longest_dead_time > 0.0)
     _check_informative(measured, form)
@@ -288,7 +288,7 @@ def _check_informative(measured: FrequencyResponse, form: TransferForm) -> None:
     needed = max(least, int(np.ceil(0.05 * size.size)))
     if np.count_nonzero(telling) < needed:
         raise InputError(
-            f"{what}: only {np.count_nonzero(telling)} of {size.size} lines {band} stand out of their uncertainty, {needed} are "
+            f"{what}: only {np.count_nonzero(telling)} of {size.size} lines {band} exceed their uncertainty, {needed} are "
             f"needed. The record has no excitation in this band: choose one that '{measured.source}' drives, or drive it there."
         )
 
@@ -306,10 +306,10 @@ def _band_notes(measured: FrequencyResponse, omega_b: float, errors: NDArray[np.
 def _reading_notes(magnitude_only: bool, misfit: float) -> list[str]:
     notes = []
     if magnitude_only:
-        notes.append("Magnitudes do not tell the sign of the gain (taken as positive), nor a dead time.")
+        notes.append("Magnitudes show neither the sign of the gain (taken as positive) nor a dead time.")
     if misfit > _MISFIT:
         notes.append(
-            f"The residuals are {misfit:.1f} times what the variances explain: this form is not the whole of the rig."
+            f"The residuals are {misfit:.1f} times larger than the variances explain: the model order is too low."
         )
     return notes
 

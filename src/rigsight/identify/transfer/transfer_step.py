@@ -1,4 +1,4 @@
-"""Which PT1 or PT2 a recorded step shows: output fit over a time window, from rest.
+"""PT1 or PT2 from a recorded step: output-error fit over a time window, from rest.
 
 References
 ----------
@@ -97,8 +97,8 @@ def fit_step(
     notes = [] if best.status > 0 else [str(best.message)]
     if poor:
         notes.append(
-            f"The step does not determine {' and '.join(poor)}: the answer of '{response}' does not stand out of the noise, or "
-            "the window ends before it settles."
+            f"The step does not determine {' and '.join(poor)}: the response of '{response}' does not exceed the noise, or the "
+            f"window ends before it settles."
         )
     unit = f"{record.units.get(response, '1')}/{record.units.get(source, '1')}"
     return TransferFit(
@@ -202,7 +202,7 @@ def _problem(
     what = f"Record '{record.name}', {begin:g} to {end:g} s"
     if inside.size < _LEAST_AFTER:
         raise InputError(
-            f"{what}: the window holds {inside.size} samples, at least {_LEAST_AFTER} are needed. The record reaches from "
+            f"{what}: the window holds {inside.size} samples, at least {_LEAST_AFTER} are needed. The record covers "
             f"{t[0]:g} to {t[-1]:g} s."
         )
     first, last = int(inside[0]), int(inside[-1]) + 1
@@ -213,14 +213,14 @@ def _problem(
     scatter = float(np.median(np.abs(np.diff(u))))
     if np.ptp(u) <= max(_STEP_OVER_NOISE * scatter, 1e-12 * float(np.max(np.abs(u)))):
         raise InputError(
-            f"{what}: '{source}' makes no step, it stays between {np.min(u):.4g} and {np.max(u):.4g}. Choose a window that "
+            f"{what}: '{source}' has no step, it stays between {np.min(u):.4g} and {np.max(u):.4g}. Choose a window that "
             "begins before the step or with it."
         )
     jump = int(np.argmax(np.abs(u - u[0]) > 0.5 * np.max(np.abs(u - u[0]))))
     if u.size - jump < _LEAST_AFTER:
         raise InputError(
-            f"{what}: '{source}' steps {u.size - jump} samples before the end; at least {_LEAST_AFTER} samples of the answer are "
-            "needed. End the window later."
+            f"{what}: '{source}' steps {u.size - jump} samples before the end; at least {_LEAST_AFTER} samples of the response "
+            f"are needed. End the window later."
         )
     return _Problem(
         form,

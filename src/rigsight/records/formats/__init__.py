@@ -1,1 +1,1 @@
-"""Measurement files of every format, read so that a damaged one harms nothing."""
+"""Readers of measurement files of every format, protected against damaged files."""

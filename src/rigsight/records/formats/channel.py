@@ -1,4 +1,4 @@
-"""What is a channel of a measurement file, before anybody has said which signal it is?"""
+"""A channel of a measurement file before it is mapped to a signal."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def check_total(file: str, n_samples: int) -> None:
     """
     if n_samples > MOST_SAMPLES_IN_ALL:
         raise InputError(
-            f"{file}: its channels have {n_samples} samples together, more than the {MOST_SAMPLES_IN_ALL} that are read. "
+            f"{file}: its channels have {n_samples} samples in total, more than the {MOST_SAMPLES_IN_ALL} that are read. "
             "Split the record, or export only the channels that are needed."
         )
 

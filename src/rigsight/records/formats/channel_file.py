@@ -1,4 +1,4 @@
-"""Which format does a file have, and how is it opened so that nothing but one clear message comes of a damaged one?"""
+"""Detection of the format of a file, and opening it such that a damaged file gives a single clear message."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def file_format(path: Path) -> str | None:
             else ""
         )
         raise InputError(
-            f"{path.name} {what}.{older} Export it again; delimited text is called .csv or .txt."
+            f"{path.name} {what}.{older} Export it again; delimited text needs the suffix .csv or .txt."
         )
     return found
 
@@ -112,7 +112,7 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     """
     kind = file_format(path)
     if kind is None:
-        raise InputError(f"{path.name} is no measurement file of a known format.")
+        raise InputError(f"{path.name} is not a measurement file of a known format.")
     name = _NAMES[kind]
     size = file_size(path)
     if size > LARGEST_FILE:
@@ -150,8 +150,8 @@ def _guarded(path: Path, name: str, channel: Channel) -> Channel:
                     raise ValueError(f"{what} is of type {samples.dtype}, shape {samples.shape}")
             if samples.size != n_samples:
                 raise InputError(
-                    f"{path.name}, channel '{channel.name}': {samples.size} of {n_samples} samples are there; "
-                    f"the file is cut short or damaged. {MEND}"
+                    f"{path.name}, channel '{channel.name}': {samples.size} of {n_samples} samples are present; the file is "
+                    f"truncated or damaged. {MEND}"
                 )
             return samples
 
@@ -184,7 +184,7 @@ def _told(path: Path, name: str) -> Iterator[None]:
         told = str(error) if isinstance(error, ReadingError) else f"{type(error).__name__}: {error}"
         reason = " ".join(told.split())[:200].removesuffix(":")
         raise InputError(
-            f"{path.name} cannot be read as {name}: the file is cut short or damaged ({reason}). {MEND}"
+            f"{path.name} cannot be read as {name}: the file is truncated or damaged ({reason}). {MEND}"
         ) from None
 
 

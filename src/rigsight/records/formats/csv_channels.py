@@ -43,7 +43,7 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
     if len(rows) * len(layout.names) > n_signs:
         raise InputError(
             f"{path.name}: most of its {len(rows)} rows are shorter than the {len(layout.names)} columns of its header. "
-            "Mend it, or cut the record there."
+            "Correct the file, or cut the record there."
         )
     table = _numbers(rows, layout)
     channels: list[Channel] = []

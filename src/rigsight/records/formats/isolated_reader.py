@@ -1,4 +1,4 @@
-"""How is a file read in a process of its own, so that no damage in it harms this one?"""
+"""Reading a file in a separate process, so that a damaged file cannot crash this one."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class _Process:
         try:
             line = self._process.stdout.readline()
             if not line:
-                raise ReadingError("it makes the library that reads it crash, or run in circles")
+                raise ReadingError("the library that reads it crashes or does not finish")
             answer: dict[str, Any] = json.loads(line)
             if answer.get("error") == "MemoryError":
                 raise MemoryError(f"the {self._most_memory / 1e9:.2g} GB that a file of its size may take")

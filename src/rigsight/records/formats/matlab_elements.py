@@ -1,7 +1,7 @@
 """What does a MATLAB file of version 5 to 7 declare, and is it safe to read?
 
-scipy allocates what a file declares before it looks whether the data is there, and crashes over types that do not exist. The
-declarations are therefore walked through first, without reading any numbers (MAT-File Format, MathWorks, R2023a, chapter 1).
+scipy allocates what a file declares before it checks whether the data is present, and crashes on invalid types. The declarations
+are therefore checked first, without reading any numbers (MAT-File Format, MathWorks, R2023a, chapter 1).
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def declared_variables(data: bytes, file: str) -> Iterator[Variable]:
         else:
             inside = data
         if kind != _MATRIX:
-            raise DamagedError(f"an element of type {kind} stands where a variable should")
+            raise DamagedError(f"an element of type {kind} was found where a variable was expected")
         yield _matrix(inside, start, end, order, 0)
 
 
@@ -99,11 +99,11 @@ def _order(data: bytes) -> str:
 
 
 def _unpacked(packed: memoryview, order: str, file: str) -> bytes:
-    """Return the one element inside a compressed one; no more is unpacked than it says it has."""
+    """Return the one element inside a compressed one; no more is unpacked than it declares."""
     unpacker = zlib.decompressobj()
     head = unpacker.decompress(packed, 8)
     if len(head) < 8:
-        raise DamagedError("a compressed variable is cut short")
+        raise DamagedError("a compressed variable is truncated")
     first, size = struct.unpack(order + "II", head)
     size = 0 if first >> 16 else size
     if size > _LARGEST_VARIABLE:
@@ -114,14 +114,14 @@ def _unpacked(packed: memoryview, order: str, file: str) -> bytes:
     # A few bytes to spare, which tell whether there is more; a limit of 0 would mean none.
     inside = head + unpacker.decompress(unpacker.unconsumed_tail, size + 8)
     if len(inside) > 8 + size + 7:
-        raise DamagedError("a compressed variable holds more than it says")
+        raise DamagedError("a compressed variable contains more data than it declares")
     return inside
 
 
 def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, int, int, int]:
     """Return type, start and end of an element's data, and where the next element begins."""
     if position + 8 > stop:
-        raise DamagedError("an element is cut short")
+        raise DamagedError("an element is truncated")
     first, size = struct.unpack_from(order + "II", data, position)
     start = position + 8
     if first >> 16:
@@ -130,7 +130,7 @@ def _element(data: bytes, position: int, stop: int, order: str) -> tuple[int, in
     else:
         following = start + size + (-size % 8)
     if (first >> 16 == 0 and start + size > stop) or (start == position + 4 and size > 4):
-        raise DamagedError("an element reaches beyond its end")
+        raise DamagedError("an element extends beyond the end of its container")
     return first, start, start + size, min(following, stop)
 
 
@@ -192,11 +192,11 @@ def _check_data(
         missing -= 1
         stored, start, end, position = _element(data, position, stop, order)
         if stored not in (_TEXT if kind == "char" else _BYTES):
-            raise DamagedError(f"data is of type {stored}, which does not exist")
+            raise DamagedError(f"data has the invalid type {stored}")
         if size is not None and end - start != size * _BYTES[stored]:
-            raise DamagedError(f"{size} numbers are declared, and {end - start} bytes are there")
+            raise DamagedError(f"{size} numbers are declared, but {end - start} bytes are present")
     if missing:
-        raise DamagedError(f"a variable of class {kind} has not the parts that it says")
+        raise DamagedError(f"a variable of class {kind} lacks parts that it declares")
 
 
 def _check_object(data: bytes, position: int, stop: int, order: str, depth: int) -> None:

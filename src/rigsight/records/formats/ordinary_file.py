@@ -1,4 +1,4 @@
-"""Is it an ordinary file, so that reading it comes to an end?"""
+"""Check for a regular file (not a device or pipe), so that reading it ends."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def file_size(path: Path, what: str = "the file") -> int:
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; check the path.") from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "this is no file name"
+        reason = getattr(error, "strerror", None) or "this is not a file name"
         raise InputError(f"{path} cannot be read: {reason}.") from None
     if stat.S_ISDIR(found.st_mode):
         raise InputError(f"{path} is a folder; name {what} in it.")
     if not stat.S_ISREG(found.st_mode):
         raise InputError(
-            f"{path} is no ordinary file but a device or a pipe; save its contents as a file first."
+            f"{path} is a device or a pipe, not a regular file; save its contents as a file first."
         )
     return found.st_size

@@ -77,7 +77,7 @@ def read_csv(
     """
     if separator is not None and (len(separator) != 1 or separator in '"\r\n'):
         raise InputError(
-            f"{path.name}: separator is {separator!r}; name one character, neither a quote nor a line end."
+            f"{path.name}: separator is {separator!r}; give one character that is neither a quote nor a line end."
         )
     if separator is not None and separator == decimal:
         raise InputError(
@@ -150,7 +150,7 @@ def find_layout(
     Raises
     ------
     InputError
-        If there are too many columns, or nobody can say which line holds their names.
+        If there are too many columns, or the line with their names cannot be determined.
     """
     looked_at = [lines[number - 1] for number in kept[:MOST_HEAD]]
     last = [lines[number - 1] for number in kept[MOST_HEAD:][-LAST_LINES:]]
@@ -167,8 +167,8 @@ def find_layout(
     if head.n_passed > 0:
         notes.append(
             f"{path.name}: {head.n_passed} line{'s' if head.n_passed > 1 else ''} above the "
-            f"{'numbers' if head.names is None else f'names in line {kept[head.names]}'} are no part of the table and were "
-            "passed over."
+            f"{'numbers' if head.names is None else f'names in line {kept[head.names]}'} are not part of the table and were "
+            f"skipped."
         )
     if head.names is None:
         names = _names_in_comment(lines, first_row, dialect, len(first), comment)
@@ -178,7 +178,8 @@ def find_layout(
     if head.units is not None:
         units = tuple(printable(cell) for cell in dialect.cells(lines[kept[head.units] - 1]))
         notes.append(
-            f"{path.name}, line {kept[head.units]}: taken as a row of units ({', '.join(units)}); values are not converted by it."
+            f"{path.name}, line {kept[head.units]}: taken as a row of units ({', '.join(units)}); it is not used to convert "
+            f"values."
         )
     return Layout(dialect, tuple(first), head.first_row, True, tuple(notes), units)
 
@@ -205,8 +206,8 @@ def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, o
         if 1 <= mapping.name <= len(layout.names):
             return mapping.name - 1
         raise InputError(
-            f"{path.name}: signal '{signal}' is to stand in column {mapping.name}, "
-            f"but the columns are 1 to {len(layout.names)}: {listed}."
+            f"{path.name}: signal '{signal}' is mapped to column {mapping.name}, but the columns are 1 to {len(layout.names)}: "
+            f"{listed}."
         )
     count = layout.names.count(mapping.name)
     if count == 1:
@@ -226,7 +227,7 @@ def _position(path: Path, signal: str, mapping: ColumnMapping, layout: Layout, o
     hint = nearest(mapping.name, layout.names)
     raise InputError(
         f"{path.name} has no column '{mapping.name}' for signal '{signal}'.{hint} Its columns: {listed}. "
-        "Map it under columns, or name the separator if these are not the columns."
+        "Map it under columns, or specify the separator if these are not the columns."
     )
 
 
@@ -252,7 +253,9 @@ def _numbers(
         )
     except ValueError:
         _report_culprit(path, [lines[number - 1] for number in rows], rows, layout, found)
-        raise InputError(f"{path.name} cannot be read as numbers; name separator and decimal sign.") from None
+        raise InputError(
+            f"{path.name} cannot be read as numbers; specify separator and decimal sign."
+        ) from None
     return np.asarray(table, dtype=np.float64)
 
 
@@ -267,7 +270,7 @@ def _check_widths(path: Path, texts: Sequence[str], rows: Sequence[int], layout:
             mend = (
                 "The file ends there: delete the incomplete line."
                 if ends
-                else "Mend it, or name separator and decimal sign."
+                else "Correct the line, or specify separator and decimal sign."
             )
             raise InputError(f"{path.name}, line {number}: {n_cells} columns, but {width} above it. {mend}")
 
@@ -287,7 +290,7 @@ def _report_culprit(
             if not cell:
                 what = "the cell is empty. Cut the record there or fill the gap before reading."
             elif other.number(cell) is not None:
-                what = f"'{cell}' has another decimal sign than '{dialect.decimal}'. Name it: decimal = \"{other.decimal}\"."
+                what = f"'{cell}' has a decimal sign other than '{dialect.decimal}'. Specify it: decimal = \"{other.decimal}\"."
             else:
-                what = f"'{cell}' is not a number. Mend the cell; time is given as a number of seconds."
+                what = f"'{cell}' is not a number. Correct the cell; time must be a number of seconds."
             raise InputError(f"{path.name}, line {number}, column '{layout.names[position]}': {what}")

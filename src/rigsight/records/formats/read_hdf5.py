@@ -60,11 +60,11 @@ def _refusal(dataset: Any) -> str | None:
     if dataset.shape is None:
         return "is empty"
     if dataset.dtype.kind == "O":
-        return "holds text or object references, which are not followed"
+        return "contains text or object references, which are not read"
     if dataset.dtype.kind not in "iuf":
-        return f"is of type {dataset.dtype}, no real numbers"
+        return f"is of type {dataset.dtype}, not real numbers"
     if dataset.is_virtual or dataset.external:
-        return "keeps its data in another file, which is not followed; copy the data into this one"
+        return "stores its data in another file, which is not read; copy the data into this one"
     return None
 
 

@@ -65,5 +65,5 @@ def _channels(name: str, dataset: Any, kept: dict[str, NDArray[Any]]) -> list[Ch
     if kind not in NUMERIC or dataset.dtype.kind not in "iuf":
         return Refused(name, why_no_signal(kind if kind not in NUMERIC else "complex"))
     if dataset.is_virtual or dataset.external:
-        return Refused(name, "keeps its data in another file, which is not followed")
+        return Refused(name, "stores its data in another file, which is not read")
     return columns_of(name, dataset.shape, kept_last(kept, name, lambda: dataset[()]))

@@ -23,7 +23,7 @@ from rigsight.records.formats.channel import (
 # Types of asammdf.blocks.v4_constants: numbers, and conversions that are formulas with numbers, not text.
 _NUMBERS = range(6)
 _NO_CONVERSION, _ALGEBRAIC, _LAST_NUMERIC = (None, 0), 3, 6
-_FORMULA = "is converted by a formula in text, which is not executed; export it with physical values"
+_FORMULA = "is converted by a text formula, which is not executed; export it with physical values"
 
 
 def open_mdf(path: Path) -> Iterator[ChannelFile]:
@@ -84,7 +84,7 @@ def _refusal(channel: Any, n_samples: int, axis: TimeAxis | None) -> str | None:
     if conversion == _ALGEBRAIC:
         return _FORMULA
     if channel.data_type not in _NUMBERS or (conversion not in _NO_CONVERSION and conversion > _LAST_NUMERIC):
-        return "holds text, a list or other bytes, no numbers"
+        return "contains text, a list or other bytes, not numbers"
     if n_samples < 2:
         return "holds a single number" if n_samples else "is empty"
     return None if axis is not None else "has no time"

@@ -38,9 +38,9 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
         refused: list[Refused] = []
         for column in schema:
             if schema.names.count(column.name) > 1:
-                refused.append(Refused(column.name, "stands twice in the file"))
+                refused.append(Refused(column.name, "occurs twice in the file"))
             elif not _is_numeric(column.type):
-                refused.append(Refused(column.name, f"is of type {column.type}, no numbers"))
+                refused.append(Refused(column.name, f"is of type {column.type}, not numbers"))
             elif n_rows < 2:
                 refused.append(Refused(column.name, "holds a single number" if n_rows else "is empty"))
             else:

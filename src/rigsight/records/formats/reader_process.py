@@ -1,9 +1,9 @@
-"""What does a reader say about a file, asked in a process of its own?
+"""A reader in a separate process.
 
-asammdf, libhdf5, scipy and pyarrow read in C, and a damaged file can make them crash, run in circles or ask for all memory;
-the process that asked then gets a message instead. Run as ``python -P -m rigsight.records.formats.reader_process FORMAT FILE``:
-one line of JSON tells what the file holds; then every line ``channel INDEX`` or ``axis INDEX`` on stdin is answered by a line of
-JSON with type and size of the samples, and their bytes.
+asammdf, libhdf5, scipy and pyarrow read in C, and a damaged file can make them crash, loop forever or request all memory; the
+calling process then gets a message instead. Run as ``python -P -m rigsight.records.formats.reader_process FORMAT FILE``: one line
+of JSON describes the file; then every line ``channel INDEX`` or ``axis INDEX`` on stdin is answered by a line of JSON with type
+and size of the samples, and their bytes.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ def main(kind: str, path: Path) -> None:
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
-        # Who asked ends what runs in circles; if it was killed, nobody does.
+        # The calling process ends a reader that loops; if it was killed, nothing does.
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
     reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
     try:
-        # Before the limit: what libraries set aside for their threads is no matter of the file.
+        # Before the limit is set: memory that libraries reserve for their threads does not depend on the file.
         import_module(PACKAGES[kind])
         limit_memory(most_memory(path))
         with contextlib.contextmanager(reader)(path) as file:

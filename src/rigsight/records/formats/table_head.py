@@ -1,8 +1,7 @@
-"""Where do names, units and numbers stand in a text, and what above them is neither?
+"""Location of names, units and numbers in a text, and of other lines above them.
 
-Loggers write what they know about the test above the table: its number, the date, the operator, in any number of cells. The
-rows of numbers are what all else is told by: the last lines of a file are some of them, and what stands right above the first
-one are units or names.
+Loggers write information about the test above the table: its number, the date, the operator, in any number of cells. The rows of
+numbers are found first: the last lines of a file belong to them, and the lines directly above the first one are units or names.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class Head:
 
 
 class UnclearHeadError(ValueError):
-    """Nobody can say which line holds the names; the text says what stands there and what to write."""
+    """The line with the names cannot be determined; the text describes the lines and what to write."""
 
 
 @dataclass(frozen=True)
@@ -134,14 +133,14 @@ def find_head(
     wanted
         Names that are asked for: the line that holds them holds the names.
     header
-        Whether there are names, or in which line they stand, counted from 1 in the file; None where nobody said so.
+        Whether there are names, or the line of the names, counted from 1 in the file; None if unspecified.
     number_of
         Number in the file of a line.
 
     Raises
     ------
     UnclearHeadError
-        If nobody can say which line holds the names.
+        If the line with the names cannot be determined.
     """
     if isinstance(header, int) and not isinstance(header, bool):
         return _told(dialect, lines, header, number_of)
@@ -160,8 +159,9 @@ def find_head(
     names = _names_in(dialect, lines, block, wanted)
     if first - names > 2:
         raise UnclearHeadError(
-            f"lines {number_of(names)} to {number_of(first - 1)} all stand above the first row of numbers; one line may hold "
-            f"names and the next one units. If the names stand in line {number_of(names)}, delete the lines between units and "
+            f"lines {number_of(names)} to {number_of(first - 1)} are all above the first row of numbers; only one line may "
+            f"contain names and the next one units. If the names are in line {number_of(names)}, delete the lines between units "
+            f"and "
             "numbers, else write header = LINE."
         )
     return Head(names, names + 1 if names + 1 < first else None, first)
@@ -199,7 +199,7 @@ def _without_words(
     count = len(above)
     raise UnclearHeadError(
         f"line {number_of(first - 1)} has {count} column{'s' if count > 1 else ''}, the rows of numbers below it have "
-        f"{shape.width}, so it holds no names for them. Give each column a name there, or write header = false to count the "
+        f"{shape.width}, so it cannot contain their names. Give each column a name there, or write header = false to count the "
         "columns."
     )
 
@@ -228,8 +228,8 @@ def _first_of(
             return found[0]
     places = " and ".join(str(number_of(i)) for i in rows[:3])
     raise UnclearHeadError(
-        f"rows of numbers begin in lines {places}, with words between them. Cut the record where the logger began anew; if what "
-        "stands above is no part of it, write header = LINE with the line that holds the names."
+        f"rows of numbers begin in lines {places}, with text between them. Cut the record where the logger restarted; if the "
+        f"text above is not part of the table, write header = LINE with the line of the names."
     )
 
 
@@ -238,7 +238,7 @@ def _names_time(cell: str) -> bool:
 
 
 def _names_in(dialect: Dialect, lines: Sequence[str], block: range, wanted: Collection[str]) -> int:
-    """Return which of several lines of words holds the names: what is asked for, a time, or what has units below it."""
+    """Return which of several lines of words contains the names: by requested names, a time, or units below it."""
     rows = {i: dialect.cells(lines[i]) for i in block}
     held = {i: len(set(cells) & set(wanted)) for i, cells in rows.items()}
     most = [i for i in block if held[i] == max(held.values())]

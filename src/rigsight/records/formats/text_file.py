@@ -1,4 +1,4 @@
-"""How does a file become text, once it is clear that it is one and that it fits into memory?"""
+"""Reading a file as text after checking that it is text and fits into memory."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The score of a blind bench for people: words, figures, page, text."""
+"""Report of a blind bench: words, figures, page, text."""

@@ -1,4 +1,4 @@
-"""Which words and rows do the trials of a laboratory become? By the condition under which their records were taken."""
+"""Words and rows for the trials of a laboratory, by the condition under which their records were taken."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigsight.report.wording import sentence_case
 _LABORATORY_SHARES = {
     "laboratory_right": "laboratory: effect and place right",
     "laboratory_wrong_name": "  another effect or place named",
-    "laboratory_sure_unknown": "  called unknown with more than 0.9",
+    "laboratory_sure_unknown": "  called unknown with a probability above 0.9",
 }
 CONDITION_HEADS = (
     "Condition",
@@ -25,9 +25,9 @@ CONDITION_HEADS = (
 )
 """Heads of the table by condition; the largest stated probability is that of `unknown`."""
 CONDITION_WORDS = (
-    "Records as laboratories take them, by what stands between rig and record. Right is the hidden effect at its place; of three "
-    "effects the one with the largest gap, alone or with others of the three. Neither counts the verdicts none and "
-    "parameters, and diagnoses that failed. The largest stated probability is that of unknown."
+    "Records as taken in laboratories, by the disturbance of the measurement. Right means that the hidden effect is named at its "
+    "place; of three effects, that the one with the largest gap is named, alone or with others of the three. The verdicts none "
+    "and parameters and failed diagnoses are not counted. The largest stated probability is that of unknown."
 )
 
 

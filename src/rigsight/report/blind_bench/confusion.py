@@ -1,4 +1,4 @@
-"""What was hidden against what was named: a matrix of single effects and controls, and what became of pairs."""
+"""Confusion matrix of hidden and named effects for single effects and controls, and the outcome for pairs."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def pair_rows(content: Mapping[str, Any]) -> list[tuple[str, int]]:
     """Return what became of pairs, and how often."""
     words = {
         "both": "both named",
-        _WRONG_PLACE: "both named, one at least at a wrong place",
+        _WRONG_PLACE: "both named, at least one at a wrong place",
         "both and another": "both named, and another effect",
         "one alone": "one of them named alone",
         "one with another": "one of them named, with another effect",

@@ -1,4 +1,4 @@
-"""Which figures show the score of a blind bench: stated probabilities against what was right, and errors on withheld records?"""
+"""Figures of a blind bench: stated probabilities against the share of right verdicts, and errors on withheld records."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def reliability_figure(content: Mapping[str, Any]) -> PageFigure:
         for row in rows
     )
     caption = (
-        "Verdicts by the probability that the diagnosis gave them: on the dashed line they are right as often as stated. "
+        "Share of right verdicts by stated probability; on the dashed line they are right as often as stated. "
         "Bars are 95 % intervals (Wilson), numbers count trials."
     )
     return page_figure(_reliability(rows), "reliability-plot", f"Reliability: {told}.", caption)
@@ -53,7 +53,7 @@ def _reliability(rows: list[Mapping[str, Any]]) -> Figure:
     ax.set_xlim(-0.02, 1.02)
     ax.set_ylim(-0.03, 1.05)
     ax.set_xlabel("probability stated")
-    ax.set_ylabel("share that was right")
+    ax.set_ylabel("share of right verdicts")
     ax.grid()
     ax.set_axisbelow(True)
     return figure
@@ -64,8 +64,8 @@ def held_out_figure(content: Mapping[str, Any]) -> PageFigure:
     bins = [row for row in content["held_out"]["histogram"] if row["right"] + row["wrong"]]
     told = "; ".join(f"{_bin_text(row)}: {row['right'] + row['wrong']} trials" for row in bins)
     caption = (
-        "Error of the diagnosed model on records that no diagnosis has seen, in units of the true noise floor (1 is perfect), "
-        "of all trials but those from outside the catalogue. Classes are unequally wide."
+        "Error of the diagnosed model on withheld records, in units of the true noise floor (1 is perfect), for all trials "
+        "except those with an effect from outside the catalogue. Class widths differ."
     )
     return page_figure(
         _held_out(content["held_out"]["histogram"]), "held-out-plot", f"Withheld errors: {told}.", caption

@@ -23,8 +23,8 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
     seconds = content["seconds"]
     parts = [
         "# The blind bench",
-        f"Diagnoses of {content['n_trials']} rigs whose effect was withheld ({views.bench_text(content)}), "
-        "scored by keys that no diagnosis has seen. This text is written by the command; every figure is that of the run.",
+        f"Diagnoses of {content['n_trials']} rigs with hidden effects ({views.bench_text(content)}), scored with keys that no "
+        f"diagnosis has seen. The command writes this text; every figure comes from the run.",
         f"- Date: {content['made'].replace('T', ' ').removesuffix('+00:00')} UTC\n"
         f"- Command: `{content['command']}`\n"
         f"- Versions: {', '.join(f'{name} {version}' for name, version in content['versions'].items())}\n"
@@ -32,8 +32,8 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         f"- Time of a diagnosis: {views.number(seconds['median'])} s (median), {views.number(seconds['quantile_95'])} s (95 % "
         f"quantile), {views.number(seconds['total'] / 3600.0)} h in all",
         "## Goals",
-        f"{views.verdict_text(content)} Goals are set for gaps of at least 5 noise floors; intervals are of 95 % (Wilson for "
-        "shares, normal for the mean, from order alone for the median).",
+        f"{views.verdict_text(content)} Goals apply to gaps of at least 5 noise floors; intervals are 95 % (Wilson for shares, "
+        f"normal for the mean, order statistics for the median).",
         _table(
             ["Figure", "Goal", "Found", "Trials", "95 % interval", "Reached"],
             [[r.figure, r.goal, r.found, r.trials, r.interval, r.reached] for r in views.goal_rows(content)],
@@ -41,26 +41,27 @@ def blind_markdown(content: Mapping[str, Any]) -> str:
         "Beside the goals:",
         _table(["Figure", "Found", "Trials", "95 % interval"], views.beside_rows(content)),
         *_conditions(content),
-        "## What was hidden, what was named",
+        "## True causes and diagnosed causes",
         _table(["Hidden", "Trials", "Right", "Named instead"], _confusion_rows(content)),
     ]
     if pairs := pair_rows(content):
         parts += [
             "Pairs, gaps of all sizes:",
-            _table(["What became of them", "Trials"], [[words, str(count)] for words, count in pairs]),
+            _table(["Outcome", "Trials"], [[words, str(count)] for words, count in pairs]),
         ]
     parts += [
-        "## Is a stated probability kept?",
+        "## Are the stated probabilities calibrated?",
         _table(["Stated, mean", "True", "Trials", "95 % interval"], views.reliability_rows(content)),
-        "By stratum. The slope is that of the logistic regression of what came true on the stated log odds: 1 is calibrated, "
-        "less is overconfident. The likely causes of a diagnosis are to hold the truth in 90 %.",
+        "By stratum. Slope of the logistic regression of the outcome on the stated log odds: 1 is calibrated, below 1 "
+        "overconfident. The set of likely causes should contain the true cause in 90 % of the trials.",
         _table(["Stratum", *views.SCORE_HEADS], views.score_rows(content)),
         "## Errors on withheld records",
-        "In noise floors, from the model and the input alone, by kind and amplitude of the record; of all trials but those from "
-        "outside the catalogue.",
+        "In noise floors, simulated from the model and the input alone, by kind and amplitude of the record; all trials except "
+        "those with an effect from outside the catalogue.",
         _table(["Record", "Records", "Median", "95 % quantile"], views.held_out_rows(content)),
         "## Errors of the parameters",
-        "In standard errors, where the verdict is right. True standard errors would give 95 % within 2, a median of 0.67 and a "
+        "In standard errors, where the verdict is right. Correct standard errors would give 95 % within 2, a median of 0.67 and "
+        "a "
         "95 % quantile of 1.96.",
         _table(
             ["Parameters", "Numbers", "Within 2", "Median", "95 % quantile"], views.parameter_rows(content)
@@ -114,7 +115,7 @@ def _wrong(content: Mapping[str, Any]) -> str:
         ],
     )
     more = len(content["wrong"]) - len(rows)
-    again = f"Each can be run again alone, the first with `{rows[0].again}`."
+    again = f"Each trial can be rerun alone, the first with `{rows[0].again}`."
     return "\n\n".join([table, *([f"And {more} more in blind.json."] if more else []), again])
 
 

@@ -1,4 +1,4 @@
-"""Which words and rows does the score of a blind bench become? Page, terminal and text share them."""
+"""Words and rows of the score of a blind bench, shared by page, terminal and text."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from rigsight.report.wording import TIMES, effect_label, listed, percent, senten
 NOTHING = "-"
 SHARES = {
     "singles_right": "single effects right, gap of 5 x floor and more",
-    "singles_right_within_set": "  or among those named alike",
+    "singles_right_within_set": "  or named among causes that cannot be distinguished",
     "singles_effect_right": "  effect right, at any place",
     "singles_place_right": "  place right",
-    "looked_at": "true places among those looked at, gap of 5 x floor and more",
+    "looked_at": "true places among those examined, gap of 5 x floor and more",
     "pairs_right": "pairs, both right, gap of 5 x floor and more",
-    "pairs_right_within_set": "  or among those named alike",
+    "pairs_right_within_set": "  or named among causes that cannot be distinguished",
     "controls_right": "controls right (none, parameters)",
     "outside_unknown": "outside the catalogue, called unknown",
     "outside_unknown_large_gap": "  gap of 5 x floor and more",
     "outside_named_above_half": "  an effect named with more than 0.5",
     "faint_right": "faint single effects right, 1.5 to 5 x floor",
-    "faint_right_within_set": "  or among those named alike",
+    "faint_right_within_set": "  or named among causes that cannot be distinguished",
 }
 NUMBERS = {
     "log_score": "mean log score on the truth (0 is perfect)",
@@ -38,17 +38,17 @@ _GOALS = {
     "pairs_right": "pairs, both effects named",
     "log_score": "log score on the truth, mean (0 is perfect)",
     "held_out_median": "error on withheld records, median",
-    "laboratory_right": "effect and place named in a laboratory's records",
+    "laboratory_right": "effect and place named in laboratory records",
     "laboratory_wrong_name": "another effect or place named there",
     "laboratory_sure_unknown": "called unknown there with more than 0.9",
 }
 _BESIDE = {
     "singles_effect_right": "single effects named, at whatever place",
-    "looked_at": "singles and pairs whose true places were looked at, on rigs with several places",
-    "singles_right_within_set": "single effects named, or among those that the records cannot tell apart",
-    "pairs_right_within_set": "pairs named, or among those that the records cannot tell apart",
+    "looked_at": "singles and pairs whose true places were examined, on rigs with several places",
+    "singles_right_within_set": "single effects named, or among causes that the records cannot distinguish",
+    "pairs_right_within_set": "pairs named, or among causes that the records cannot distinguish",
     "faint_right": "faint single effects named (gap of 1.5 to 5 noise floors)",
-    "faint_right_within_set": "faint single effects named, or among those that cannot be told apart",
+    "faint_right_within_set": "faint single effects named, or among causes that cannot be distinguished",
     "outside_unknown": "effects from outside called unknown, gaps of all sizes",
     "outside_named_above_half": "effects from outside for which an effect was named with more than 0.5",
 }
@@ -84,7 +84,7 @@ class GroupView:
 
 
 GROUP_HEADS = (
-    "Trials", "Right", "95 % interval", "Effect right", "Right or not to be told apart", "Place right", "Place looked at",
+    "Trials", "Right", "95 % interval", "Effect right", "Right or indistinguishable", "Place right", "Place looked at",
     "Log score on the truth",
     "Withheld error, median", "Seconds, median",
 )  # fmt: skip
@@ -114,7 +114,7 @@ def number(value: float | None, digits: int = 3) -> str:
 def bench_text(content: Mapping[str, Any]) -> str:
     """Return which benches were scored."""
     return listed(
-        f"{b['n_trials']} campaign{'s' if b['n_trials'] != 1 else ''} of somebody else"
+        f"{b['n_trials']} campaign{'s' if b['n_trials'] != 1 else ''} from an external source"
         if b["design"] == "external"
         else f"{b['n_trials']} of design {b['design']}, seed {b['seed']}"
         for b in content["benches"]
@@ -132,7 +132,7 @@ def verdict_text(content: Mapping[str, Any]) -> str:
         f"{_GOALS[row['name']]} ({_together(_value(row))} instead of {_together(_target(row))})"
         for row in missed
     ]
-    untried = f" {len(rows) - len(tried)} of the goals could not be tried." if len(tried) < len(rows) else ""
+    untried = f" {len(rows) - len(tried)} of the goals could not be tested." if len(tried) < len(rows) else ""
     if not missed:
         return f"All of the {len(tried)} goals are reached.{untried}"
     return (
@@ -220,11 +220,11 @@ def _reached(row: Mapping[str, Any]) -> str:
     if row["reached"] is None:
         return "not tried"
     word = "yes" if row["reached"] else "no"
-    return word if row["decided"] else f"{word}, but the interval holds the goal"
+    return word if row["decided"] else f"{word}, but the interval contains the goal"
 
 
 def reliability_rows(content: Mapping[str, Any]) -> list[list[str]]:
-    """Return stated probability, share that was right, counts and interval, of bins that hold a trial."""
+    """Return stated probability, share of right verdicts, counts and interval, of bins that hold a trial."""
     return [
         [number(row["stated"]), *share_cells(row["right"])]
         for row in content["reliability"]
@@ -239,7 +239,7 @@ SCORE_HEADS = (
     "Log score",
     "Brier score",
     "Slope",
-    "Likely causes hold the truth",
+    "Likely causes contain the truth",
     "Causes in the set",
 )
 
@@ -358,7 +358,7 @@ def _at_places(effects: Sequence[str], where: Sequence[str]) -> str:
 
 
 def _wrong_row(trial: Mapping[str, Any], name: str) -> WrongRow:
-    remark = "truth among those that cannot be told apart" if trial["right_within_set"] else ""
+    remark = "truth among causes that cannot be distinguished" if trial["right_within_set"] else ""
     return WrongRow(
         trial=name,
         hidden=hidden_text(trial),

@@ -1,4 +1,4 @@
-"""How do curves get into the page, so that its script can draw and zoom them? As packed numbers beside a static drawing."""
+"""Curves in the page that its script can draw and zoom: packed numbers next to a static drawing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which figures does a comparison of models leave, and which models are drawn where there are too many?"""
+"""Figures of a comparison of models, and the choice of models to draw if there are too many."""
 
 from __future__ import annotations
 

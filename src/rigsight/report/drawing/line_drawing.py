@@ -1,4 +1,4 @@
-"""How do lines over a shared axis become a static drawing, in the look of the other figures and without matplotlib?
+"""Static drawing of lines over a shared axis, in the style of the other figures and without matplotlib.
 
 matplotlib takes a tenth of a second for a figure, whatever is in it, and a report has several of every record. A drawing here
 takes some milliseconds. Lengths are points, of which 72 make an inch, as in matplotlib.

@@ -94,7 +94,7 @@ def _figure(diagnosis: Diagnosis, trace: Trace, motion: str, force: str, key: st
     what = f"{force} over {motion} and over its rate, record {trace.record}, motion of ±{half * scale.factor:.3g} {scale.unit}"
     place = f"{trace.t[window.start]:.4g} s to {trace.t[window.stop - 1]:.4g} s"
     if window.stop - window.start < whole.size:
-        place += f", where it errs most, {next(iter(stages.values()))}"
+        place += f", where the error is largest, {next(iter(stages.values()))}"
     return page_figure(
         plot.force_loops(loop, stages),
         key,

@@ -1,4 +1,4 @@
-"""How do the curves of a record look where they stand still: on paper, and where no script runs?"""
+"""Static drawings of the curves of a record, for print and without script."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How do the frequency responses of the records look: each on its own, and all amplitudes over each other?"""
+"""Drawings of the frequency responses of the records: each alone, and all amplitudes together."""
 
 from __future__ import annotations
 

@@ -80,5 +80,5 @@ def _caption(marks: Mapping[str, plot.PlaceMark], rig: Rig) -> str:
     if named:
         told += f" Marked: {listed(named)}."
     if others:
-        told += f" Paler, and possible too: {listed(others)}."
+        told += f" Paler, also possible: {listed(others)}."
     return told

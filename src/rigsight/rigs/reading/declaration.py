@@ -1,4 +1,4 @@
-"""What does a rig file hold? Its tables, its expressions as parsed, and the place of each, for messages."""
+"""Content of a rig file: its tables, parsed expressions, and the position of each for messages."""
 
 from __future__ import annotations
 

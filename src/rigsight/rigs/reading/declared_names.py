@@ -1,4 +1,4 @@
-"""Are the names of a rig file free, known where they are read, and read at all?"""
+"""Checks of the names of a rig file: unique, declared where they are used, and used at all."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rigsight.rigs.reading.functions import FUNCTIONS
 
 _LONGEST_NAME = 60
 _NEEDED = {
-    "coordinates": "something that moves",
-    "joints": "a place where friction and other effects can act; one that resists nothing has a motion alone",
-    "sensors": "something that is recorded",
+    "coordinates": "a motion",
+    "joints": "a place where friction and other effects can act; one without resistance needs only a motion",
+    "sensors": "a recorded signal",
 }
 """Tables without which there is nothing to diagnose."""
 _PLACES = ("joints", "drives", "sensors")
@@ -58,19 +58,19 @@ def check_declared_names(declaration: Declaration) -> None:
 def _check_name(declaration: Declaration, path: Path, name: str) -> None:
     if not is_identifier(name):
         declaration.refuse(
-            path, f"{shown(name)} is no name: letters, digits and _ make one, and it begins with no digit"
+            path, f"{shown(name)} is not a name: use letters, digits and _, and do not begin with a digit"
         )
     # `force` and `d` are functions only where parentheses follow.
     if name in FUNCTIONS or name == "t":
         what = "the time column" if name == "t" else "a function"
-        declaration.refuse(path, f"'{name}' is {what}; name it otherwise")
+        declaration.refuse(path, f"'{name}' is {what}; choose another name")
     if len(name) > _LONGEST_NAME:
         declaration.refuse(path, f"a name may have {_LONGEST_NAME} characters, this one has {len(name)}")
 
 
 def _check_free(declaration: Declaration, path: Path, name: str, taken: dict[str, str]) -> None:
     if name in taken:
-        declaration.refuse(path, f"the name '{name}' is taken by [{taken[name]}]; name it otherwise")
+        declaration.refuse(path, f"the name '{name}' is already used by [{taken[name]}]; choose another name")
 
 
 def _check_places(declaration: Declaration) -> None:
@@ -108,7 +108,8 @@ def _check_references(declaration: Declaration) -> None:
     for name in table.initial:
         if name in table.states and table.states[name].start is not None:
             declaration.refuse(
-                ("initial", name), f"'{name}' starts twice: states.{name}.start says it too; take one out"
+                ("initial", name),
+                f"'{name}' has two start values: states.{name}.start gives it too; remove one",
             )
         if name in known:
             continue
@@ -118,11 +119,11 @@ def _check_references(declaration: Declaration) -> None:
         ):
             declaration.refuse(
                 ("initial", name),
-                f"'{name}' is prescribed by an input, which says where it starts; take it out",
+                f"'{name}' is prescribed by an input, which also gives its start value; remove it",
             )
         declaration.refuse(
             ("initial", name),
-            f"'{name}' is no coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}",
+            f"'{name}' is not a coordinate, rate or state.{nearest(name, known)} Known: {_listed(known)}",
         )
 
 
@@ -180,20 +181,20 @@ def _made_of(path: Path) -> str:
     """Return in words what an expression is made of."""
     match path:
         case ("energy", "kinetic"):
-            return "a kinetic energy is made of coordinates, rates, parameters and constants, and of signals made of these"
+            return "a kinetic energy may contain coordinates, rates, parameters and constants, and signals made of these"
         case ("energy", "potential"):
-            return "a potential energy is made of coordinates, parameters and constants, and of signals made of these"
+            return "a potential energy may contain coordinates, parameters and constants, and signals made of these"
         case ("joints", _, "motion"):
-            return "a joint's motion is made of coordinates, parameters and constants"
+            return "the motion of a joint may contain coordinates, parameters and constants"
         case ("joints", _, "force"):
-            return "a joint's force is made of coordinates, rates, states, signals, parameters and constants"
+            return "the force of a joint may contain coordinates, rates, states, signals, parameters and constants"
         case ("joints", _, part):
-            return f"a joint's {part} is made of parameters and constants"
+            return f"the {part} of a joint may contain parameters and constants"
         case ("drives", _, "along"):
-            return "what a force acts along is made of coordinates, parameters and constants"
+            return "the expression along which a force acts may contain coordinates, parameters and constants"
         case ("alternatives", name, _):
-            return f"the value that follows is made of '{name}' and of constants"
-    return "a start value is made of parameters and constants"
+            return f"the derived value may contain '{name}' and constants"
+    return "a start value may contain parameters and constants"
 
 
 def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str]) -> str:
@@ -203,10 +204,10 @@ def _why_not(declaration: Declaration, path: Path, name: str, allowed: set[str])
     if name in declaration.symbols:
         if inner in table.joints and name == force_name(inner):
             return (
-                f"'{name}' can be read by sensors alone: the force of a joint can be recorded, not fed back"
+                f"'{name}' can only be read by sensors: the force of a joint can be recorded but not fed back"
             )
         if name in table.alternatives:
-            return f"'{name}' is known in the place of '{table.alternatives[name].gives}'; read that one"
+            return f"'{name}' is an alternative to '{table.alternatives[name].gives}'; use that one"
         return f"'{name}' cannot be read here: {_made_of(path)}"
     if name == force_name(inner):
         return f"there is no joint '{inner}'.{nearest(inner, table.joints)} Joints: {_listed(table.joints)}"
@@ -239,18 +240,18 @@ def check_all_used(declaration: Declaration) -> None:
     for key in ("inputs", "constants", "parameters", "signals"):
         for name in getattr(table, key):
             if name not in read:
-                declaration.refuse((key, name), f"no equation reads '{name}'; take it out, or use it")
+                declaration.refuse((key, name), f"no equation reads '{name}'; remove it, or use it")
     for name in table.drives:
         # The force may follow from a state that the drive moves: a current, a pressure.
         if not any(name in e.reads for path, e in expressions.items() if path != ("drives", name, "signal")):
             declaration.refuse(
                 ("drives", name, "force"),
-                f"neither it nor another equation reads '{name}', the drive's signal behind the effects; write '{name}' in it",
+                f"neither it nor another equation reads '{name}', the signal of the drive after its effects; use '{name}' in it",
             )
     for name in table.alternatives:
         if name not in expressions["alternatives", name, "value"].reads:
             declaration.refuse(
-                ("alternatives", name, "value"), f"it does not read '{name}', from which it is to follow"
+                ("alternatives", name, "value"), f"it does not read '{name}', from which it should be derived"
             )
 
 

@@ -141,7 +141,7 @@ def _parameter(
         if log and bound is not None and bound <= 0.0:
             declaration.refuse(
                 (key, name, end),
-                f"log = true searches its logarithm, so {end} lies above 0, got {bound:g}",
+                f"log = true searches its logarithm, so {end} must be above 0, got {bound:g}",
             )
     lower = own.lower if own.lower is not None else (_LEAST if log else -_LARGEST)
     upper = own.upper if own.upper is not None else _LARGEST

@@ -1,4 +1,4 @@
-"""Do the units of all expressions of a rig file add up, and are they those that the place of each demands?"""
+"""Checks of the units of all expressions of a rig file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _ENERGY = "J"
 
 
 def check_units_add_up(declaration: Declaration, order: list[Path]) -> None:
-    """Refuse units that nobody knows, or that do not add up.
+    """Reject unknown or inconsistent units.
 
     Parameters
     ----------
@@ -48,10 +48,14 @@ class _Units:
         for name in self._table.drives:
             along = self._of(("drives", name, "along"))
             wanted = None if along is None else self._energy / along
-            self._is(("drives", name, "force"), wanted, "as force times what it acts along is J")
+            self._is(
+                ("drives", name, "force"),
+                wanted,
+                "because force times the expression that it acts along is in J",
+            )
         for name, state in self._table.states.items():
             measured = dimension(state.unit)
-            self._is(("states", name, "rate"), measured / self._second, "as the unit of the state demands")
+            self._is(("states", name, "rate"), measured / self._second, "from the unit of the state")
             if state.start is not None:
                 self._is(("states", name, "start"), measured, "as the state is")
         for name, alternative in self._table.alternatives.items():
@@ -91,7 +95,7 @@ class _Units:
         if got is not None and wanted is not None and got != wanted:
             text = quoted(self._declaration.expressions[path].text)
             self._declaration.refuse(
-                path, f"'{text}' is {measured_in(got)}, and should be {measured_in(wanted)}, {why}"
+                path, f"'{text}' is {measured_in(got)} but should be {measured_in(wanted)}, {why}"
             )
 
     def _check_signal(self, path: Path) -> None:
@@ -105,9 +109,11 @@ class _Units:
         motion, force = self._of(("joints", name, "motion")), self._dimensions[force_name(name)]
         if motion is None or force is None:
             return
-        self._is(("joints", name, "stiffness"), force / motion, "as the motion demands")
-        self._is(("joints", name, "damping"), force * self._second / motion, "as the motion demands")
+        self._is(("joints", name, "stiffness"), force / motion, "from the unit of the motion")
+        self._is(("joints", name, "damping"), force * self._second / motion, "from the unit of the motion")
         self._is(("joints", name, "rest"), motion, "as the motion is")
-        self._is(("joints", name, "force"), force, "as the motion demands")
+        self._is(("joints", name, "force"), force, "from the unit of the motion")
         if self._table.joints[name].inertia is not None:
-            self._is(("joints", name, "inertia"), force * self._second**2 / motion, "as the motion demands")
+            self._is(
+                ("joints", name, "inertia"), force * self._second**2 / motion, "from the unit of the motion"
+            )

@@ -1,7 +1,7 @@
-"""Do the units of an expression add up?
+"""Dimensional analysis of an expression.
 
-A number that is part of a formula (2, 0.5) is a plain number. Any other (9.81) may stand for a constant whose unit nobody wrote:
-what it multiplies may have any unit. Angles count as plain numbers, as in SI.
+A number that is part of a formula (2, 0.5) is dimensionless. Any other (9.81) may be a constant without a stated unit, so a
+product with it may have any unit. Angles are dimensionless, as in SI.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def dimension(unit: str) -> Dimension:
     Raises
     ------
     UnitError
-        If nobody knows the unit, or it is not the SI unit of what it measures: equations hold in SI alone.
+        If the unit is unknown, or is not the SI unit of its quantity: equations are in SI units only.
     """
     from pint.errors import PintError
 
@@ -57,7 +57,7 @@ def dimension(unit: str) -> Dimension:
     if len(text) > _LONGEST:
         raise UnitError(f"a unit may have {_LONGEST} characters, this one has {len(text)}")
     if not _UNIT.fullmatch(text) or re.search(r"\)\s*\^|\(\s*\)", text):
-        raise UnitError(f"'{unit}' is no unit; write one like N m/rad, kg m^2 or 1/s")
+        raise UnitError(f"'{unit}' is not a unit; write one like N m/rad, kg m^2 or 1/s")
     registry = _registry()
     try:
         # A blank multiplies, and what follows a stroke in parentheses is all below it.
@@ -74,10 +74,10 @@ def dimension(unit: str) -> Dimension:
         SyntaxError,
         TokenError,
     ):
-        raise UnitError(f"the unit '{unit}' is not known; write one like N m/rad, kg m^2 or 1/s") from None
+        raise UnitError(f"the unit '{unit}' is unknown; write one like N m/rad, kg m^2 or 1/s") from None
     if abs(float(si.magnitude) - 1.0) > 1e-12:
         raise UnitError(
-            f"the unit '{unit}' is not SI: equations hold in {_plain(si.units)}, which is {1.0 / si.magnitude:g} {unit}"
+            f"the unit '{unit}' is not SI: equations are in {_plain(si.units)}, which is {1.0 / si.magnitude:g} {unit}"
         )
     return si.dimensionality
 
@@ -176,7 +176,7 @@ class _Walk:
         if kind == "pure":
             if parts[0] is not None and parts[0] != self._plain:
                 raise ExpressionError(
-                    f"{name}(...) takes a plain number, but {self._quoted(arguments[0])} is {measured_in(parts[0])}",
+                    f"{name}(...) takes a dimensionless number, but {self._quoted(arguments[0])} is {measured_in(parts[0])}",
                     place_of(arguments[0]),
                 )
             return self._plain
@@ -189,13 +189,13 @@ class _Walk:
         base, exponent = (self.of(child) for child in node.children)
         if exponent is not None and exponent != self._plain:
             raise ExpressionError(
-                f"an exponent is a plain number, but {self._quoted(node.children[1])} is {measured_in(exponent)}",
+                f"an exponent must be dimensionless, but {self._quoted(node.children[1])} is {measured_in(exponent)}",
                 place_of(node.children[1]),
             )
         if base is None or base == self._plain:
             return base
         power = constant(node.children[1])
-        # An exponent that is a parameter gives a unit that nobody can write down, and so do powers of powers.
+        # An exponent that is a parameter gives an undefined unit, and so do powers of powers.
         if power is None or max(abs(p * power) for p in base.values()) > _LARGEST_POWER:
             return None
         return base**power

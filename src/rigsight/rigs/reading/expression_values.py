@@ -1,4 +1,4 @@
-"""What does a parsed expression stand for? The same as symbols, and always a real and finite value."""
+"""Conversion of a parsed expression to symbols, with checks that its value is real and finite."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _check_number(value: sp.Expr, place: int) -> None:
     try:
         number = complex(value)
     except (OverflowError, TypeError, ValueError):
-        raise ExpressionError("a number is too large, or none", place) from None
+        raise ExpressionError("a number is too large or undefined", place) from None
     if number.imag != 0.0 or math.isnan(number.real):
         raise ExpressionError("this has no real value", place)
     if abs(number.real) > _LARGEST:
@@ -88,13 +88,14 @@ def _of_node(node: Tree[Token] | Token, symbols: Mapping[str, sp.Expr]) -> sp.Ex
     base, exponent = parts
     if exponent.is_number and abs(float(exponent)) > MOST_POWER:
         raise ExpressionError(
-            f"an exponent lies within +-{MOST_POWER}, this one is {float(exponent):g}",
+            f"an exponent must be within +-{MOST_POWER}, this one is {float(exponent):g}",
             place_of(node.children[1]),
         )
     power = base**exponent
     if power.is_Pow and power.exp.is_number and abs(float(power.exp)) > MOST_POWER:
         raise ExpressionError(
-            f"powers of powers stay within +-{MOST_POWER}, this is the {float(power.exp):g}th", place_of(node)
+            f"powers of powers must stay within +-{MOST_POWER}, this is the {float(power.exp):g}th",
+            place_of(node),
         )
     return power
 

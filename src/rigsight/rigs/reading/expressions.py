@@ -1,4 +1,4 @@
-"""What may stand in an expression of a rig file, and what does it mean? Text is parsed, never executed.
+"""Syntax and meaning of expressions of a rig file. Text is parsed, never executed.
 
 Numbers, names, ``+ - * / ^``, parentheses, ``d(coordinate)`` for a rate, and a few functions. Kinks are written through the
 functions that the simulation knows how to cross (`rigsight.rigs.reading.functions`).
@@ -101,7 +101,7 @@ def parsed(text: str) -> Expression:
     except UnexpectedInput as error:
         raise _told(error, text) from None
     if not isinstance(tree, Tree):
-        raise ExpressionError("this is no expression")
+        raise ExpressionError("this is not an expression")
     if _depth(tree) > _DEEPEST_TREE:
         raise ExpressionError(f"powers and signs may be nested {_DEEPEST_TREE} deep")
     return Expression(text, _checked(tree))
@@ -151,7 +151,7 @@ def _told(error: UnexpectedInput, text: str) -> ExpressionError:
     if isinstance(error, UnexpectedCharacters):
         prime = "; a rate is written d(phi)" if found == "'" else ""
         return ExpressionError(
-            f"{found} has no meaning here{prime}; allowed are numbers, names, + - * / ^ and parentheses",
+            f"{found} is not allowed here{prime}; allowed are numbers, names, + - * / ^ and parentheses",
             place,
         )
     if text[max(place - 1, 0) : place + 1] == "**":
@@ -206,7 +206,7 @@ def _check_exponent(node: Tree[Token] | Token) -> None:
     power = constant(node)
     if power is not None and abs(power) > MOST_POWER:
         raise ExpressionError(
-            f"an exponent lies within +-{MOST_POWER}, this one is {power:g}", place_of(node)
+            f"an exponent must be within +-{MOST_POWER}, this one is {power:g}", place_of(node)
         )
 
 

@@ -1,4 +1,4 @@
-"""Is a kinetic energy one, and does every coordinate move inertia? Found by numbers: symbols of large arms take minutes."""
+"""Numerical checks of a kinetic energy and of the inertia of every coordinate: symbolic ones of large arms take minutes."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def read_rig_file(path: Path) -> Rig:
         Naming the file, line and column, what was wrong and what to write instead.
     """
     if file_size(path, "the rig file") > LARGEST_FILE:
-        raise InputError(f"{path}: a rig file may have {LARGEST_FILE / 1e6:g} MB.")
+        raise InputError(f"{path}: a rig file may have at most {LARGEST_FILE / 1e6:g} MB.")
     try:
         text = path.read_text("utf-8")
     except UnicodeDecodeError as error:
@@ -67,7 +67,7 @@ def rig_of_text(
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source}{toml_error(error)}") from None
     except RecursionError:
-        raise InputError(f"{source}: is no valid TOML: its arrays are nested too deep.") from None
+        raise InputError(f"{source}: is not valid TOML: its arrays are nested too deep.") from None
     if folder is not None:
         content = with_whole_path(content, folder)
     return _rig_of(content, value_places(text), source, check_units)

@@ -1,4 +1,4 @@
-"""What may stand in a rig file: its tables and their keys, before any expression is read."""
+"""Tables and keys of a rig file, before any expression is parsed."""
 
 from __future__ import annotations
 
@@ -150,13 +150,16 @@ def path_and_sentence(error: Any) -> tuple[tuple[str | int, ...], str]:
         return path[:-1], f"the line '{key} = ...' is missing"
     if error["type"] == "string_too_long":
         own = path[:-1] if key == _FORMULA else path
-        return own, f"it may have {error['ctx']['max_length']} characters, and has {len(error['input'])}"
+        return (
+            own,
+            f"it may have at most {error['ctx']['max_length']} characters but has {len(error['input'])}",
+        )
     got = shown(error.get("input"))
     if error["type"] in ("model_type", "dict_type", "model_attributes_type"):
         return path, f"this is a table: write [{'.'.join(map(str, path))}] and its keys below, got {got}"
     if key in (_FORMULA, "float"):
-        return path[:-1], f"wanted is an expression in quotes or a number, got {got}"
-    return path, f"wanted is {_WANTED.get(error['type'], error['msg'])}, got {got}"
+        return path[:-1], f"expected an expression in quotes or a number, got {got}"
+    return path, f"expected {_WANTED.get(error['type'], error['msg'])}, got {got}"
 
 
 def _keys_at(path: tuple[str | int, ...]) -> list[str]:

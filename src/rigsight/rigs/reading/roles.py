@@ -1,4 +1,4 @@
-"""What decides the size of a rig's parameter? The place where it stands alone: a stiffness is as large as force over motion."""
+"""Characteristic size of a parameter from the place where it occurs alone: a stiffness scales with force over motion."""
 
 from __future__ import annotations
 

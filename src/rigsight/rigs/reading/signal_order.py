@@ -35,5 +35,5 @@ def signal_order(declaration: Declaration) -> list[Path]:
         loop = [name.removeprefix(READING) for name in reversed(error.args[1])]
         declaration.refuse(
             own[error.args[1][0]],
-            f"a loop without a state in it: {' -> '.join(loop)}; each needs the value of the next",
+            f"an algebraic loop (no state in it): {' -> '.join(loop)}; each needs the value of the next",
         )

@@ -1,4 +1,4 @@
-"""What does a rig file leave to another program? Its bodies, by what they are called there."""
+"""Bodies of a rig file that another program simulates, with their names there."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ def check_simulator(declaration: Declaration) -> None:
     if own.kind not in KINDS:
         declaration.refuse(
             (_KEY, "kind"),
-            f"'{own.kind}' is no simulator.{nearest(own.kind, KINDS)} Allowed: {', '.join(KINDS)}",
+            f"'{own.kind}' is not a simulator.{nearest(own.kind, KINDS)} Allowed: {', '.join(KINDS)}",
         )
     free = [name for name, coordinate in table.coordinates.items() if coordinate.prescribed_by is None]
     if len(free) < len(table.coordinates) or not free:
         declaration.refuse(
-            (_KEY,), "every coordinate of a simulated rig is a degree of freedom; take out prescribed_by"
+            (_KEY,), "every coordinate of a simulated rig must be a degree of freedom; remove prescribed_by"
         )
     others = {"rates": own.rates, "forces": own.forces, "without_armature": own.without_armature}
     for key, wanted in {"rates": "fmu", "forces": "fmu", "without_armature": "mujoco"}.items():
         if others[key] and own.kind != wanted:
-            declaration.refuse((_KEY, key), f"it is of {wanted}, and this is {own.kind}; take it out")
+            declaration.refuse((_KEY, key), f"it belongs to {wanted}, but this is {own.kind}; remove it")
     for key in ("coordinates", "rates", "forces"):
         for name in getattr(own, key):
             if name not in free:
@@ -48,18 +48,16 @@ def check_simulator(declaration: Declaration) -> None:
         names = list(getattr(own, key).values())
         for name, there in getattr(own, key).items():
             if names.count(there) > 1:
-                declaration.refuse(
-                    (_KEY, key, name), f"'{there}' stands there twice; each has one of its own"
-                )
+                declaration.refuse((_KEY, key, name), f"'{there}' is used twice; each needs its own")
     for name, there in own.parameters.items():
         if list(own.parameters.values()).count(there) > 1:
-            declaration.refuse((_KEY, "parameters", name), f"'{there}' is given by two numbers; take one out")
+            declaration.refuse((_KEY, "parameters", name), f"'{there}' is given by two numbers; remove one")
     numbers = declaration.names("constants", "parameters")
     for name in own.parameters:
         if name not in numbers:
             declaration.refuse(
                 (_KEY, "parameters", name),
-                f"'{name}' is no constant and no parameter of this file.{nearest(name, numbers)} Declare it",
+                f"'{name}' is neither a constant nor a parameter of this file.{nearest(name, numbers)} Declare it",
             )
 
 

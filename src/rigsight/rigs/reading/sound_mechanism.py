@@ -1,4 +1,4 @@
-"""Can a declared mechanism move as it is written? Energies, forces that act on something, sensors that something moves."""
+"""Checks of a declared mechanism: energies, forces that act on a motion, sensors that read one."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ def _check_mass(declaration: Declaration, mechanism: Mechanism) -> None:
     if not is_quadratic(mechanism) or mechanism.mass_matrix.free_symbols & rates:
         declaration.refuse(
             path,
-            "a kinetic energy is a sum of squares and products of rates, as 'm*d(x)^2/2'; what holds no rate is potential",
+            "a kinetic energy is a sum of squares and products of rates, such as 'm*d(x)^2/2'; terms without a rate belong to "
+            "the potential energy",
         )
     negative = negative_coordinates(mechanism)
     if negative:
-        declaration.refuse(path, f"it is negative when {', '.join(negative)} moves; turn its sign round")
+        declaration.refuse(path, f"it is negative when {', '.join(negative)} moves; change its sign")
     lacking = dependent_coordinates(mechanism)
     if lacking:
         together = " together" if len(lacking) > 1 else ""
@@ -58,7 +59,7 @@ def _check_that_forces_act(declaration: Declaration, mechanism: Mechanism) -> No
         if not moving & (free | prescribed):
             declaration.refuse(
                 path,
-                "it reads no coordinate, so the joint never moves; write one, as 'phi', or a difference of two",
+                "it reads no coordinate, so the joint never moves; use one, such as 'phi', or a difference of two",
             )
         if not moving & free and force_symbol(joint.name) not in recorded:
             declaration.refuse(
@@ -82,7 +83,7 @@ def _check_sensors(declaration: Declaration, mechanism: Mechanism) -> None:
         if not _reached(sensor.reads, mechanism) & moving:
             declaration.refuse(
                 ("sensors", sensor.name, "reads"),
-                "nothing that moves is read: no coordinate, rate, state or force",
+                "it reads nothing that moves: no coordinate, rate, state or force",
             )
 
 
@@ -98,7 +99,7 @@ def _check_feedback(declaration: Declaration, mechanism: Mechanism) -> None:
     for path, expression in fed_back.items():
         if _reached(expression, mechanism) & forces:
             declaration.refuse(
-                path, "the force of a joint is read; it can be recorded by a sensor, not fed back"
+                path, "it reads the force of a joint, which a sensor can record but which cannot be fed back"
             )
 
 

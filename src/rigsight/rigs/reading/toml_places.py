@@ -1,4 +1,4 @@
-"""At which line and column of a TOML file does the value of a key stand? tomllib does not say."""
+"""Line and column of the value of a key in a TOML file, which tomllib does not report."""
 
 from __future__ import annotations
 
@@ -55,23 +55,23 @@ def value_places(text: str) -> dict[Path, Place]:
 
 
 _MENDS = {
-    "Invalid value": "text and expressions stand in quotes",
+    "Invalid value": "put text and expressions in quotes",
     "Illegal character '\\n'": "a quotation mark is missing at the end of the line",
-    "Cannot overwrite a value": "the key stands twice in its table",
-    "Cannot declare": "the table stands twice",
-    "Expected '=' after a key": "a line is KEY = VALUE",
-    "Unescaped": "a backslash in quotes is written twice",
+    "Cannot overwrite a value": "the key occurs twice in its table",
+    "Cannot declare": "the table occurs twice",
+    "Expected '=' after a key": "write the line as KEY = VALUE",
+    "Unescaped": "write a backslash in quotes twice",
 }
 _POSITION = re.compile(r"(?P<what>.*) \(at (?P<place>line \d+, column \d+|end of document)\)", re.DOTALL)
 
 
 def toml_error(error: tomllib.TOMLDecodeError) -> str:
-    """Return ``", line 3, column 8: is no valid TOML: ..."`` with what to write, for behind the name of a file."""
+    """Return ``", line 3, column 8: is not valid TOML: ..."`` with what to write, for behind the name of a file."""
     found = _POSITION.fullmatch(str(error))
     if found is None:
-        return f": is no valid TOML: {error}."
+        return f": is not valid TOML: {error}."
     mend = next((mend for start, mend in _MENDS.items() if found["what"].startswith(start)), "")
-    return f", {found['place']}: is no valid TOML: {found['what']}{f'; {mend}' if mend else ''}."
+    return f", {found['place']}: is not valid TOML: {found['what']}{f'; {mend}' if mend else ''}."
 
 
 def _keys(written: str) -> Path:

@@ -1,4 +1,4 @@
-"""Which numbers does a rig file from a model declare, and which numbers of the model is each?"""
+"""Parameters of a rig file from a model, and the corresponding fields of the model."""
 
 from __future__ import annotations
 

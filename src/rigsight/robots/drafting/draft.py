@@ -1,4 +1,4 @@
-"""A MuJoCo model -> the tables of a rig file, with where each part comes from, so that numbers find the way back."""
+"""A MuJoCo model -> the tables of a rig file, with the origin of each part, so that parameters can be written back."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Gear:
 
 @dataclass(frozen=True)
 class RigDraft:
-    """A rig file that says what a MuJoCo model says.
+    """A rig file equivalent to a MuJoCo model.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def draft_rig(
     gears = gears or {}
     if gears and as_it_is is not None:
         raise InputError(
-            "a gear splits a joint in two, which a simulation as it is does not have; leave one of them out"
+            "a gear splits a joint in two, which is impossible if the model is simulated as it is; omit one of the two options"
         )
     bodies, plays = split_joints(model, bodies_of(model), gears)
     actuators, drives_left_out = actuators_of(model)
@@ -147,7 +147,7 @@ def draft_rig(
             if joint.index < model.njnt
         ]
     if not sensors:
-        notes.append("The model has no sensor of a joint: the rig reads the position of every joint.")
+        notes.append("The model has no joint sensor: the rig reads the position of every joint.")
         sensors = [
             TreeSensor(-1, joint.index, "", 1.0, False) for joint in joints if joint.index < model.njnt
         ]

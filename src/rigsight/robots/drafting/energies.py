@@ -1,4 +1,4 @@
-"""Kinetic and potential energy of a tree of bodies, in steps with names that a person can follow from body to body.
+"""Kinetic and potential energy of a tree of bodies, in named steps from body to body.
 
 Angular velocity, velocity and direction of gravity are carried outward along the tree, each in the frame of its body.
 
@@ -100,7 +100,9 @@ def energies_of(
         frame = frames[body.parent]
         # Where a tree begins changes no energy but by a constant.
         if not frame.is_still:
-            frame = frame.shifted(known.length("at", body.position, "where it hangs on its parent"))
+            frame = frame.shifted(
+                known.length("at", body.position, "position of its attachment to its parent")
+            )
         frame = frame.turned(_numbers(body.rotation))
         together = _together(body.joints)
         for i, alike in enumerate(together):

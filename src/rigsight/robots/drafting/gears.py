@@ -1,7 +1,6 @@
-"""A joint whose gear gives way: the rotor and what it moves turn by themselves, with a spring between them.
+"""A joint with a compliant gear: rotor and load are separate, with a spring between them.
 
-The first joint keeps the actuator, the armature, damping and friction; a second one at its place is what lies between rotor and
-body.
+The first joint keeps the actuator, the armature, damping and friction; a second one at its place lies between rotor and body.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     import mujoco
 
 _DAMPING_RATIO = 0.1
-"""Of the rotor on the spring of its gear, where nobody knows the damping (**assumption**): steel is less damped, grease more."""
+"""Of the rotor on the spring of its gear, if the damping is unknown (**assumption**): steel is less damped, grease more."""
 
 
 def split_joints(
@@ -52,8 +51,8 @@ def split_joints(
             raise InputError(f"--gear: the stiffness of '{name}' is positive, got {stiffness:g}.")
         if model.dof_armature[joints[name].dof] == 0.0:
             raise InputError(
-                f"--gear: joint '{name}' has no armature. Its rotor turns by itself then, and needs an inertia: give the "
-                "joint an armature in the model."
+                f"--gear: joint '{name}' has no armature. With a gear its rotor turns separately and needs an inertia: give the "
+                f"joint an armature in the model."
             )
     added: dict[int, TreeJoint] = {}
     found = []

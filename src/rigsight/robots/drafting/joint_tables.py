@@ -1,4 +1,4 @@
-"""The joints of a rig file: what resists each, as the fields of a MuJoCo joint say."""
+"""The joints of a rig file: their resistance, from the fields of a MuJoCo joint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What are parts of a MuJoCo model called in a rig file? Its own names, as identifiers that are free."""
+"""Names of the parts of a MuJoCo model in a rig file: its own names as unique identifiers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of a rig file -> its text, with what it leaves out as comments at its head."""
+"""The tables of a rig file -> its text, with omitted parts as comments at its head."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def simulator_table(
     for joint, _ in joints:
         if not joint.name:
             raise InputError(
-                f"joint number {joint.index} has no name, by which MuJoCo is asked for it; give it one"
+                f"joint number {joint.index} has no name, which is needed to access it in MuJoCo; give it one"
             )
     names = {joint.index: joint.name for joint, _ in joints}
     parameters = {

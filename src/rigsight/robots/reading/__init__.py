@@ -1,1 +1,1 @@
-"""What does a compiled MuJoCo model hold, and what of it can a rig file not say?"""
+"""Content of a compiled MuJoCo model, and the parts that a rig file cannot represent."""

@@ -107,7 +107,7 @@ def _beside(model: mujoco.MjModel, index: int, called: str) -> list[str]:
     delay = float(model.actuator_delay[index])
     if delay > 0.0:
         found.append(
-            f'{called}: its delay of {delay:g} s; a campaign says it by effects = ["input_delay@DRIVE"] and T_d'
+            f'{called}: its delay of {delay:g} s; declare it in a campaign by effects = ["input_delay@DRIVE"] and T_d'
         )
     if (
         float(model.actuator_armature[index])

@@ -1,4 +1,4 @@
-"""What is in a MuJoCo model that a rig file cannot say? Each named, so that nothing is dropped silently."""
+"""Parts of a MuJoCo model that a rig file cannot represent. Each is named, so that nothing is dropped silently."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _between_bodies(model: mujoco.MjModel) -> list[str]:
     limited = [model.joint(j).name or f"number {j}" for j in range(model.njnt) if model.jnt_limited[j]]
     if limited:
         found.append(
-            f"range of joints: {_listed(limited)}; the rig moves past it, and end_stop says it as an effect"
+            f"range of joints: {_listed(limited)}; the rig moves past it; use the effect end_stop for it"
         )
     if model.neq:
         found.append(

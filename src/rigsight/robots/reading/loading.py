@@ -43,7 +43,7 @@ def load_spec(path: Path) -> mujoco.MjSpec:
             "Reading MJCF and URDF needs MuJoCo, which is not installed: pip install 'rigsight[mujoco]'."
         ) from None
     if file_size(path, "the model file") > LARGEST_FILE:
-        raise InputError(f"{path}: a model file may have {LARGEST_FILE / 1e6:g} MB.")
+        raise InputError(f"{path}: a model file may have at most {LARGEST_FILE / 1e6:g} MB.")
     try:
         spec = mujoco.MjSpec.from_file(os.fspath(path))
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Which sensors of a MuJoCo model can a rig file say? Those that read the motion of a joint."""
+"""Sensors of a MuJoCo model that a rig file can represent: those that read the motion of a joint."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ def sensors_of(model: mujoco.MjModel, actuators: list[TreeActuator]) -> tuple[li
             found.append(TreeSensor(index, read.joint, name, read.gear, at_actuators[kind]))
         else:
             what = mujoco.mjtSensor(kind).name.removeprefix("mjSENS_").lower()
-            left_out.append(f"{called} ({what}): it reads no joint's motion")
+            left_out.append(f"{called} ({what}): it does not read the motion of a joint")
             continue
         if model.sensor_cutoff[index] > 0.0:
             left_out.append(f"{called}: its cutoff of {float(model.sensor_cutoff[index]):g}")
         if model.sensor_delay[index] > 0.0:
             left_out.append(
-                f"{called}: its delay of {float(model.sensor_delay[index]):g} s; sensor_delay says it as an effect"
+                f"{called}: its delay of {float(model.sensor_delay[index]):g} s; use the effect sensor_delay for it"
             )
     return found, left_out

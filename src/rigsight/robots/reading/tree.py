@@ -1,4 +1,4 @@
-"""What of a compiled MuJoCo model moves? Its bodies in their order, each with its joints, as numbers."""
+"""Bodies of a compiled MuJoCo model in order, each with its joints."""
 
 from __future__ import annotations
 

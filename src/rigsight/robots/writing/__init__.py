@@ -1,1 +1,1 @@
-"""Which fields of MuJoCo and Isaac Lab say the numbers and effects of a model?"""
+"""Fields of MuJoCo and Isaac Lab for the parameters and effects of a model."""

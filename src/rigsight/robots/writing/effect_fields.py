@@ -1,4 +1,4 @@
-"""Which field of MuJoCo says an effect at its place? Many have none."""
+"""Field of MuJoCo for an effect at its place; many effects have none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A gear that gives way, in a MuJoCo model: a second joint at the place of the first, as its documentation says play.
+"""A compliant gear in a MuJoCo model: a second joint at the place of the first, as the documentation recommends for backlash.
 
 MuJoCo documentation, *Modeling*, section *Backlash*.
 """

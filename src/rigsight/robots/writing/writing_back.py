@@ -1,4 +1,4 @@
-"""Numbers and effects of a model -> the MuJoCo model that it began as, with what MuJoCo has a field for."""
+"""Parameters and effects of a model -> the original MuJoCo model, as far as MuJoCo has fields for them."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def _check_is_of(model: Model, draft: RigDraft, source: Path) -> None:
         missing = [part.name for part in parts if part.name not in known]
         if missing:
             raise InputError(
-                f"The model's rig has a {what} '{missing[0]}', and {source} has none of that name "
-                f"({', '.join(known) or 'none at all'}). Name the file from which rigsight init --mjcf made the rig."
+                f"The model's rig has a {what} '{missing[0]}', but {source} has none of that name "
+                f"({', '.join(known) or 'none at all'}). Give the file from which rigsight init --mjcf made the rig."
             )
 
 
@@ -208,7 +208,7 @@ class _Writer:
             self._spec.compile()
             text = self._spec.to_xml()
         except ValueError as error:
-            raise InputError(f"{source}: MuJoCo refuses it with the new numbers: {error}") from None
+            raise InputError(f"{source}: MuJoCo rejects it with the new numbers: {error}") from None
         lines = [f"Written by rigsight export from {source.name}."]
         lines += [f"{line}" for line in self._written]
         lines += [f"MuJoCo has no field for {line}" for line in self._without_field]

@@ -63,7 +63,9 @@ def function_body(
     needed = needed_steps(expressions, steps)
     read = set().union(*(e.free_symbols for e in (*expressions, *needed.values())))
     for symbol in sorted(read - set(needed) - set(names), key=str):
-        raise KeyError(f"The symbol {symbol} has no number: no name of a rig or an effect may reach C.")
+        raise KeyError(
+            f"The symbol {symbol} has no number: names of rigs and effects must not appear in C code."
+        )
     lines = (C_LANES if lanes else C).statements(targets, expressions, names, needed) if targets else []
     return _marked(arguments, lines, further)
 

@@ -1,7 +1,7 @@
-"""How do accelerations that are found by elimination answer to small changes of what they are made of?
+"""Derivatives of accelerations that are found by elimination.
 
-Not the elimination is differentiated, but the system: ``mass @ da = d(loads) - d(mass) @ a``, which is solved with the factors
-that are there.
+The linear system is differentiated instead of the elimination: ``mass @ da = d(loads) - d(mass) @ a``, which is solved with the
+existing factors.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ class Kernel:
         except OSError as error:
             raise MachineError(
                 f"The compiled kernel {path} cannot be loaded ({error}). "
-                "Its folder must allow programs to be run from it; set RIGSIGHT_CACHE_DIR to one that does."
+                "Its folder must permit execution; set RIGSIGHT_CACHE_DIR to a folder that does."
             ) from error
         connect(structure, loaded)
         self._bodies = structure.rig.mechanism.bodies
@@ -140,7 +140,7 @@ class Kernel:
         Returns
         -------
         status
-            0, or why it stopped: 1 for too many steps, 2 for a motion beyond the range of numbers, 3 for lack of memory.
+            0, or why it stopped: 1 for too many steps, 2 for a diverging motion, 3 for lack of memory.
         out
             What is computed at each sample, shape (n_samples, n_computed).
         state
@@ -226,7 +226,7 @@ class Kernel:
         )  # fmt: skip
         self._check_bodies()
         if failed:
-            raise MachineError(f"There is no memory to simulate {n_sets} parameter sets side by side.")
+            raise MachineError(f"Not enough memory to simulate {n_sets} parameter sets side by side.")
         return products
 
     def tangent_equations(
@@ -317,7 +317,7 @@ class Kernel:
         )  # fmt: skip
         self._check_bodies()
         if failed:
-            raise MachineError(f"There is no memory to simulate {n_directions} derivatives side by side.")
+            raise MachineError(f"Not enough memory to simulate {n_directions} derivatives side by side.")
 
 
 def _doubles(values: Any) -> Floats:

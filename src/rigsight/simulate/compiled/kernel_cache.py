@@ -1,4 +1,4 @@
-"""Structure -> compiled kernels, made once and kept."""
+"""Cache of the compiled kernels of structures."""
 
 from __future__ import annotations
 

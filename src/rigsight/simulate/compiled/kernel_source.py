@@ -6,14 +6,14 @@
     Parameter sets side by side in vector registers, classical Runge-Kutta with given numbers of substeps. Fast, accurate enough
     for fits.
 ``normal_equations``
-    The same for many records, of which only what a step of least squares needs is kept: products of residuals and differences.
+    The same for many records, of which only the products of residuals and differences for a least-squares step are kept.
 ``tangent_equations``
     Instead of it where that is cheaper: one set and the derivatives of its outputs by many directions, carried along.
 
-Where something acts late within the rig, its past is remembered: there is ``simulate_one`` alone.
+Delays within the rig need the history of the signal: then only ``simulate_one`` is available.
 
-The equations and the accurate integrator are what exports hold too. No name of a rig or an effect reaches the C text: states,
-parameters and constants are numbered.
+Exports contain the same equations and accurate integrator. The C code contains no names of rigs or effects: states, parameters
+and constants are numbered.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How do expressions answer to small changes of what they hold: their derivatives, and the sums that changes are put into."""
+"""Linearization of expressions: their derivatives, and sums of changes weighted by them."""
 
 from __future__ import annotations
 

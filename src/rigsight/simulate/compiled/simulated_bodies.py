@@ -1,4 +1,4 @@
-"""What another program computes of a rig, as C functions that its equations call."""
+"""Quantities computed by another program, as C functions that the equations call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How do the equations change with states and constants, so that derivatives can be carried along with a motion?"""
+"""Derivatives of the equations by states and constants, for integrating sensitivities along with the motion."""
 
 from __future__ import annotations
 

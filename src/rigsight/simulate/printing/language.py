@@ -1,4 +1,4 @@
-"""How do statements look in a language of code, whatever the language?"""
+"""Statements of a programming language, independent of the language."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which sums of positive parts are the `min`, `max` and `clip` that somebody wrote? People are shown these."""
+"""Sums of positive parts that represent `min`, `max` and `clip`, which are shown instead."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is each symbol of a structure called where people read it: which letter, with which words below and dots above?"""
+"""Displayed name of each symbol of a structure: letter, subscript and dots."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def shown_names(structure: Structure, label: Callable[[str], str] = in_words) ->
     for coordinate, velocity in zip(tree.motion.coordinates, tree.motion.velocities, strict=True):
         own = declared_name(coordinate.name)
         names |= {coordinate: own, velocity: own.dotted(), rate_symbol(velocity): own.dotted().dotted()}
-    names |= _told_apart(_owned(structure), names.values(), label)
+    names |= _distinguished(_owned(structure), names.values(), label)
     for state, rate in kinematic_states(structure).items():
         names[rate] = names[state].dotted()
     for state in tree.states:
@@ -219,7 +219,7 @@ def kinematic_states(structure: Structure) -> dict[sp.Symbol, sp.Symbol]:
     return found
 
 
-def _told_apart(
+def _distinguished(
     sources: list[tuple[sp.Symbol, str, str | None]], taken: Iterable[ShownName], label: Callable[[str], str]
 ) -> dict[sp.Symbol, ShownName]:
     own = {symbol: declared_name(name) for symbol, name, _ in sources}

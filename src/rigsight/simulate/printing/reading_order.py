@@ -1,4 +1,4 @@
-"""In which order do people read a sum? What is added first, then what is taken off: ``a - b``, never ``-b + a``."""
+"""Order of a displayed sum: positive terms first, then negative ones: ``a - b``, never ``-b + a``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which equations are people shown? Those of the tree, in the order of reading, in any language."""
+"""Displayed equations: those of the tree in reading order, in any language."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ def flat_equations(structure: Structure, numbers: Mapping[sp.Symbol, sp.Expr]) -
 
 
 def _by_name(equation: ShownEquation) -> ShownEquation:
-    """Return an equation with what another program gives by a name: nobody can read what it is made of."""
+    """Return an equation with quantities from another program replaced by names, because their content is unknown."""
 
     def named(expression: sp.Expr) -> sp.Expr:
         leaves = expression.atoms(simulated)

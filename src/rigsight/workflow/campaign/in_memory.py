@@ -17,7 +17,8 @@ from rigsight.simulate import compose
 from rigsight.simulate.model import Model
 from rigsight.workflow.campaign.campaign_file import Offsets
 from rigsight.workflow.campaign.given_simulation import checked_numbers, checked_simulation
-from rigsight.workflow.campaign.read_campaign import NO_VALIDATION, of_first_record
+from rigsight.workflow.campaign.read_campaign import of_first_record
+from rigsight.workflow.campaign.record_notes import record_notes
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effects_on
 
@@ -84,7 +85,6 @@ def make_campaign(
         raise InputError(
             f"{called}: records: several are called '{twice[0]}'. Give every record a name of its own."
         )
-    judged = any(record.role == "validation" for record in records)
     check_option("offsets", offsets, get_args(Offsets))
     checked = tuple(_checked(called, record, found) for record in records)
     if offsets == "per_record":
@@ -99,9 +99,7 @@ def make_campaign(
         parameters=given,
         records=checked,
         modelled=tuple(modelled),
-        notes=tuple(
-            note for note in (differing, "" if judged else NO_VALIDATION.format(file=called)) if note
-        ),
+        notes=tuple(note for note in (differing, *record_notes(called, found, checked)) if note),
     )
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect
@@ -22,15 +20,10 @@ from rigsight.workflow.campaign.campaign_file import (
 )
 from rigsight.workflow.campaign.given_simulation import checked_simulation, rig_named
 from rigsight.workflow.campaign.listed_records import file_inside, inside, read_listed_record
+from rigsight.workflow.campaign.record_notes import record_notes
 from rigsight.workflow.campaign.where import Where
 from rigsight.workflow.own.effect_names import effect_on
 from rigsight.workflow.own.own_rigs import known_rigs
-
-_SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
-"""How far the amplitude of an input may lie below and above half its range: one line of many, and a step counted from rest."""
-_RATES_APART = 100.0
-"""Ratio of sample times from which they are asked about."""
-NO_VALIDATION = '{file}: no record has role = "validation"; gaps are judged on the records that were fitted, which flatters them.'
 
 
 def read_campaign(
@@ -83,18 +76,7 @@ def read_campaign(
         read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
     records = tuple(record for _, record in read)
     constants, differing = of_first_record(rig, known_constants, records)
-    notes = [
-        note
-        for note in (
-            differing,
-            _rates_apart(records),
-            *(_other_amplitude(r, rig) for r in records),
-            *_fitted_again(path.name, records),
-        )
-        if note
-    ]
-    if all(record.role != "validation" for record in records):
-        notes.append(NO_VALIDATION.format(file=path.name))
+    notes = [note for note in (differing, *record_notes(path.name, rig, records)) if note]
     return Campaign(
         title=table.title or path.parent.resolve().name,
         rig=rig,
@@ -104,22 +86,6 @@ def read_campaign(
         modelled=tuple(modelled),
         path=path,
         notes=tuple(notes),
-    )
-
-
-def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
-    for scored in (record for record in records if record.role == "validation"):
-        for fitted in (record for record in records if record.role == "estimation"):
-            if _holds_same_samples(scored, fitted):
-                yield (
-                    f"{file}: '{scored.name}' is for validation and holds the very samples of '{fitted.name}', which is fitted: "
-                    "its error proves nothing. Name another file."
-                )
-
-
-def _holds_same_samples(record: Record, other: Record) -> bool:
-    return record.signals.keys() == other.signals.keys() and all(
-        np.array_equal(samples, other[name]) for name, samples in record.signals.items()
     )
 
 
@@ -196,30 +162,6 @@ def of_first_record(
         constants,
         f"Each record has its own {', '.join(first)}; models are written with those of the first, {listed}.",
     )
-
-
-def _rates_apart(records: Sequence[Record]) -> str:
-    """Say that sample times lie so far apart that the time of one record is probably in another unit; empty if they do not."""
-    finest, coarsest = (choose(records, key=lambda record: record.dt) for choose in (min, max))
-    if coarsest.dt < _RATES_APART * finest.dt:
-        return ""
-    return (
-        f"The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' has "
-        f"{finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
-        't = { name = "...", unit = "ms" } for it.'
-    )
-
-
-def _other_amplitude(record: Record, rig: Rig) -> str:
-    """Say that the stated amplitude cannot be that of the input; empty if it can, as a peak, an RMS or that of a line."""
-    stated, halves = record.amplitude, {s.name: 0.5 * float(np.ptp(record[s.name])) for s in rig.inputs}
-    moving = {name: half for name, half in halves.items() if half > 0.0}
-    if stated is None or not moving:
-        return ""
-    if any(half / _SMALLEST_SHARE <= abs(stated) <= _LARGEST_SHARE * half for half in moving.values()):
-        return ""
-    listed = " and ".join(f"'{name}' moves by {half:.3g}" for name, half in moving.items())
-    return f"Record '{record.name}': amplitude = {stated:g}, but {listed} to each side. Is one of them in another unit?"
 
 
 def _with_distinct_names(read: Sequence[tuple[RecordTable, Record]]) -> tuple[Record, ...]:

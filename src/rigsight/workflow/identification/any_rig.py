@@ -32,7 +32,7 @@ from rigsight.identify.identification import (
 from rigsight.identify.information import Information, information
 from rigsight.identify.linear_view import LinearView, by_constants, linear_view, measured_responses, near_rest
 from rigsight.identify.record_identification import EstimationOptions, measured_amplitude
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.identify.undetermined import POORLY_KNOWN
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
@@ -171,8 +171,8 @@ def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | No
     rig = campaign.rig
     held = {}
     if is_built_in_motion(rig):
-        no_spring = rig.is_driven and campaign.parameters.get(str(rig.motion.stiffness)) == 0.0
-        held = held_parameters(campaign, records, no_spring)
+        has_stiffness = not (rig.is_driven and campaign.parameters.get(str(rig.motion.stiffness)) == 0.0)
+        held = held_parameters(campaign, records, has_stiffness)
     return held if factor is None else {**held, factor.held: factor.value}
 
 

@@ -15,7 +15,7 @@ from rigsight.identify import GreyBoxFit, characteristic_scales, estimate_conici
 from rigsight.identify.identification import JointIdentification, RecordIdentification, RecordScore
 from rigsight.identify.joint import JointFit
 from rigsight.identify.record_identification import measured_amplitude
-from rigsight.identify.transfer.physical import PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import PhysicalEstimates
 from rigsight.metrics import nrmse
 from rigsight.records import Record
 from rigsight.records.plausibility import is_constant
@@ -32,7 +32,7 @@ _BELOW = 1e-6
 
 
 def identify_jointly(
-    campaign: Campaign, found: Sequence[RecordIdentification], no_spring: bool
+    campaign: Campaign, found: Sequence[RecordIdentification], has_stiffness: bool
 ) -> JointIdentification:
     """Fit one set to all estimation records that show the motion, and one to each alone; score every record.
 
@@ -42,8 +42,8 @@ def identify_jointly(
         The campaign.
     found
         What each estimation record shows by itself. A record whose motion could not be identified is left out.
-    no_spring
-        True for an axis without a spring: records are cut into windows, since it drifts in free run.
+    has_stiffness
+        False for an axis without a spring: records are cut into windows, since it drifts in free run.
 
     Raises
     ------
@@ -57,9 +57,9 @@ def identify_jointly(
             f"No estimation record shows the motion of the rig, so nothing can be identified.\n{reasons}"
         )
     structure = compose(campaign.rig)
-    length = window_length(campaign.rig, records) if no_spring else None
+    length = None if has_stiffness else window_length(campaign.rig, records)
     windows = [w for w in cut(records, length) if not is_constant(w[campaign.rig.inputs[0].name])]
-    known = held_parameters(campaign, records, no_spring)
+    known = held_parameters(campaign, records, has_stiffness)
     fit = fit_jointly(
         structure, windows, campaign.constants, known=known, start=_start(found, known), group_of=parent
     )
@@ -173,7 +173,7 @@ def parent(record: Record) -> str:
     return record.name.split(WINDOW)[0]
 
 
-def held_parameters(campaign: Campaign, records: Sequence[Record], no_spring: bool) -> dict[str, float]:
+def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness: bool) -> dict[str, float]:
     """Return what these records say nothing about: a spring that is not there, outputs that were not measured.
 
     Parameters
@@ -182,13 +182,13 @@ def held_parameters(campaign: Campaign, records: Sequence[Record], no_spring: bo
         Of a built-in rig of one motion.
     records
         Those that are fitted.
-    no_spring
-        True for an axis without a spring.
+    has_stiffness
+        False for an axis without a spring.
     """
     rig = campaign.rig
     known: dict[str, float] = {}
     names = {parameter.name for parameter in rig.parameters}
-    if no_spring:
+    if not has_stiffness:
         known |= {"k": 0.0, "x_off": 0.0}
     elif rig.is_driven and "force_off" in names:
         # A linear spring cannot tell a constant force from a shifted rest position.

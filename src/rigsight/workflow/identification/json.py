@@ -12,7 +12,7 @@ from rigsight.identify.identification import (
     RecordIdentification,
 )
 from rigsight.identify.transfer.conicity import ConicityEstimate
-from rigsight.identify.transfer.physical import LEVEL, PhysicalEstimates
+from rigsight.identify.transfer.running_gear_parameters import LEVEL, PhysicalEstimates
 from rigsight.identify.transfer.transfer_fit import TransferFit
 from rigsight.workflow.identification.linear_json import (
     finite,

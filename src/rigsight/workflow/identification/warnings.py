@@ -68,7 +68,7 @@ def campaign_warnings(
     campaign: Campaign,
     found: Sequence[RecordIdentification],
     joint: JointIdentification,
-    no_spring: bool,
+    has_stiffness: bool,
 ) -> list[str]:
     """Return what the records' own identifications, the joint fit and the reading have to tell, a sentence each."""
     told = list(campaign.notes)
@@ -77,7 +77,7 @@ def campaign_warnings(
     told += [f"Record '{r.record.name}': {text}" for r in found for text in r.warnings]
     told += _not_the_whole(found)
     told += [f"Record '{name}' was left out of the joint fit." for name in joint.left_out]
-    if no_spring:
+    if not has_stiffness:
         told.append(
             "The campaign sets k = 0: the axis has no spring and no resonance, so m and d are fitted to the velocity, and "
             "the axis is simulated over windows with their own initial states."

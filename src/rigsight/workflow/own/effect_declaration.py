@@ -30,7 +30,7 @@ _MAY_READ: Mapping[str, tuple[str, ...]] = {
     "delay": (),
     "lateral": ("creepage", "creep_gain", "lateral_displacement", "lateral_feedback"),
     "measured": ("reading", "t"),
-    "measured_late": (),
+    "reading_delay": (),
 }
 _STATES_MAY_READ: Mapping[str, tuple[str, ...]] = {
     **_MAY_READ,
@@ -43,7 +43,7 @@ _PLACES: Mapping[Place, tuple[str, ...]] = {
     Place.DYNAMICS: ("torque", "spring", "deflection"),
     Place.DISTURBANCE: ("torque",),
     Place.LATERAL_DYNAMICS: ("lateral",),
-    Place.SENSOR: ("measured", "measured_late"),
+    Place.SENSOR: ("measured", "reading_delay"),
 }
 _WITH_STATES = ("torque", "spring", "deflection", "drive", "measured")
 _KINKS = (sp.Abs, sp.sign, canonical.positive_part)
@@ -111,7 +111,7 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
             yield f"ordered names {name}, which is no parameter.{nearest(name, names)}"
         if set(pair) <= set(names) and dimensions[pair[0]] != dimensions[pair[1]]:
             yield f"ordered compares {pair[0]} with {pair[1]}, whose dimension is another."
-    for field in ("elastic_share", "pulsation", "wave_number"):
+    for field in ("post_yield_stiffness_ratio", "pulsation", "wave_number"):
         name = getattr(effect, field)
         if name is not None and name not in names:
             yield f"{field} names {name}, which is no parameter.{nearest(str(name), names)}"

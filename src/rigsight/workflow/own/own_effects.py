@@ -113,7 +113,7 @@ def equation_text(effect: Effect) -> str:
         "delay": "drive = u(t - {})",
         "lateral": "lateral rate = {}",
         "measured": "measured = {}",
-        "measured_late": "measured = reading(t - {})",
+        "reading_delay": "measured = reading(t - {})",
     }
     lines = [told[field].format(text(expression, {})) for field, expression in equations(effect).items()]
     for state in effect.states:

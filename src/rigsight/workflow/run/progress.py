@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 
@@ -17,7 +17,7 @@ class Step:
     detail
         What has just been finished; empty at the start of a stage.
     done, total
-        Steps of the stage that are finished, and all of them.
+        Steps of the stage that are finished, and all of them; both 0 for a remark, which is no work.
     """
 
     stage: str
@@ -31,6 +31,12 @@ Listener = Callable[[Step], None]
 
 def silent(step: Step) -> None:
     """Ignore a step."""
+
+
+def tell(remarks: Iterable[str], listener: Listener) -> None:
+    """Tell a listener what was noticed, while there is still time to stop."""
+    for remark in remarks:
+        listener(Step(remark, "", 0, 0))
 
 
 class Stage:

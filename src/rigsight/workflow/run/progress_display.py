@@ -41,9 +41,9 @@ def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time
             return
         last = clock()
         detail = f": {step.detail}" if step.detail else ""
-        line = (
-            f"{step.stage} ..." if step.done == 0 else f"{step.stage} ({step.done} of {step.total}){detail}"
-        )
+        line = f"{step.stage} ({step.done} of {step.total}){detail}" if step.done > 0 else f"{step.stage} ..."
+        if step.total == 0:
+            line = f"Note: {step.stage}"
         # A log that is full, or a terminal that went away, ends no work of hours.
         with contextlib.suppress(OSError):
             typer.echo(line, err=True)
@@ -103,6 +103,9 @@ def _bar() -> Iterator[Listener]:
         starting = progress.add_task("Starting", total=None, detail="")
 
         def listener(step: Step) -> None:
+            if step.total == 0:
+                progress.console.print(f"Note: {step.stage}", highlight=False, markup=False)
+                return
             progress.update(starting, visible=False)
             if step.stage not in tasks:
                 tasks[step.stage] = progress.add_task(step.stage, total=step.total, detail="")

@@ -1,4 +1,4 @@
-"""What does an element show whose motion a bench prescribes? Its force: spring, damper, and a law."""
+"""An element with prescribed motion: its force from spring, damper, and a law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does a drive make of its command?
+"""Output of a drive from its command.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Which dry frictions are there, as the literature writes them?
+"""Laws of dry friction from the literature.
 
 References
 ----------
@@ -74,14 +74,14 @@ class Directional(DryFriction):
 
 
 class Meshing(DryFriction):
-    """Coulomb friction that pulsates with the position as teeth mesh, as of gears.
+    """Coulomb friction that varies periodically with position, as in meshing gears.
 
     Parameters
     ----------
     level
         Its mean [N, N m].
     depth
-        Share by which it pulsates, below 1.
+        Relative amplitude of the variation, below 1.
     wave_number
         Periods per displacement times 2 pi [1/m, 1/rad].
     """

@@ -1,4 +1,4 @@
-"""What does an input do between the samples that a record holds of it?"""
+"""Course of an input between its recorded samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is a law at a joint: which force resists its motion, with which memory, in which modes?"""
+"""A law at a joint: the force that resists its motion, its internal states and its modes."""
 
 from __future__ import annotations
 

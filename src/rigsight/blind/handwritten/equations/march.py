@@ -1,4 +1,4 @@
-"""How does a plant whose equations change at events move? By scipy's compiled DOP853 from node to node, with events as roots.
+"""Integration of a plant with events: scipy's compiled DOP853 from node to node, with events located as roots.
 
 Between two nodes the equations are those of one mode. Where a margin of the mode is negative at the end of an interval, the
 moment at which it became so is found by integrating up to trial times (Brent's method), and the plant changes its mode there.

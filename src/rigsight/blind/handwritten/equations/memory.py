@@ -1,4 +1,4 @@
-"""Which springs remember where they were, as the literature on hysteresis writes them?
+"""Springs with memory from the literature on hysteresis.
 
 References
 ----------

@@ -1,7 +1,7 @@
-"""How do the rigs move, as textbooks derive it? Newton's and Euler's equations of four rigs, written out.
+"""Equations of motion of four rigs as derived in textbooks (Newton-Euler).
 
-A plant's state holds the positions, then their rates, then what is of first order. Every function takes the forces of the drives
-and the force with which a law resists the motion of one joint.
+The state of a plant contains the positions, then their rates, then first-order states. Every function takes the forces of the
+drives and the force with which a law resists the motion of one joint.
 
 References
 ----------
@@ -77,7 +77,7 @@ class Motion:
         y
             States.
         drives
-            What leaves each drive, in the unit of its input.
+            Output of each drive, in the unit of its input.
         resist
             Force of the law against each coordinate [N, N m].
         """

@@ -1,4 +1,4 @@
-"""How do rig, law, drive and sensor make a plant that is driven and read?"""
+"""A plant composed of rig, law, drive and sensor."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Which springs and dampers without memory of positions are there, as textbooks write them?
+"""Springs and dampers without memory from textbooks.
 
-Each is written as what it adds to a linear spring ``k x`` of the joint: where the law takes the place of that spring, its force
-is taken off.
+Each is written as the force added to a linear spring ``k x`` of the joint; if the law replaces that spring, the spring force is
+subtracted.
 
 References
 ----------
@@ -51,7 +51,7 @@ def quadratic(stiffness: float) -> Static:
 
 
 def power_law(stiffness: float, power: float, reference: float) -> Static:
-    """Return a force that goes with a power of the deflection, as a Hertzian contact's with 3/2 (Johnson)."""
+    """Return a force proportional to a power of the deflection, such as 3/2 for a Hertzian contact (Johnson)."""
 
     def force(x: float, _: float) -> float:
         return math.copysign(stiffness * reference * (abs(x) / reference) ** power, x)
@@ -89,12 +89,12 @@ def drag(coefficient: float) -> Static:
 
 
 def squeeze(coefficient: float) -> Static:
-    """Return damping that goes with the square of the displacement [N s/m^3] (van der Pol's term, its sign turned)."""
+    """Return damping proportional to the square of the displacement [N s/m^3] (van der Pol's term with the opposite sign)."""
     return Static(lambda x, v: coefficient * x * x * v)
 
 
 def ripple(sine: float, cosine: float, wave_number: float, rest: float) -> Static:
-    """Return a force that comes back with the position: one harmonic of cogging (Jahns and Soong).
+    """Return a force that is periodic in position: one harmonic of cogging (Jahns and Soong).
 
     Parameters
     ----------

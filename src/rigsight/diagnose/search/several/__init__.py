@@ -1,1 +1,1 @@
-"""Which effects together explain what a single one leaves? Grown one by one, then looked for anew from joint starts."""
+"""Several effects: they are added one by one, then pairs are also fitted from joint starts."""

@@ -1,8 +1,8 @@
-"""Has one more effect evidence of its own, or does it only soak up what the inexact form of those before it leaves?
+"""Is there independent evidence for one more effect, or does it only compensate for the inexact form of the previous ones?
 
-No form is exact on a measured rig: a sign is rounded, a spring bends a little. What that leaves goes with the same signal as the
-effect itself, and many a second effect takes it up as well as a truer form of the first would. So what a pair gains is held
-against what any other law of the first effect's own signal, at the first effect's place, would gain.
+No law is exact on a measured rig: friction may change sign smoothly, a spring may be slightly nonlinear. The resulting residual
+depends on the same signal as the effect itself, and a second effect may explain it as well as a better form of the first. So the
+gain of a pair is compared with the gain of any other law of the same signal at the place of the first effect.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from rigsight.effects import Effect
 
 
 class OtherForms:
-    """What other forms of single effects would explain of what these leave, asked once of each.
+    """Part of the residual of single effects that other forms of them would explain, computed once for each.
 
     Parameters
     ----------
     context
         Records, scales and noise.
     lower_bound
-        True if the noise floor is only a lower bound, so that nothing of a remainder can be put down to noise beforehand.
+        True if the noise floor is only a lower bound, so that no part of a residual can be attributed to noise beforehand.
     """
 
     def __init__(self, context: FitContext, lower_bound: bool) -> None:
@@ -37,7 +37,7 @@ class OtherForms:
         self._known: dict[tuple[str, ...], float] = {}
 
     def gain(self, model: Scored) -> float:
-        """Return by how much a model's mean square error, in units of the noise floor, falls with another form of one effect."""
+        """Return the reduction of a model's mean square error, in units of the noise floor, by another form of one effect."""
         if model.names not in self._known:
             answers = Answers(
                 self._context, self._context.scoring, model.held_out, model.effects, model.fit.free
@@ -48,14 +48,14 @@ class OtherForms:
         return self._known[model.names]
 
     def share(self, model: Scored) -> float:
-        """Return the share of what a model leaves above the noise, of squares, that another form of one effect takes."""
+        """Return the share of the squared residual above the noise that another form of one effect explains."""
         above_noise = max(model.error_over_noise**2 - self._noise, 0.0)
         return min(1.0, self.gain(model) / above_noise) if above_noise > 0.0 else 1.0
 
     def partners(self, single: Scored, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects that are worth trying beside a single one.
 
-        Where another form of it would take most of what it leaves, only those are that make one law with it.
+        If another form of it would explain most of its residual, only effects that act as one law with it.
         """
         if self.share(single) < VERDICT.larger_part:
             return list(effects)
@@ -64,7 +64,7 @@ class OtherForms:
     def with_own_evidence(self, singles: Sequence[Scored], larger: Sequence[Scored]) -> list[Scored]:
         """Return the models without pairs whose second effect explains less than another form of the first would.
 
-        A third effect has been held against other forms of the first two before it was tried.
+        A third effect was compared with other forms of the first two before it was tried.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class OtherForms:
 
         def stands(model: Scored) -> bool:
             single = alone.get(model.names[0])
-            # Two effects that are one law are another form of each other; they are told apart by other means.
+            # Two effects that act as one law are other forms of each other; they are distinguished by other means.
             if len(model.effects) > 2 or single is None or not model.residuals or is_one_law(model):
                 return True
             return self.gain(single) < VERDICT.larger_part * (
@@ -94,10 +94,10 @@ class OtherForms:
 def beyond_disturbance(
     evidence: Evidence, singles: Sequence[Scored], larger: Sequence[Scored]
 ) -> list[Scored]:
-    """Return the models that explain more than any single effect does beside a disturbance, and make nothing worse.
+    """Return the models that explain more than any single effect with a disturbance, and increase no part of the error.
 
-    A disturbance swings a rig at its resonances, and a second effect with a motion of its own follows that in each record. Where
-    the form of the first is not quite right, a second that shakes the rig may soak up a slow error and leaves a fast one instead.
+    A disturbance excites the resonances of a rig, and a second effect with its own motion can follow that in each record. If the
+    form of the first is slightly wrong, a second that excites the rig may compensate a slow error but cause a fast one.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""Does a relative of the best pair explain more, if both effects start from their declared numbers?
+"""Does a pair similar to the best one explain more if both effects start from their declared values?
 
-Pairs are grown from a single effect that was fitted alone, and so took over part of what a second one does. The second then
-starts in the wrong place, and another effect that is like it wins. Here both start beside the equations without an effect.
+Pairs are built from a single effect that was fitted alone and therefore compensates for part of the second one. The second effect
+then starts from wrong values, and a similar effect may win. Here both effects start together from the equations without an
+effect.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def with_joint_starts(
     is_adequate: Callable[[Scored], bool],
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return the models of several effects, with those relatives of the best pair that explain more than it does.
+    """Return the models of several effects, with those pairs similar to the best one that explain more.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def with_joint_starts(
     effects
         Candidates.
     is_adequate
-        Says whether what a model leaves is noise and disturbance: then no other pair is looked for.
+        Says whether the residual of a model is noise and disturbance: then no other pair is searched.
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     """
@@ -96,7 +97,7 @@ def with_joint_starts(
 
 
 def _plainest_of_the_best(models: Sequence[Scored]) -> list[Scored]:
-    """Return the nearest models, of those that explain as much the ones with the fewest numbers first."""
+    """Return the best models; among equally good ones those with the fewest parameters first."""
     lowest = min((model.error_over_noise for model in models), default=np.inf)
     near = [m for m in models if m.error_over_noise <= SEARCH.alike_pairs * lowest]
     return sorted(near, key=lambda model: (model.n_free, model.error_over_noise))[: SEARCH.most_finished]

@@ -1,8 +1,8 @@
-"""Are two effects one law together, of which another form would look much the same?
+"""Do two effects act together as a single law, which other laws would fit equally well?
 
-Two effects of the spring, two dampings, two linear effects between drive and motion: their sum bends like many a law that is in
-no catalogue. Of 14 such pairs that were named on blind rigs ten imitated a cause from outside and two a single effect whose own
-fit had stopped short (seeds 3 to 8, `experiments/blind_small`).
+Two effects of the spring, two damping effects, two linear effects between drive and motion: their sum resembles many laws outside
+the catalogue. Of 14 such pairs named on blind rigs, ten imitated a cause outside the catalogue, and two imitated a single effect
+whose own fit had stopped too early (seeds 3 to 8, `experiments/blind_small`).
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ def split_distinguishable(
     allowed: float,
     is_adequate: Callable[[Scored], bool],
 ) -> tuple[list[Scored], list[Scored]]:
-    """Return the pairs that compete, and those that are one law and come near the floor as another form of it would.
+    """Return the pairs that compete, and those that act as one law and are excluded because other laws fit equally well.
 
-    Such pairs compete only where no single effect comes near the floor and the best of them reaches it, or leaves noise and
-    disturbance: what only imitates a law leaves something that goes with the motion.
+    Such pairs compete only if no single effect comes near the floor and the best of them reaches it or leaves only noise and
+    disturbance: the residual of an imitation correlates with the motion.
 
     Parameters
     ----------
     pairs, singles
         Scored models.
     allowed
-        What a named cause may leave, in units of the noise floor.
+        Error that a named cause may leave, in units of the noise floor.
     is_adequate
-        Says whether what a model leaves is noise and disturbance.
+        Says whether the residual of a model is noise and disturbance.
     """
     best = min((model.error_over_noise for model in singles), default=float("inf"))
     of_one_law = [pair for pair in pairs if _has_one_law(pair)]
@@ -50,13 +50,13 @@ def split_distinguishable(
 
 
 def _has_one_law(model: Scored) -> bool:
-    """Return True where two of the effects are one law together."""
+    """Return True if two of the effects act as one law."""
     rig = model.fit.structure.rig
     return any(are_one_law(two, rig) for two in itertools.combinations(model.effects, 2))
 
 
 def is_one_law(model: Scored) -> bool:
-    """Return True for a pair of effects that are one law together.
+    """Return True for a pair of effects that act as one law.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def is_one_law(model: Scored) -> bool:
 
 
 def are_one_law(effects: Sequence[Effect], rig: Rig) -> bool:
-    """Return True for effects that are one law together on a rig.
+    """Return True for effects that act as one law on a rig.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def _one_force(effects: Sequence[Effect]) -> bool:
 
 
 def _one_linear_system(effects: Sequence[Effect], rig: Rig) -> bool:
-    """Return True for linear effects between the same signals: many another linear system has their frequency response."""
+    """Return True for linear effects between the same signals: many other linear systems have the same frequency response."""
     one_output = len(rig.outputs) == 1
     return all(
         is_linear(effect) and effect.lateral is None and (one_output or effect.place is not Place.SENSOR)

@@ -1,7 +1,7 @@
-"""Which effects, added to a model, explain what it leaves? Every effect gets a first look, the promising are fitted.
+"""Which effects, added to a model, explain its residual? Every effect gets a first fit; the promising ones are fitted carefully.
 
-A look goes two ways: from the model with the new effect added, and from the new effect alone with those of the model added. A
-strong memory hides behind the effect that was found first.
+The first fit is tried in both orders: from the model with the new effect added, and from the new effect alone with those of the
+model added. Otherwise the effect found first could hide a strong effect with memory.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def with_one_more(
     context
         Records, scales and noise.
     parent
-        The model that leaves something.
+        The model that is extended.
     effects
         Candidates to add.
     known
@@ -47,7 +47,7 @@ def with_one_more(
     prepare
         Called with the structures that are about to be looked at, to compile them side by side.
     least_share
-        Share of the squared remainder that pushes like those of one of the effects must take away for any of them to be tried.
+        Share of the squared residual that the pushes of one of the effects must explain for any of them to be tried.
     """
     open_ones = [
         effect

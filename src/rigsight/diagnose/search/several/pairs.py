@@ -1,7 +1,6 @@
-"""Do several effects explain what the best one leaves? Greedy growth from the best, judged by held-out records.
+"""Do several effects explain the residual of the best one? Greedy forward selection, judged by held-out records.
 
-Each part of the best pairs is fitted alone from there. What the growth cannot do without is found by the ranking: a model
-competes with its own parts.
+Each effect of the best pairs is then also fitted alone from there, so that a pair competes with its own parts in the ranking.
 
 References
 ----------
@@ -37,7 +36,7 @@ def grown(
     forms: OtherForms,
     prepare: Prepare | None = None,
 ) -> list[Scored]:
-    """Return models of two and three effects that close half or more of what the best with one less leaves, fitted and scored.
+    """Return fitted models of two and three effects that close at least half of the error of the best with one less.
 
     Parameters
     ----------
@@ -58,7 +57,7 @@ def grown(
 
     Returns
     -------
-    Each with the effect first that explains more by itself.
+    Each with the effect that explains more alone in first place.
     """
     usable = sorted(
         (m for m in singles if m.residuals and np.isfinite(m.error_over_noise)),
@@ -78,7 +77,7 @@ def grown(
     others = [model for model in close if model is not first and not _alike(first, model)]
     others = [model for model in others if max(model.fit.substeps) <= SEARCH.finest_steps]
     allowed = _half_closed(usable[0].error_over_noise)
-    # An effect that was left out of the singles, as another says the same, may still be half of a pair.
+    # An effect that was left out of the singles because another is equivalent may still be part of a pair.
     alone = {effect.name: np.inf for effect in effects} | {
         model.names[0]: model.error_over_noise for model in singles
     }
@@ -95,7 +94,8 @@ def grown(
             pairs += with_one_more(context, parent, forms.partners(parent, effects), pairs, usable, prepare)
     best_pair = min(pairs, key=lambda pair: pair.error_over_noise, default=None)
     if best_pair is not None and best_pair.error_over_noise <= allowed:
-        # What came second may be right and the first only its relative: another as good alone may do better in its place.
+        # The second effect may be right and the first only similar to the right one: another equally good single effect may be
+        # better in its place.
         for second in (model for model in usable if model not in tried):
             if second.effects[0] in best_pair.effects:
                 (name,) = set(best_pair.names) - set(second.names)
@@ -129,7 +129,7 @@ def grown(
 
 
 def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Scored]:
-    """Return models with the effect first that explains more by itself.
+    """Return models with the effect that explains more alone in first place.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def larger_first(models: Sequence[Scored], singles: Sequence[Scored]) -> list[Sc
 
 
 def _half_closed(left: float) -> float:
-    """Return what one more effect may leave of what is left, in units of the noise floor."""
+    """Return the error that one more effect may leave, in units of the noise floor."""
     return left - VERDICT.larger_part * (left - 1.0)
 
 
@@ -159,9 +159,9 @@ def _plainest(models: Sequence[Scored], like: Scored, effects: Sequence[Effect])
 
 
 def refit_singles(context: FitContext, singles: Sequence[Scored], pairs: Sequence[Scored]) -> list[Scored]:
-    """Return the singles, refitted where they do better from where they stand in a pair than from where they were found.
+    """Return the singles, refitted where they are better from their values in a pair than from their own starts.
 
-    A second effect may do no more than lift a fit of the first over a ridge; without it the first then explains as much.
+    A second effect may only help the fit of the first out of a local minimum; the first alone then explains as much.
 
     Parameters
     ----------
@@ -207,9 +207,9 @@ def _more_general(
     known: Sequence[Scored],
     prepare: Prepare | None,
 ) -> list[Scored]:
-    """Return the pairs in which an effect that contains one of the pair's stands in its place, fitted from there.
+    """Return the pairs in which one effect is replaced by a more general one, fitted from there.
 
-    Beside another effect a simpler relative may lead at a first look, as it has fewer numbers to find.
+    In combination with another effect a simpler form may lead at a first look, because it has fewer parameters to fit.
     """
     alone = {model.names[0]: model for model in singles}
     swaps = []
@@ -241,6 +241,6 @@ def _more_general(
 
 
 def _alike(one: Scored, other: Scored) -> bool:
-    """Return True if one is a special or limiting case of the other: what is missing beside them is the same."""
+    """Return True if one is a special or limiting case of the other: the effect missing in addition is the same."""
     parents = {name for model in (one, other) for effect in model.effects for name in effect.parents}
     return bool(parents & {*one.names, *other.names})

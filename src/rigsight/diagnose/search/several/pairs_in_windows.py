@@ -1,7 +1,7 @@
-"""Which two effects together explain a motion in which chance has a part?
+"""Which two effects together explain a motion that is sensitive to small disturbances?
 
-Whole records cannot tell: not even the true pair follows one to its end, and a fit to them may stop far from it. So the nearest
-pairs are looked at in short pieces of the liveliest stretches, from the starts of both effects, and fitted in windows of a few
+Whole records cannot decide: not even the true pair follows one to its end, and a fit to them may stop far away. So the best pairs
+are first fitted in short pieces of the most excited stretches, from the starts of both effects, and then in windows of a few
 cycles.
 """
 
@@ -20,7 +20,7 @@ from rigsight.diagnose.search.starts import start_values
 def pairs_in_windows(
     context: FitContext, windows: FitContext, reidentified: Scored, pairs: Sequence[Scored]
 ) -> list[Scored]:
-    """Return the nearest pairs, fitted and scored in windows.
+    """Return the best pairs, fitted and scored in windows.
 
     Parameters
     ----------

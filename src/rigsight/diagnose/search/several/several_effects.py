@@ -1,4 +1,4 @@
-"""Are several effects looked for, and in which ways? Only where what the best single effect leaves is no noise."""
+"""Search for several effects: only if the residual of the best single effect is not noise."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ def several_effects(
     lower_bound: bool,
     prepare: Prepare | None,
 ) -> list[Scored]:
-    """Return models of two and three effects where a single effect leaves something to explain.
+    """Return models of two and three effects if a single effect does not explain everything.
 
-    Above a lower bound of the floor what a single one leaves may be noise: the checks tell, and a pair must reach that bound.
+    Above a lower bound of the floor the residual of a single effect may be noise: the checks decide, and a pair must reach that
+    bound.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def several_effects(
     forms
         Says which effects are worth trying beside another.
     checks
-        Say whether what a model leaves is noise and disturbance.
+        Say whether the residual of a model is noise and disturbance.
     lower_bound
         True if the noise floor is only a lower bound.
     prepare
@@ -49,14 +50,14 @@ def several_effects(
 
     Returns
     -------
-    Each with the effect first that explains more by itself.
+    Each with the effect that explains more alone in first place.
     """
     best = min(singles, key=lambda model: model.error_over_noise, default=None)
     is_excused = lower_bound and best is not None and best.error_over_noise <= VERDICT.at_lower_bound
     if best is None or (is_excused and checks.is_adequate(best)):
         return []
     at_floor = VERDICT.at_floor
-    # A floor is known to a few percent. Within these what the best effect leaves tells whether it is noise.
+    # A floor is known to a few percent. Within these, the residual of the best effect is tested for being noise.
     is_near = not lower_bound and VERDICT.exact < best.error_over_noise <= VERDICT.at_floor
     if is_near and not checks.is_adequate(best):
         at_floor = VERDICT.exact

@@ -1,6 +1,6 @@
-"""Does a third effect explain what the best two leave?
+"""Does a third effect explain the residual of the best two?
 
-Only where some push takes the larger part of that away, and more than another form of one of the two would.
+Only tried if some candidate explains more than half of it in the screening, and more than another form of one of the two would.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def with_relatives(
 ) -> tuple[list[Scored], list[Scored]]:
     """Return the triples with those in which a relative stands for an effect of the best one, and the pairs with their parts.
 
-    Found beside an incomplete model, an effect may be only a relative of the right one, or more general than what is needed.
+    An effect found with an incomplete model may be only similar to the right one, or more general than needed.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from rigsight.excitation import linear_sweep
 from rigsight.identify import GreyBoxFit, characteristic_scales
 from rigsight.identify.fit.coordinates import Coordinates
 from rigsight.identify.fit.first_states import first_state
-from rigsight.identify.fit.separate_states import SeparateStates
+from rigsight.identify.fit.variable_projection import VariableProjection
 from rigsight.records import Record
 from rigsight.rigs import AXIS
 from rigsight.simulate import compose, simulate
@@ -56,8 +56,8 @@ def test_the_gradient_is_that_of_the_cost_with_settled_states(windows: tuple[Rec
     low, high = [p - 20.0 for p in places], [p + 20.0 for p in places]
     theta = coordinates.from_values(TRUTH)
 
-    def evaluated(at: np.ndarray) -> SeparateStates:
-        problem = SeparateStates(fit.data, coordinates, places, low, high)
+    def evaluated(at: np.ndarray) -> VariableProjection:
+        problem = VariableProjection(fit.data, coordinates, places, low, high)
         problem.substeps = [4] * len(places)
         problem.settle_anew(at)
         return problem

@@ -1,7 +1,7 @@
-"""The parameters alone as coordinates: at each step every record takes the initial state that suits it (variable projection).
+"""Variable projection: only the parameters are coordinates, and the initial states of all records are refitted at each step.
 
-In windows of records there are far more initial states than parameters, and where a memory sticks or lets go they answer to the
-parameters with jumps: a step that moves all together is refused, one after which each window settles is not.
+Windows of records have far more initial states than parameters, and if friction sticks or slips these depend on the parameters
+with jumps: a joint step in all coordinates would be rejected, a step followed by refitting each window is not.
 
 References
 ----------
@@ -34,7 +34,7 @@ _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 _DEPENDENT = 1e-9
 
 
-class SeparateStates(Problem):
+class VariableProjection(Problem):
     """Cost, gradient and Gauss-Newton matrix as functions of the parameters' coordinates.
 
     Parameters

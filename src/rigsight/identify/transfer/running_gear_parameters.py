@@ -1,4 +1,4 @@
-"""Which physical parameters of the running gear a PT2 and a PT1 stand for, with their uncertainty.
+"""Physical parameters of the running gear from a PT2 and a PT1, with their uncertainty.
 
 Thesis, equations (2.21), (2.24), (2.26) and (2.27). The factor v is where (2.12) and the lateral equation put it,
 ``c_y = 2 l_0 omega_b / v``; (2.25) prints it on the wrong side, which v = 1 m/s hides.
@@ -221,8 +221,8 @@ def check_fit(fit: TransferFit, order: str, which: str, ratio: str) -> None:
         )
     if not fit.values["gain"] > 0.0:
         raise InputError(
-            f"The {which} parameters need a positive gain of {ratio}, got {fit.values['gain']:.4g} {fit.unit}: a sensor "
-            "or the current counts the other way round. Change the sign of that signal."
+            f"The {which} parameters need a positive gain of {ratio}, got {fit.values['gain']:.4g} {fit.unit}: a sensor or the "
+            f"current has the opposite sign. Change the sign of that signal."
         )
 
 
@@ -278,7 +278,8 @@ def offsets(
     what = f"Record '{record.name}', {begin:g} to {end:g} s"
     if np.count_nonzero(inside) < _LEAST_SAMPLES:
         raise InputError(
-            f"{what}: {np.count_nonzero(inside)} samples are no stationary stretch; at least {_LEAST_SAMPLES} are needed."
+            f"{what}: {np.count_nonzero(inside)} samples are too few for a stationary stretch; at least {_LEAST_SAMPLES} are "
+            f"needed."
         )
     u_mean = float(np.mean(record["u"][inside]))
     size = float(np.max(np.abs(record["u"])))
