@@ -97,6 +97,19 @@ def test_constants_with_a_default_may_be_left_out(tmp_path: Path, write_csv: Cal
     assert 'no record has role = "validation"' in read.notes[0]
 
 
+def test_a_record_in_another_unit_is_asked_about(campaign: Callable[..., Path]) -> None:
+    folder = campaign(HEAD + RECORDS)
+    assert not any("another unit" in note for note in read_campaign(folder).notes)
+    sweep = folder / "sweep.csv"
+    header, *rows = sweep.read_text(encoding="utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    place = header.split(",").index("psi")
+    larger = [",".join([*row[:place], repr(1e3 * float(row[place])), *row[place + 1 :]]) for row in cells]
+    (folder / "other.csv").write_text("\n".join([header, *larger]), encoding="utf-8")
+    found = read_campaign(campaign(HEAD + RECORDS + '[[records]]\nfile = "other.csv"\n')).notes
+    assert any("'psi' moves 1e+03 times as far for the same 'u' in record 'other'" in note for note in found)
+
+
 def test_conicity_passes_instead_of_the_creep_factor(campaign: Callable[..., Path]) -> None:
     text = (HEAD + RECORDS).replace("J_z = 0.56", "delta_0 = 0.02")
     assert read_campaign(campaign(text)).parameters == {"delta_0": 0.02}

@@ -70,8 +70,10 @@ def test_without_validation_records_that_is_noted() -> None:
     assert len(made.notes) == 1
     assert "my stage" in made.notes[0]
     assert "validation" in made.notes[0]
-    judged = make_campaign("axis", [record(), record("other", role="validation")])
-    assert judged.notes == ()
+    other = record("other", role="validation")
+    (same,) = make_campaign("axis", [record(), other]).notes
+    assert "very samples" in same
+    assert make_campaign("axis", [record(), other.with_signals(x=2.0 * other["x"])]).notes == ()
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from rigsight.workflow.run.progress import Step
+from rigsight.workflow.run.progress import Step, tell
 from rigsight.workflow.run.progress_display import log_lines
+
+
+def test_a_remark_is_no_work(capsys: pytest.CaptureFixture[str]) -> None:
+    tell(["The sample times differ."], log_lines(between=30.0, clock=lambda: 0.0))
+    assert capsys.readouterr().err == "Note: The sample times differ.\n"
 
 
 def test_a_log_gets_a_line_per_stage_and_one_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:

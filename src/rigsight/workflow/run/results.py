@@ -225,7 +225,7 @@ def _check_replaceable(file: Path) -> None:
     if file.is_dir():
         raise InputError(f"Cannot write {file}: it is a folder. Name a file, or remove the folder.")
     if file.exists() and not file.is_file():
-        raise InputError(f"Cannot write {file}: it is no ordinary file. Name a file.")
+        raise InputError(f"Cannot write {file}: it is a device or a pipe, not a regular file. Name a file.")
 
 
 def _told(folder: Path, error: OSError, mend: str = ELSEWHERE) -> InputError:
