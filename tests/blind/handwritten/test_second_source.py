@@ -52,15 +52,25 @@ DT, N_SAMPLES = 2e-3, 2000
 EDGE = 60
 """Samples at either end of an element's record in which the smoothed motion still feels the end."""
 LAWS = {*JOINT_LAWS, *DRIVE_LAWS, *SENSOR_LAWS, *LATERAL_LAWS}
-# The last of its places on each rig: other places of one rig repeat the law, and all of them would take two minutes.
-PAIRS = list(
-    {
-        (name, kind_of(effect.name)): (name, effect)
-        for name in NUMBERS
-        for effect in candidates_on(RIGS[name], CATALOGUE)
-        if kind_of(effect.name) in LAWS
-    }.values()
-)
+# The last of its places on each rig: other places of one rig repeat the law.
+OFFERED = {
+    name: {kind_of(e.name): e for e in candidates_on(RIGS[name], CATALOGUE) if kind_of(e.name) in LAWS}
+    for name in NUMBERS
+}
+
+
+def spread(n_rigs: int = 2) -> list[tuple[str, Effect]]:
+    """Return each law on a few of the rigs that offer it, every rig with about as many: all 110 pairs take two minutes."""
+    pairs, count = [], dict.fromkeys(NUMBERS, 0)
+    for kind in sorted(LAWS, key=lambda kind: (sum(kind in own for own in OFFERED.values()), kind)):
+        rigs = sorted((name for name in NUMBERS if kind in OFFERED[name]), key=count.__getitem__)
+        for name in rigs[:n_rigs]:
+            count[name] += 1
+            pairs.append((name, OFFERED[name][kind]))
+    return pairs
+
+
+PAIRS = spread()
 
 
 def waveforms(name: str) -> list[Waveform]:
