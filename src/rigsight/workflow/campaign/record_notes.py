@@ -1,0 +1,94 @@
+"""What is noticed about the records of a campaign before any fit: do they belong together, and do they prove anything?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rigsight.records import Record
+from rigsight.records.unit_mismatch import unit_mismatch
+from rigsight.rigs import Rig
+
+_SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
+"""How far the amplitude of an input may lie below and above half its range: one line of many, and a step counted from rest."""
+_RATES_APART = 100.0
+"""Ratio of sample times from which they are asked about."""
+
+
+def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str, ...]:
+    """Return a sentence for everything that is noticed.
+
+    Parameters
+    ----------
+    called
+        How messages call the campaign: by its file, or by its title.
+    rig
+        The rig.
+    records
+        All records of the campaign.
+    """
+    found = [
+        *_rates_apart(records),
+        *_other_units(rig, records),
+        *(note for record in records for note in _other_amplitude(record, rig)),
+        *_fitted_again(called, records),
+    ]
+    if all(record.role != "validation" for record in records):
+        found.append(
+            f'{called}: no record has role = "validation"; errors are those of the records that were fitted, and too good.'
+        )
+    return tuple(found)
+
+
+def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
+    for scored in (record for record in records if record.role == "validation"):
+        for fitted in (record for record in records if record.role == "estimation"):
+            if _holds_same_samples(scored, fitted):
+                yield (
+                    f"{file}: '{scored.name}' is for validation and holds the very samples of '{fitted.name}', which is fitted: "
+                    "its error proves nothing. Name another file."
+                )
+
+
+def _holds_same_samples(record: Record, other: Record) -> bool:
+    return record.signals.keys() == other.signals.keys() and all(
+        np.array_equal(samples, other[name]) for name, samples in record.signals.items()
+    )
+
+
+def _rates_apart(records: Sequence[Record]) -> Iterator[str]:
+    """Ask about sample times that are so far apart that the time of one record is probably in another unit."""
+    finest, coarsest = (choose(records, key=lambda record: record.dt) for choose in (min, max))
+    if coarsest.dt >= _RATES_APART * finest.dt:
+        yield (
+            f"The sample times of the records differ by a factor of {coarsest.dt / finest.dt:.3g}: '{finest.name}' has "
+            f"{finest.dt:.3g} s, '{coarsest.name}' {coarsest.dt:.3g} s. Is the time of one of them in ms? Then write "
+            't = { name = "...", unit = "ms" } for it.'
+        )
+
+
+def _other_units(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
+    """Ask about a signal whose gain differs so much between records that it is probably in another unit in one of them."""
+    for output in rig.outputs:
+        for source in rig.inputs:
+            found = unit_mismatch(records, source.name, output.name)
+            if found is not None:
+                larger, smaller, ratio = found
+                yield (
+                    f"At the same frequencies '{output.name}' moves {ratio:.3g} times as far for the same '{source.name}' in "
+                    f"record '{larger.name}' as in '{smaller.name}'. Is one of the two signals in another unit there? Then say "
+                    f'which, for instance {output.name} = {{ name = "...", unit = "..." }}.'
+                )
+                break
+
+
+def _other_amplitude(record: Record, rig: Rig) -> Iterator[str]:
+    """Ask about a stated amplitude that cannot be that of the input, as a peak, an RMS or that of a line."""
+    stated, halves = record.amplitude, {s.name: 0.5 * float(np.ptp(record[s.name])) for s in rig.inputs}
+    moving = {name: half for name, half in halves.items() if half > 0.0}
+    if stated is None or not moving:
+        return
+    if not any(half / _SMALLEST_SHARE <= abs(stated) <= _LARGEST_SHARE * half for half in moving.values()):
+        listed = " and ".join(f"'{name}' moves by {half:.3g}" for name, half in moving.items())
+        yield f"Record '{record.name}': amplitude = {stated:g}, but {listed} to each side. Is one of them in another unit?"
