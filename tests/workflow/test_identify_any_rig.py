@@ -192,7 +192,7 @@ def test_inputs_that_move_together_are_named(monkeypatch: pytest.MonkeyPatch) ->
     tau = multisine(rng, 0.05, 40.0)
     records = [recorded("one", rig, ARM, {"tau_1": tau, "tau_2": -0.5 * tau}, rng)]
     found = identified(rig, records, {}, ARM, monkeypatch)
-    assert any("'tau_1' moves together with 'tau_2'" in warning for warning in found.warnings)
+    assert any("'tau_1' changes together with 'tau_2'" in warning for warning in found.warnings)
     (view,) = found.views
     assert view.measured is not None
     assert not view.measured.found
@@ -366,7 +366,7 @@ def test_a_sensor_that_nobody_recorded_is_named_if_it_would_help(
     assert told is not None
     assert told.determined == ()
     # The tachometer scales as the scale does.
-    assert told.remedies == ("With 'laser' recorded as well these inputs would determine all parameters.",)
+    assert told.remedies == ("If 'laser' were also recorded, these inputs would determine all parameters.",)
     assert told.sentence.endswith(told.remedies[0])
 
 

@@ -37,7 +37,7 @@ _PEAK = 1.1
 """Height over the lowest lines from which a largest magnitude counts as a resonance."""
 _LOWEST = 10
 MISFIT = 3.0
-"""Residuals in units of the noise from which a form is not the whole of the rig."""
+"""Residuals in units of the noise from which the order of a model is too low."""
 _LONGEST_DELAY = 0.5 * math.pi
 """Phase by which a dead time may turn the largest magnitude [rad]."""
 _TURNED = -0.5
@@ -236,7 +236,7 @@ def _fit(
 
 
 def _fit_of_part(response: FrequencyResponse, order: Order, misfit: float) -> TransferFit:
-    """Fit a form that is not the whole of the rig: every line may err by the same share of its magnitude.
+    """Fit a form whose order is too low: every line may have the same relative error.
 
     With the variances of the noise alone, the few lines that happen to be most certain would decide, wherever they lie. A PT2 is
     fitted to the magnitude, as in the thesis (section 4.4): what shifts the phase besides would be paid for with the peak.

@@ -241,7 +241,7 @@ def test_on_a_rig_with_several_places_a_key_says_that_of_each_effect(lab: Extern
         ({"where": ["shaft", "motor_bearing"]}, ["where", "several places"]),
         (
             {"effects": ["backlash"], "where": ["motor_bearing"]},
-            ["backlash@motor_bearing", "does not apply"],
+            ["backlash@motor_bearing", "makes no sense"],
         ),
         ({"kind": "pair", "effects": ["backlash"] * 2, "where": ["shaft"] * 2}, ["exactly two"]),
     ],
