@@ -26,7 +26,7 @@ NOW := date +%s
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test check bench docs fuzz calibrate blind blind-small clean
+.PHONY: help demo test check bench dist docs fuzz calibrate blind blind-small clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 20
@@ -49,6 +49,9 @@ bench: $(DEVELOPMENT)  ## measure the simulator against C and scipy, the time of
 	@$(BIN)/python benchmarks/simulation.py
 	@$(BIN)/python benchmarks/diagnosis.py
 	@$(BIN)/python benchmarks/exports.py
+
+dist: $(DEVELOPMENT)  ## build wheel and source distribution in dist/
+	@$(BIN)/python -m hatchling build
 
 docs: $(DEVELOPMENT) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
 	@# Not --quiet: what is not told does not count as a warning, and would not end a strict build.
