@@ -187,6 +187,20 @@ def test_a_hold_hidden_by_an_effect_shows_with_the_effect_in_the_model():
     assert finding.explained == pytest.approx(1.0, abs=0.02)
 
 
+def test_a_delay_of_half_a_sample_in_the_model_hides_no_wrong_hold():
+    context, reidentified = prepared([replace(r, hold="foh") for r in sweeps(effect=CUBIC, hold="zoh")])
+    pair = (effect_named("cubic_stiffness"), effect_named("input_delay"))
+    single = fit_candidate(context, pair[:1], reidentified.fit)
+    model = fit_candidate(context, pair, single.fit)
+    assert model.fit.values["T_d"] == pytest.approx(0.5 * DT, rel=0.1)
+    quality = data_quality(context, (*context.estimation, *context.scoring), reidentified)
+    (finding,) = with_best_model(replace(quality, findings=()), context, model).findings
+    assert finding.kind == "hold"
+    assert finding.sentence.startswith("With cubic_stiffness in the model: ")
+    assert '"zoh"' in finding.mend
+    assert "a delay in the rig" in finding.sentence
+
+
 def test_a_right_hold_stays_right_with_the_effect_in_the_model():
     context, reidentified = prepared(sweeps(effect=CUBIC))
     quality = data_quality(context, (*context.estimation, *context.scoring), reidentified)

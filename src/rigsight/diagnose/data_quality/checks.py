@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from rigsight.diagnose.data_quality.amplitude_response import amplitude_dependences
 from rigsight.diagnose.data_quality.finding import DataQuality, Finding
-from rigsight.diagnose.data_quality.input_timing import input_timing
+from rigsight.diagnose.data_quality.input_timing import input_timing, without_short_delays
 from rigsight.diagnose.data_quality.offsets_by_record import levels_apart, means_of
 from rigsight.diagnose.data_quality.sensor_faults import sensor_faults
 from rigsight.diagnose.fitting.fit_context import FitContext, Scored
@@ -70,6 +70,8 @@ def with_offsets_told(quality: DataQuality, context: FitContext, model: Scored) 
 def with_best_model(quality: DataQuality, context: FitContext, model: Scored) -> DataQuality:
     """Test the hold of the input again with the effects in the model that may have hidden its part of the gap.
 
+    A delay that is shorter than a sample is left out for it: a wrong hold looks like half a sample of delay.
+
     Parameters
     ----------
     quality
@@ -81,11 +83,13 @@ def with_best_model(quality: DataQuality, context: FitContext, model: Scored) ->
     """
     if not model.effects or any(finding.kind in ("hold", "time_shift") for finding in quality.findings):
         return quality
-    timing = input_timing(context, model.effects, model.fit, with_shift=False)
+    effects, base = without_short_delays(context, model)
+    timing = input_timing(context, effects, base, with_shift=False)
     if timing is None or not timing.findings():
         return quality
     # A delay may explain as much; it is worth its fit only now.
-    timing = input_timing(context, model.effects, model.fit) or timing
-    named = " and ".join(model.names)
-    found = [replace(f, sentence=f"With {named} in the model: {f.sentence}") for f in timing.findings()]
+    timing = input_timing(context, effects, base) or timing
+    named = " and ".join(effect.name for effect in effects)
+    within = f"With {named} in the model: " if named else ""
+    found = [replace(f, sentence=f"{within}{f.sentence}") for f in timing.findings()]
     return replace(quality, findings=(*found, *quality.findings))

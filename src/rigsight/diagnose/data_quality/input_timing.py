@@ -14,11 +14,12 @@ from typing import get_args
 import numpy as np
 
 from rigsight.diagnose.data_quality.finding import Finding
-from rigsight.diagnose.fitting.fit_context import FitContext
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
 from rigsight.diagnose.policy import NOTES, SEARCH, VERDICT
-from rigsight.effects import Effect, effect_named
+from rigsight.effects import Effect, effect_named, kind_of
 from rigsight.identify import FitResult
 from rigsight.records.record import Hold, Record
+from rigsight.simulate import carried_over
 
 _TOLERANCE = 1e-3
 _DELAYS = ("input_delay", "sensor_delay")
@@ -152,6 +153,37 @@ def input_timing(
         with_shift=shifted,
         shift=shift,
         dt=max(record.dt for record in context.look),
+    )
+
+
+def without_short_delays(context: FitContext, model: Scored) -> tuple[tuple[Effect, ...], FitResult]:
+    """Return the effects of a model but the delays that are shorter than a sample, and its fit without them.
+
+    Parameters
+    ----------
+    context
+        Records, scales and noise.
+    model
+        A model with effects.
+    """
+    fit, dt = model.fit, max(record.dt for record in context.look)
+
+    def is_short_delay(effect: Effect) -> bool:
+        if kind_of(effect.name) not in _DELAYS:
+            return False
+        return fit.values[fit.structure.parameter_name(effect, effect.parameters[0].name)] < dt
+
+    effects = tuple(effect for effect in model.effects if not is_short_delay(effect))
+    if effects == model.effects:
+        return effects, fit
+    structure = context.composed(effects, dict(fit.structure.fixed))
+    values = {**fit.values, **carried_over(fit.values, fit.structure, structure)}
+    names = set(structure.names)
+    return effects, replace(
+        fit,
+        structure=structure,
+        free=tuple(name for name in fit.free if name in names),
+        values={name: values[name] for name in structure.names},
     )
 
 
