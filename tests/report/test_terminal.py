@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from rigsight.diagnose.data_quality.finding import DataQuality, Finding
 from rigsight.diagnose.result import Diagnosis
 from rigsight.report import summary
 
@@ -66,6 +67,17 @@ def test_one_experiment_is_named_and_the_rest_left_to_the_report(variant: Callab
     )
     assert "differ by 23 standard deviations of the noise" in text
     assert "Stribeck friction apart" not in text
+
+
+def test_faults_of_the_records_come_before_everything_but_the_verdict(
+    variant: Callable[[str], Diagnosis],
+) -> None:
+    diagnosis = variant("effect")
+    finding = Finding("hold", "The input follows another hold.", "Set hold.", serious=True)
+    minor = replace(finding, sentence="A minor thing.", serious=False)
+    shown = printed(replace(diagnosis, data_quality=DataQuality((finding, minor), ())))
+    assert shown[2] == "Check the records first: The input follows another hold. Set hold."
+    assert not any("minor" in line for line in shown)
 
 
 def test_where_nothing_was_given_there_is_no_given_simulation(variant: Callable[[str], Diagnosis]) -> None:

@@ -19,6 +19,7 @@ from rigsight.report.wording import (
     advice_sentences,
     ambiguity_sentence,
     basis_sentence,
+    fault_sentences,
     missing_force_sentence,
     remainder_sentence,
     verdict_name,
@@ -44,6 +45,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     """
     sentences = [
         verdict_sentence(diagnosis),
+        *fault_sentences(diagnosis),
         missing_force_sentence(diagnosis),
         remainder_sentence(diagnosis),
         trust_line(diagnosis),

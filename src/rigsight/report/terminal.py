@@ -20,6 +20,7 @@ from rigsight.report.wording import (
     ambiguity_sentence,
     basis_sentence,
     effects_label,
+    fault_sentences,
     missing_force_sentence,
     named_candidate,
     percent,
@@ -31,6 +32,7 @@ from rigsight.report.wording import (
 
 _RANKED = 3
 _ADVICES = 1
+_FAULTS = 3
 """Experiments told; the report holds all."""
 _COLORS = {"effect": "bold green", "parameters": "bold green", "none": "bold green", "unknown": "bold yellow"}
 
@@ -50,6 +52,8 @@ class Summary:
         diagnosis = self.diagnosis
         yield text(f"{verdict_name(diagnosis)}: {diagnosis.title}", _COLORS[diagnosis.verdict])
         yield text(verdict_sentence(diagnosis))
+        for sentence in fault_sentences(diagnosis)[:_FAULTS]:
+            yield text(sentence, "bold yellow")
         if remainder_sentence(diagnosis):
             yield text(remainder_sentence(diagnosis))
         if missing_force_sentence(diagnosis):

@@ -233,6 +233,14 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     )
 
 
+def fault_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what is wrong with the records or the campaign, with the mend; it counts before any verdict."""
+    if diagnosis.data_quality is None:
+        return []
+    faults = [finding for finding in diagnosis.data_quality.findings if finding.serious]
+    return [f"Check the records first: {finding.sentence} {finding.mend}".strip() for finding in faults]
+
+
 def missing_force_sentence(diagnosis: Diagnosis) -> str:
     """Return a sentence on the missing force if no effect explains the gap; empty where nothing is known."""
     if diagnosis.missing_force is not None:
