@@ -56,7 +56,7 @@ def test_no_compiler_at_all_is_told_with_both_ways_out(tmp_path, monkeypatch):
     ("named", "message"),
     [
         ("no-such-compiler -m64", "CC names 'no-such-compiler', which was not found"),
-        ("gcc 'half", "CC is no command"),
+        ("gcc 'half", "CC is not a command"),
     ],
 )
 def test_a_variable_that_names_no_program_is_told(named: str, message: str, monkeypatch):

@@ -198,7 +198,7 @@ def test_an_inertia_that_is_no_formula_is_told(monkeypatch: pytest.MonkeyPatch) 
     reading = replace(effect_named("quadratic_damping"), torque=m * x)
     monkeypatch.setattr(coupled_inertia, "MOST_COUPLED", 1)
     rig = fresh(RIGS["two_link_arm"])
-    with pytest.raises(InputError, match=r"Give joints\.elbow an inertia"):
+    with pytest.raises(InputError, match=r"Set inertia in joints\.elbow"):
         compose(rig, [placed(reading, "elbow")])
     assert not rig.offers(placed(reading, "elbow"))
     joints = tuple(replace(joint, inertia=sp.Symbol("I_2", real=True)) for joint in rig.mechanism.joints)

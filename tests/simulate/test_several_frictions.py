@@ -299,7 +299,7 @@ def test_more_frictions_than_can_be_tried_are_refused(tmp_path: Path) -> None:
     joints = "".join(f'[joints.j{i}]\nmotion = "phi_m + {i + 2}*phi_l"\n' for i in range(9))
     path.write_text((FILES / "drive_train.toml").read_text("utf-8") + joints, "utf-8")
     structure, values = with_friction(read_rig_file(path), {f"j{i}": 0.01 for i in range(9)}, TRAIN)
-    with pytest.raises(InputError, match="dry friction at 9 motions; at most 8"):
+    with pytest.raises(InputError, match="dry friction at 9 joints; at most 8"):
         simulate(structure, values, driven({"u": CURRENT}), np.zeros(4))
 
 

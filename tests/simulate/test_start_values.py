@@ -85,7 +85,7 @@ def test_given_values_are_taken_and_the_others_rest_with_them(
 
 
 def test_a_state_that_starts_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"initial\.z: 'z' starts twice"):
+    with pytest.raises(InputError, match=r"initial\.z: 'z' has two start values"):
         stage(tmp_path, "[initial]\nz = 0.1\n", 'start = "x_0"\n')
 
 
