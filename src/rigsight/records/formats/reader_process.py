@@ -21,7 +21,8 @@ from typing import IO, Any
 import numpy as np
 
 from rigsight.records.formats.channel import ChannelFile, TimeAxis
-from rigsight.records.formats.isolated_reader import PACKAGES, most_memory
+from rigsight.records.formats.isolated_reader import most_memory
+from rigsight.records.formats.known import PACKAGES
 
 LONGEST_WORK = 600
 """Processor time [s]."""
@@ -77,7 +78,6 @@ def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> N
 
 def _contents(file: ChannelFile, axes: list[TimeAxis]) -> dict[str, Any]:
     return {
-        "format": file.format,
         "channels": [
             [one.name, one.n_samples, one.unit, None if one.axis is None else axes.index(one.axis)]
             for one in file.channels
