@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ from rigsight.records.formats.channel import (
     with_distinct_names,
 )
 from rigsight.records.formats.isolated_reader import ReadingError, open_isolated
-from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, recognized
+from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, reader_of, recognized
 from rigsight.records.formats.ordinary_file import file_size
 
 LARGEST_FILE = 2_000_000_000
@@ -95,8 +94,7 @@ def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
     """Return the reader of a format; only its own library is imported."""
     if kind in PACKAGES:
         return contextlib.contextmanager(partial(open_isolated, kind))
-    reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
-    return contextlib.contextmanager(reader)
+    return contextlib.contextmanager(reader_of(kind))
 
 
 def _guarded(path: Path, name: str, channel: Channel) -> Channel:

@@ -6,8 +6,14 @@ imported when a file of that format is opened.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rigsight.records.formats.channel import ChannelFile
 
 HEAD = 4096
 """Bytes at the beginning of a file that decide its format."""
@@ -104,3 +110,11 @@ PACKAGES = {known.key: known.package for known in FORMATS if known.isolated and 
 def recognized(head: bytes) -> Format | None:
     """Return the format of a file that begins with these bytes, None for delimited text."""
     return next((known for known in FORMATS if known.recognizes(head)), None)
+
+
+def reader_of(key: str) -> Callable[[Path], Iterator[ChannelFile]]:
+    """Return the function that reads a format; it and its library are imported no earlier than that."""
+    reader: Callable[[Path], Iterator[ChannelFile]] = getattr(
+        import_module(f"rigsight.records.formats.read_{key}"), f"open_{key}"
+    )
+    return reader
