@@ -107,7 +107,7 @@ def diagnose(
     if found.windowing.cycles is not None:
         notes.append(
             "In free run the motion is sensitive to small disturbances: one as small as the noise would change it by much more "
-            "than the noise. The records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own "
+            f"than the noise. The records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own "
             "initial state."
         )
     elif found.judgement.verdict == "unknown":
