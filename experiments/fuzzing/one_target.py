@@ -4,34 +4,40 @@ from __future__ import annotations
 
 import random
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import atheris
 
-# Where coverage is looked at. Libraries in C show none, and to instrument asammdf takes minutes.
+# Where coverage is looked at; a package stands for all its modules.
 _INSTRUMENTED = [
     "rigsight.records",
     "rigsight.parameters",
-    *(
-        f"rigsight.workflow.{name}"
-        for name in (
-            "campaign", "campaign_file", "json_file", "model_file", "blind_external", "own_effects", "effect_declaration",
-            "inspect", "record_proposal", "signal_guesses",
-        )
-    ),
-]  # fmt: skip
-_LIBRARIES = {"TDMS": ["nptdms"], "UFF": ["pyuff"], "campaign.toml": ["tomllib"]}
+    "rigsight.workflow.bench.external",
+    "rigsight.workflow.campaign",
+    "rigsight.workflow.inspect",
+    "rigsight.workflow.own.effect_declaration",
+    "rigsight.workflow.own.own_effects",
+    "rigsight.workflow.run.json_file",
+]
+if sys.argv[1] == "campaign.toml":
+    _INSTRUMENTED.append("tomllib")
 
-with atheris.instrument_imports(include=[*_INSTRUMENTED, *_LIBRARIES.get(sys.argv[1], [])]):
+with atheris.instrument_imports(include=_INSTRUMENTED):
     import oracle
     import targets
 
     from rigsight.records.formats import isolated_reader, reader_process
+    from rigsight.records.formats.known import BY_SUFFIX, FORMATS, reader_of
 
-    for _reader in ("hdf5", "matlab", "matlab_hdf5", "mdf", "parquet", "tdms", "uff"):
-        __import__(f"rigsight.records.read_{_reader}")
-    for _library in _LIBRARIES.get(sys.argv[1], []):
-        __import__(_library)
+    for _format in FORMATS:
+        reader_of(_format.key)
+
+# A library in C shows no coverage, and to instrument asammdf takes minutes.
+_read = BY_SUFFIX.get(targets.TARGETS[sys.argv[1]].suffix)
+if _read is not None and _read.package is not None and not _read.isolated:
+    with atheris.instrument_imports(include=[_read.package]):
+        import_module(_read.package)
 
 
 def main(name: str, folder: Path, options: list[str]) -> None:

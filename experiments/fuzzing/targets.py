@@ -9,11 +9,9 @@ import struct
 import tempfile
 import tomllib
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +22,13 @@ from declarations import DECLARATIONS, effect_of
 from rigsight.errors import InputError
 from rigsight.records import read_record
 from rigsight.records.formats import channel_file
-from rigsight.records.formats.channel import ChannelFile
+from rigsight.records.formats.known import BY_SUFFIX, reader_of
 from rigsight.rigs import RIGS
 from rigsight.workflow.bench.external import ExternalBench
 from rigsight.workflow.campaign.model_file import read_model
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.inspect import run_inspect
-from rigsight.workflow.own import own_effects
+from rigsight.workflow.own import own_effects, python_file
 from rigsight.workflow.run.results import json_text
 
 Plain = Callable[[bytes, int], bytes]
@@ -114,13 +112,7 @@ def _measurement(suffix: str) -> Callable[[bytes], object]:
 def read_in_this_process() -> None:
     """Let the libraries that the program keeps in a process of their own read here, where coverage is seen."""
 
-    def reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
-        opened: Callable[[Path], Iterator[ChannelFile]] = getattr(
-            import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}"
-        )
-        return contextlib.contextmanager(opened)
-
-    channel_file._reader = reader
+    channel_file._reader = lambda kind: contextlib.contextmanager(reader_of(kind))
 
 
 def _samples(name: str) -> Callable[[], list[bytes]]:
@@ -160,7 +152,7 @@ def _key(data: bytes) -> object:
 
 def _effect_text(data: bytes) -> object:
     """Read a file of effects up to where it would be run: what the fuzzer wrote is never run."""
-    own_effects.exec = lambda *_: None  # type: ignore[attr-defined]
+    python_file.exec = lambda *_: None  # type: ignore[attr-defined]
     path = _folder() / "mine.py"
     path.write_bytes(data)
     return own_effects.own_effects([path], check=False)
@@ -268,17 +260,25 @@ def _mutate_packed_matlab(data: bytes, rng: random.Random, plain: Plain) -> byte
     return b"".join(out)
 
 
-_FORMATS = {
-    "CSV, TSV": ("CSV", ".dat", False, _mutate_text),
-    "MATLAB 5": ("MATLAB 5", ".mat", True, None),
-    "MATLAB 7": ("MATLAB 7", ".mat", True, _mutate_packed_matlab),
-    "MATLAB 7.3": ("MATLAB 7.3", ".mat", True, None),
-    "HDF5": ("HDF5", ".h5", True, None),
-    "MDF4": ("MDF4", ".mf4", True, None),
-    "TDMS": ("TDMS", ".tdms", False, None),
-    "Parquet": ("Parquet", ".parquet", True, None),
-    "UFF": ("UFF", ".uff", False, None),
-}
+_MUTATED_INSIDE = {"MATLAB 7": _mutate_packed_matlab}
+"""Formats whose content is packed, so that plain bytes reach nothing."""
+
+
+def _formats() -> dict[str, Target]:
+    """Return delimited text and every format for which the tests have a writer."""
+    text = Target(".dat", _samples("CSV"), _measurement(".dat"), _mutate_text)
+    return {"CSV, TSV": text} | {
+        name: Target(
+            suffix,
+            _samples(name),
+            _measurement(suffix),
+            _MUTATED_INSIDE.get(name),
+            in_child=BY_SUFFIX[suffix].isolated,
+        )
+        for name, (suffix, _) in seeds.formats().FORMATS.items()
+    }
+
+
 _CAMPAIGN_WORDS = [
     "title", "rig", "records", "model", "effects", "constants", "parameters", "file", "name", "role", "kind", "amplitude", "hold",
     "dt", "resample", "columns", "separator", "decimal", "header", "comment", "scale", "offset", "unit", "axis", "element",
@@ -305,14 +305,12 @@ _KEY_WORDS = [
 _EFFECT_WORDS = [
     "name", "place", "summary", "parameters", "energy", "torque", "spring", "drive", "delay", "lateral", "measured", "states",
     "symbol", "rate", "limit", "starts", "searched_as", "special_cases", "post_yield_stiffness_ratio", "pulsation",
-    "x", "v", "t", "k", "m", "dynamics", "actuator", "sensor", "null", "default", "search", "dimension", "lower", "upper", "fitted", "Abs", "exp", "sign",
+    "x", "v", "t", "k", "m", "dynamics", "actuator", "sensor", "null", "default", "search", "dimension", "lower", "upper",
+    "fitted", "Abs", "exp", "sign",
 ]  # fmt: skip
 
 TARGETS: dict[str, Target] = {
-    **{
-        name: Target(suffix, _samples(written), _measurement(suffix), mutate, in_child)
-        for name, (written, suffix, in_child, mutate) in _FORMATS.items()
-    },
+    **_formats(),
     "campaign.toml": Target(
         ".toml",
         lambda: [text.encode() for text in (seeds.CAMPAIGN, seeds.AXIS_CAMPAIGN)],

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigsight.records.formats.known import FORMATS as KNOWN
 from rigsight.rigs import RIGS
 
 from ..records.formats import FORMATS, Write, write_matlab, write_tdms, write_text
@@ -108,3 +109,9 @@ def test_an_unknown_rig_is_told(tmp_path: Path, run: Run) -> None:
     code, _, stderr = run("init", tmp_path, "--model", "bicycle")
     assert code == 2
     assert all(f"'{rig}'" in stderr for rig in RIGS)
+
+
+def test_the_help_names_every_format(run: Run) -> None:
+    """It is written out there: to import the table of formats would make all help slow."""
+    shown = " ".join(run("inspect", "--help")[1].split())
+    assert [known.name for known in KNOWN if known.suffixes and known.name not in shown] == []

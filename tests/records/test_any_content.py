@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rigsight.errors import InputError
-from rigsight.records.formats.channel_file import SUFFIXES
+from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.workflow.inspect import run_inspect
 
 from .formats import FORMATS
@@ -35,7 +35,7 @@ def check(path: Path) -> None:
             reading(path)
 
 
-@pytest.mark.parametrize("suffix", [".csv", *SUFFIXES])
+@pytest.mark.parametrize("suffix", [".csv", *BY_SUFFIX])
 @settings(drawn, max_examples=10)
 @given(data=st.binary(max_size=400))
 def test_any_bytes(tmp_path: Path, suffix: str, data: bytes) -> None:

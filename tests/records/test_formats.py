@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,10 @@ import pytest
 
 from rigsight.errors import InputError
 from rigsight.records import ColumnMapping, Record, read_record
-from rigsight.records.formats.channel_file import open_channels
+from rigsight.records.formats.channel import Channel, ChannelFile
+from rigsight.records.formats.channel_file import file_format, open_channels
+from rigsight.records.formats.known import BY_SUFFIX, HEAD, Format, recognized
+from rigsight.records.formats.known import FORMATS as KNOWN
 
 from .formats import (
     FORMATS,
@@ -49,8 +53,57 @@ def rows(n_samples: int = 120, dt: float = 0.01) -> dict[str, np.ndarray]:
     }
 
 
+DOCUMENTED = (Path(__file__).parents[2] / "docs/records.md").read_text(encoding="utf-8")
+
+
 def read(path: Path, **options: object) -> Record:
     return read_record(path, INPUTS, OUTPUTS, **options)
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=lambda known: known.key)
+def test_no_known_format_is_missed(known: Format) -> None:
+    """Each has a writer here, so that every test below is about it as well, and each suffix is documented."""
+    assert not known.suffixes or {suffix for suffix, _ in FORMATS.values()} & set(known.suffixes)
+    undocumented = [suffix for suffix in known.suffixes if f"`{suffix}`" not in DOCUMENTED]
+    assert undocumented == []
+    assert known.suffixes == tuple(suffix.lower() for suffix in known.suffixes)
+
+
+def test_the_writers_here_write_every_known_format_and_one_format_recognizes_each_file(
+    tmp_path: Path,
+) -> None:
+    found = []
+    for i, (suffix, write) in enumerate(FORMATS.values()):
+        path = tmp_path / f"run{i}{suffix}"
+        write(path, rows(), UNITS)
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+        (one,) = (known for known in KNOWN if known.recognizes(head))
+        assert one is recognized(head)
+        found.append(one)
+    assert {known.key for known in found} == {known.key for known in KNOWN}
+
+
+def test_every_suffix_belongs_to_one_format() -> None:
+    suffixes = [suffix for known in KNOWN for suffix in known.suffixes]
+    assert len(suffixes) == len(set(suffixes))
+
+
+def test_names_are_made_distinct_and_printable_whatever_a_reader_gives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def opened(_: Path) -> Iterator[ChannelFile]:
+        channels = [Channel(name, 3, lambda: np.arange(3.0)) for name in ("u", "u", "x\x1b", "u_2")]
+        channels.append(Channel("short\x1b", 3, lambda: np.arange(2.0)))
+        yield ChannelFile(tuple(channels))
+
+    write_tdms(tmp_path / "run.tdms", rows(), UNITS)
+    monkeypatch.setattr("rigsight.records.formats.read_tdms.open_tdms", opened)
+    with open_channels(tmp_path / "run.tdms") as file:
+        assert [channel.name for channel in file.channels] == ["u", "u_3", "x\ufffd", "u_2", "short\ufffd"]
+        assert file.format == "TDMS"
+        with pytest.raises(InputError, match="channel 'short\ufffd': 2 of 3 samples"):
+            file.channels[-1].load()
 
 
 @formats
@@ -84,7 +137,7 @@ def test_content_decides_and_not_the_name(tmp_path: Path, suffix: str, write: Wr
     np.testing.assert_array_equal(read(path)["psi"], rows()["psi"])
 
 
-@pytest.mark.parametrize("suffix", [".mat", ".h5", ".mf4", ".tdms", ".parquet", ".uff"])
+@pytest.mark.parametrize("suffix", BY_SUFFIX)
 @pytest.mark.parametrize("content", [b"", b"t,u,psi\n0,1,2\n", bytes(300)])
 def test_a_name_that_promises_what_the_content_is_not(tmp_path: Path, suffix: str, content: bytes) -> None:
     path = tmp_path / f"run{suffix}"
@@ -296,25 +349,28 @@ def test_universal_files_as_text_and_binary(tmp_path: Path, binary: int) -> None
     np.testing.assert_allclose(read(tmp_path / "run.uff")["psi"], rows()["psi"], rtol=1e-11)
 
 
-PACKAGES = {
-    "MATLAB 7.3": "h5py", "HDF5": "h5py", "MDF4": "asammdf", "TDMS": "nptdms", "Parquet": "pyarrow", "UFF": "pyuff",
-}  # fmt: skip
+OPTIONAL = {known.package for known in KNOWN} - {"scipy", None}
+"""Packages of the extra `formats`."""
 
 
-@pytest.mark.parametrize("name", PACKAGES)
+@formats
 def test_a_missing_library_is_told_with_the_extra(
-    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, suffix: str, write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    suffix, write = FORMATS[name]
     path = tmp_path / f"run{suffix}"
     write(path, rows(), {})
-    for module in [m for m in sys.modules if m.partition(".")[0] == PACKAGES[name]]:
+    known = file_format(path)
+    assert known is not None
+    if known.package not in OPTIONAL:
+        assert read(path).n_samples == 120
+        return
+    for module in [m for m in sys.modules if m.partition(".")[0] == known.package]:
         monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setitem(sys.modules, PACKAGES[name], None)
+    monkeypatch.setitem(sys.modules, known.package, None)
     with pytest.raises(InputError) as caught:
         read(path)
     assert 'pip install "rigsight[formats]"' in str(caught.value)
-    assert PACKAGES[name] in str(caught.value)
+    assert known.package in str(caught.value)
 
 
 @pytest.mark.parametrize("write", [write_matlab, write_matlab_hdf5])
@@ -322,7 +378,7 @@ def test_matlab_needs_no_extra_before_7_3(
     tmp_path: Path, write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write(tmp_path / "run.mat", rows(), {})
-    for package in set(PACKAGES.values()):
+    for package in OPTIONAL:
         monkeypatch.setitem(sys.modules, package, None)
     if write is write_matlab:
         assert read(tmp_path / "run.mat").n_samples == 120

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigsight.errors import InputError
-from rigsight.rigs import rig_file_text
+from rigsight.rigs import RIGS, rig_file_text
 from rigsight.workflow.campaign.read_campaign import read_campaign
 from rigsight.workflow.init import run_init
 
@@ -58,24 +58,29 @@ def test_a_time_that_is_hardly_in_seconds_is_asked_about(tmp_path: Path) -> None
     assert "sample time 10 s; is it in ms?" in (tmp_path / "campaign.toml").read_text("utf-8")
 
 
-def test_the_kind_of_rig_is_guessed_from_the_channels(tmp_path: Path) -> None:
-    for folder, columns in {
-        "element": ("t", "Hub [mm]", "Kraft [kN]"),
-        "running_gear": ("time", "motor current", "psi"),
-        "axis": ("t", "u", "position"),
-        "servo": ("time", "goal", "angle"),
-        "drive_train": ("t", "u", "motor_angle", "load_angle"),
-        "cart_pendulum": ("t", "u", "cart", "angle"),
-        "two_link_arm": ("t", "tau_1", "tau_2", "angle_1", "angle_2"),
-        "quarter_car": ("t", "road", "travel", "body"),
-    }.items():
-        (tmp_path / folder).mkdir()
-        write_text(
-            tmp_path / folder / "a.csv",
-            dict(zip(columns, (T, SWEEP, ANSWER, 2.0 * ANSWER, 3.0 * ANSWER), strict=False)),
-            {},
-        )
-        assert run_init(tmp_path / folder).model == folder
+@pytest.mark.parametrize("name", RIGS)
+def test_every_rig_is_recognized_by_the_names_of_its_signals(tmp_path: Path, name: str) -> None:
+    inputs, outputs = RIGS[name].inputs, RIGS[name].outputs
+    samples = {"t": T} | {signal.name: (i + 1.0) * SWEEP for i, signal in enumerate(inputs)}
+    samples |= {signal.name: (i + 1.0) * ANSWER for i, signal in enumerate(outputs)}
+    write_text(tmp_path / "a.csv", samples, {})
+    assert run_init(tmp_path).model == name
+
+
+@pytest.mark.parametrize(
+    ("columns", "model"),
+    [
+        (("t", "Hub [mm]", "Kraft [kN]"), "element"),
+        (("time", "motor current", "psi"), "running_gear"),
+        (("t", "u", "position"), "axis"),
+        (("time", "goal", "angle"), "servo"),
+    ],
+)
+def test_the_kind_of_rig_is_guessed_from_the_channels(
+    tmp_path: Path, columns: tuple[str, ...], model: str
+) -> None:
+    write_text(tmp_path / "a.csv", dict(zip(columns, (T, SWEEP, ANSWER), strict=True)), {})
+    assert run_init(tmp_path).model == model
 
 
 @pytest.mark.parametrize(

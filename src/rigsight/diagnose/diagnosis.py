@@ -24,26 +24,20 @@ from rigsight.diagnose.noise.disturbance import disturbance
 from rigsight.diagnose.noise.noise_floor import NoiseFloor
 from rigsight.diagnose.policy import VERDICT
 from rigsight.diagnose.result import Candidate, Diagnosis, Estimate, LikelyCauses, OutputGap
-from rigsight.diagnose.search.predictability import growth_of_disturbances
 from rigsight.diagnose.trust.trust import trust
 from rigsight.diagnose.uncertainty.of_verdict import with_own_errors
 from rigsight.diagnose.verdict.calibration import Situation, trained
 from rigsight.diagnose.verdict.ranking import Grounds
 from rigsight.diagnose.verdict.remainder import remainder_of
 from rigsight.diagnose.verdict.unknown_cause import force_of_one_motion, forces_at_joints, traced_to
+from rigsight.diagnose.verdict.verdict_notes import Basis, verdict_notes
 from rigsight.effects import CATALOGUE, Effect
 from rigsight.errors import InputError
 from rigsight.identify import FitMemory
-from rigsight.identify.closed_loop import closed_loop_notes
 from rigsight.metrics import nrmse
 from rigsight.records.record import Record
 from rigsight.rigs import Rig
 from rigsight.simulate.model import Model
-
-_REFERENCE_USED = (
-    "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "
-    "the responses in the report do not use it."
-)
 
 
 def diagnose(
@@ -85,45 +79,14 @@ def diagnose(
     if not campaign.estimation:
         raise InputError('A diagnosis needs at least one record with role = "estimation".')
     effects = candidates_on(campaign.rig, effects, campaign.modelled)
-    notes = [*campaign.notes, *(note for record in campaign.records for note in record.notes)]
-    notes += closed_loop_notes(campaign.records, campaign.rig, _REFERENCE_USED)
     scored_on = "validation" if campaign.validation else "estimation"
-    if campaign.open_factor is not None:
-        notes.append(campaign.open_factor.sentence)
     rng = np.random.default_rng(seed)
     found = examine(campaign, effects, rng, n_jobs, say, prepare, memory)
+    below_rest = None
     if any(floor.method == AT_REST for floor in found.floors) and _least_left(found) < VERDICT.refutes_rest:
-        notes.append(
-            f"A model's error is {_least_left(found):.2g} of the noise floor measured at rest. So the rig was moving at rest, "
-            f"within its play or driven by a disturbance; the noise floor is taken from the top of the spectrum instead."
-        )
+        below_rest = _least_left(found)
         found = examine(campaign, effects, rng, n_jobs, say, prepare, memory, at_rest=False)
-    if found.windowing.bandwidth is not None:
-        notes.append(
-            f"The rig has no restoring force, so every model drifts in free run. Models are compared as observers: each tracks "
-            f"the measured motion up to {found.windowing.bandwidth:.3g} rad/s, so the errors are those that build up within "
-            f"{1.0 / found.windowing.bandwidth:.2g} s."
-        )
-    if found.windowing.cycles is not None:
-        notes.append(
-            "In free run the motion is sensitive to small disturbances: one as small as the noise would change it by much more "
-            "than the noise. The records are fitted and scored in windows of {found.windowing.cycles} cycles, each with its own "
-            "initial state."
-        )
-    elif found.judgement.verdict == "unknown":
-        growth = growth_of_disturbances(found.context, found.reidentified, found.judgement.model, rng)
-        if growth > VERDICT.sensitive:
-            notes.append(
-                f"The motion of the best model is sensitive to small disturbances: one as small as the noise changes it by "
-                f"{growth:.2g} times the noise, so its error may be chance. Record more motion or shorter records to find out."
-            )
-    notes += [*found.quality.notes, found.judgement.reason, *found.doubts]
-    if found.judgement.verdict == "unknown" and found.imitations:
-        nearest = min(found.imitations, key=lambda pair: pair.error_over_noise)
-        notes.append(
-            f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act as "
-            f"a single law, and other laws of this kind fit equally well, so they are not named."
-        )
+    notes = verdict_notes(Basis(campaign, found, rng, below_rest))
     diagnosis = _assembled(campaign, found, notes, scored_on, rng)
     diagnosis = replace(diagnosis, data_quality=found.quality)
     named = found.judgement.model if diagnosis.effects else found.reidentified

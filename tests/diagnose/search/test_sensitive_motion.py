@@ -59,6 +59,7 @@ def test_the_play_is_named_in_windows_down_to_the_noise(of_play: tuple[Record, .
     assert best.error_over_noise == pytest.approx(1.0, abs=0.1)
     assert best.parameters["g"].value == pytest.approx(1.35e-4, rel=0.02)
     assert any("windows of 4 cycles" in note for note in diagnosis.notes)
+    assert not any("{" in note or "}" in note for note in diagnosis.notes)
 
 
 def test_windows_do_not_make_a_wrong_effect_right(of_play: tuple[Record, ...]) -> None:

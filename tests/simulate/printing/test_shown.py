@@ -33,7 +33,7 @@ _TOGETHER = (
     ("creep_saturation", "conicity_variation"),
 )
 ONE_MOTION = [name for name, rig in RIGS.items() if rig.has_one_motion]
-_LARGER = ("drive_train", "servo", "cart_pendulum", "two_link_arm", "quarter_car")
+LARGER = [name for name in RIGS if name not in ONE_MOTION]
 _TOGETHER_AT_PLACES = (
     ("drive_train", "backlash@shaft", "coulomb_friction@load_bearing", "coulomb_friction@motor_bearing"),
     ("drive_train", "bouc_wen_hysteresis@shaft", "input_saturation@motor", "sensor_lag@load_angle", "sensor_lag@motor_angle"),
@@ -71,8 +71,8 @@ def one_place_each(rig: str) -> list[tuple[str, tuple[str, ...]]]:
 
 
 AT_PLACES = [
-    *((rig, ()) for rig in _LARGER),
-    *(case for rig in _LARGER for case in one_place_each(rig)),
+    *((rig, ()) for rig in LARGER),
+    *(case for rig in LARGER for case in one_place_each(rig)),
     *((rig, names) for rig, *names in _TOGETHER_AT_PLACES),
 ]
 """Every effect on every rig, the places in turn; delays have a memory of their own and their own tests."""

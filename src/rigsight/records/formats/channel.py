@@ -67,7 +67,7 @@ class Channel:
     Attributes
     ----------
     name
-        Unique in the file; ``group/channel`` where the file has groups.
+        Unique in an opened file; ``group/channel`` where the file has groups.
     n_samples
         Number of samples.
     load
@@ -113,17 +113,17 @@ class ChannelFile:
 
     Attributes
     ----------
-    format
-        Plain name: ``"MATLAB"``.
     channels
-        In the order of the file, with distinct names.
+        In the order of the file; names are made distinct and printable by `open_channels`, not by a reader.
     refused
         What else is in it.
+    format
+        Plain name, ``"MATLAB"``; `open_channels` fills it in.
     """
 
-    format: str
     channels: tuple[Channel, ...]
     refused: tuple[Refused, ...] = ()
+    format: str = ""
 
 
 def check_size(file: str, name: str, n_samples: int) -> None:

@@ -9,46 +9,29 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from rigsight.errors import InputError
-from rigsight.records.formats.channel import Channel, ChannelFile, Load, check_count, check_size, check_total
-from rigsight.records.formats.isolated_reader import PACKAGES, ReadingError, open_isolated
+from rigsight.records.formats.channel import (
+    Channel,
+    ChannelFile,
+    Load,
+    check_count,
+    check_size,
+    check_total,
+    with_distinct_names,
+)
+from rigsight.records.formats.isolated_reader import ReadingError, open_isolated
+from rigsight.records.formats.known import BY_SUFFIX, HEAD, PACKAGES, Format, reader_of, recognized
 from rigsight.records.formats.ordinary_file import file_size
 
 LARGEST_FILE = 2_000_000_000
 MEND = "Export it again, or as CSV."
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-_HEAD = 4096
-_SUFFIXES = {
-    ".mat": "matlab",
-    ".h5": "hdf5",
-    ".hdf5": "hdf5",
-    ".hdf": "hdf5",
-    ".mf4": "mdf",
-    ".mdf": "mdf",
-    ".tdms": "tdms",
-    ".parquet": "parquet",
-    ".uff": "uff",
-    ".unv": "uff",
-}
-_NAMES = {
-    "matlab": "MATLAB",
-    "matlab_hdf5": "MATLAB 7.3",
-    "hdf5": "HDF5",
-    "mdf": "MDF4",
-    "tdms": "TDMS",
-    "parquet": "Parquet",
-    "uff": "UFF",
-}
-SUFFIXES = tuple(_SUFFIXES)
-"""Of the formats other than delimited text."""
 
 
-def file_format(path: Path) -> str | None:
+def file_format(path: Path) -> Format | None:
     """Return the format that the content of a file shows, whatever it is called; None for delimited text.
 
     Raises
@@ -59,41 +42,17 @@ def file_format(path: Path) -> str | None:
     file_size(path)
     try:
         with path.open("rb") as file:
-            head = file.read(_HEAD)
+            head = file.read(HEAD)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-    found = _by_content(head)
-    promised = _SUFFIXES.get(path.suffix.lower())
+    found, promised = recognized(head), BY_SUFFIX.get(path.suffix.lower())
     if found is None and promised is not None:
-        what = (
-            "is empty" if not head else f"is no {_NAMES[promised]} file inside, or its beginning is damaged"
-        )
-        older = (
-            " MATLAB files before version 5 are not read: save it again with save -v7."
-            if promised == "matlab"
-            else ""
-        )
+        what = "is empty" if not head else f"is no {promised.name} file inside, or its beginning is damaged"
+        advice = f" {promised.advice}" if promised.advice else ""
         raise InputError(
-            f"{path.name} {what}.{older} Export it again; delimited text needs the suffix .csv or .txt."
+            f"{path.name} {what}.{advice} Export it again; delimited text needs the suffix .csv or .txt."
         )
     return found
-
-
-def _by_content(head: bytes) -> str | None:
-    if any(head[start : start + 8] == _HDF5 for start in (0, 512, 1024, 2048)):
-        return "matlab_hdf5" if head.startswith(b"MATLAB 7.3 MAT-file") else "hdf5"
-    if head[126:128] in (b"IM", b"MI") and head[124:126] in (b"\x00\x01", b"\x01\x00"):
-        return "matlab"
-    if head.startswith((b"MDF     ", b"UnFinMF ")):
-        return "mdf"
-    if head.startswith((b"TDSm", b"TDSh")):
-        return "tdms"
-    if head.startswith(b"PAR1"):
-        return "parquet"
-    lines = head.lstrip(b"\r\n").splitlines()
-    if len(lines) > 1 and lines[0].rstrip() == b"    -1" and lines[1][:6].strip().isdigit():
-        return "uff"
-    return None
 
 
 @contextlib.contextmanager
@@ -110,10 +69,10 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     InputError
         Naming the file: too large, damaged, or a library is missing that reads it.
     """
-    kind = file_format(path)
-    if kind is None:
+    known = file_format(path)
+    if known is None:
         raise InputError(f"{path.name} is not a measurement file of a known format.")
-    name = _NAMES[kind]
+    name = known.name
     size = file_size(path)
     if size > LARGEST_FILE:
         raise InputError(
@@ -123,19 +82,19 @@ def open_channels(path: Path) -> Iterator[ChannelFile]:
     with contextlib.ExitStack() as stack:
         stack.enter_context(_silence())
         with _told(path, name):
-            file = stack.enter_context(_reader(kind)(path))
+            file = stack.enter_context(_reader(known.key)(path))
             check_count(path.name, len(file.channels))
             check_total(path.name, sum(channel.n_samples for channel in file.channels))
-        channels = tuple(_guarded(path, name, channel) for channel in file.channels)
-        yield replace(file, channels=channels)
+            distinct = with_distinct_names(file.channels)
+        channels = tuple(_guarded(path, name, channel) for channel in distinct)
+        yield replace(file, channels=channels, format=name)
 
 
 def _reader(kind: str) -> Callable[[Path], AbstractContextManager[ChannelFile]]:
     """Return the reader of a format; only its own library is imported."""
     if kind in PACKAGES:
         return contextlib.contextmanager(partial(open_isolated, kind))
-    reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
-    return contextlib.contextmanager(reader)
+    return contextlib.contextmanager(reader_of(kind))
 
 
 def _guarded(path: Path, name: str, channel: Channel) -> Channel:

@@ -54,7 +54,7 @@ def _open_text(path: Path) -> Iterator[ChannelFile]:
             continue
         unit = stated_unit(layout.units[i]) if i < len(layout.units) else None
         channels.append(Channel(name, table.shape[0], _load(table, i), unit))
-    yield ChannelFile("delimited text", with_distinct_names(channels), tuple(refused))
+    yield ChannelFile(with_distinct_names(channels), tuple(refused), "delimited text")
 
 
 def _load(table: NDArray[np.float64], column: int) -> Any:

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from rigsight.errors import InputError
 from rigsight.records.formats.channel import Channel, ChannelFile, Load, Refused, TimeAxis
+from rigsight.records.formats.known import PACKAGES
 
-PACKAGES = {"mdf": "asammdf", "hdf5": "h5py", "matlab_hdf5": "h5py", "matlab": "scipy", "parquet": "pyarrow"}
-"""Format -> package whose C code is kept apart."""
 LEAST_MEMORY, MEMORY_PER_BYTE, LARGEST_MEMORY = 1_000_000_000, 100, 8_000_000_000
 """What reading may take beside the libraries [bytes]: so much, and so much for every byte of the file, since files are packed."""
 LEAST_WAIT, WAIT_PER_BYTE, LONGEST_WAIT = 30.0, 1e-6, 120.0
@@ -50,7 +49,7 @@ def open_isolated(kind: str, path: Path) -> Iterator[ChannelFile]:
             Channel(name, n_samples, process.load("channel", i), unit, None if axis is None else axes[axis])
             for i, (name, n_samples, unit, axis) in enumerate(contents["channels"])
         )
-        yield ChannelFile(contents["format"], channels, tuple(Refused(*one) for one in contents["refused"]))
+        yield ChannelFile(channels, tuple(Refused(*one) for one in contents["refused"]))
 
 
 class _Process:

@@ -16,7 +16,6 @@ from rigsight.records.formats.channel import (
     columns_of,
     kept_last,
     stated_unit,
-    with_distinct_names,
 )
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
@@ -52,7 +51,7 @@ def open_hdf5(path: Path) -> Iterator[ChannelFile]:
                 channels.extend(found)
 
         file.visititems(visit)
-        yield ChannelFile("HDF5", with_distinct_names(channels), tuple(refused))
+        yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _refusal(dataset: Any) -> str | None:

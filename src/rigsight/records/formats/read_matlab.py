@@ -18,7 +18,6 @@ from rigsight.records.formats.channel import (
     Refused,
     check_count,
     columns_of,
-    with_distinct_names,
 )
 from rigsight.records.formats.matlab_elements import (
     HEADER,
@@ -71,7 +70,7 @@ def open_matlab(path: Path) -> Iterator[ChannelFile]:
                 refused += [found] if variable.name else []
             else:
                 channels.extend(found)
-    yield ChannelFile("MATLAB", with_distinct_names(channels), tuple(refused))
+    yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _parts(name: str, variable: Variable, way: Way) -> Iterator[tuple[str, Variable, Way]]:

@@ -15,7 +15,6 @@ from rigsight.records.formats.channel import (
     check_count,
     columns_of,
     kept_last,
-    with_distinct_names,
 )
 from rigsight.records.formats.matlab_names import DEEPER, DEEPEST, NUMERIC, why_no_signal
 
@@ -54,7 +53,7 @@ def open_matlab_hdf5(path: Path) -> Iterator[ChannelFile]:
                     look_into(item, f"{above}{name}/", depth + 1)
 
         look_into(file, "", 0)
-        yield ChannelFile("MATLAB 7.3", with_distinct_names(channels), tuple(refused))
+        yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _channels(name: str, dataset: Any, kept: dict[str, NDArray[Any]]) -> list[Channel] | Refused:

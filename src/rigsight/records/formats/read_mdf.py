@@ -17,7 +17,6 @@ from rigsight.records.formats.channel import (
     TimeAxis,
     check_count,
     stated_unit,
-    with_distinct_names,
 )
 
 # Types of asammdf.blocks.v4_constants: numbers, and conversions that are formulas with numbers, not text.
@@ -60,7 +59,7 @@ def open_mdf(path: Path) -> Iterator[ChannelFile]:
                         continue
                     unit = stated_unit(channel.unit) or stated_unit(getattr(channel.conversion, "unit", None))
                     channels.append(Channel(name, n_samples, _load(file, number, index), unit, axis))
-            yield ChannelFile("MDF4", with_distinct_names(channels), tuple(refused))
+            yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _axis(file: Any, group: Any, number: int, master: int | None, n_samples: int) -> TimeAxis | None:

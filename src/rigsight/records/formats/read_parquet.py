@@ -16,7 +16,6 @@ from rigsight.records.formats.channel import (
     Refused,
     check_count,
     stated_unit,
-    with_distinct_names,
 )
 from rigsight.records.formats.time_stamps import seconds_since_first
 
@@ -46,7 +45,7 @@ def open_parquet(path: Path) -> Iterator[ChannelFile]:
             else:
                 unit = "s" if _is_time(column.type) else _unit(column.metadata)
                 channels.append(Channel(column.name, n_rows, _load(file, column.name), unit))
-        yield ChannelFile("Parquet", with_distinct_names(channels), tuple(refused))
+        yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _load(file: Any, name: str) -> Load:

@@ -16,7 +16,6 @@ from rigsight.records.formats.channel import (
     Refused,
     TimeAxis,
     stated_unit,
-    with_distinct_names,
 )
 from rigsight.records.formats.time_stamps import seconds_since_first
 
@@ -49,7 +48,7 @@ def open_tdms(path: Path) -> Iterator[ChannelFile]:
                 else:
                     unit = "s" if kind == "M" else _unit(channel.properties)
                     channels.append(Channel(name, len(channel), _load(channel, kind), unit, _axis(channel)))
-        yield ChannelFile("TDMS", with_distinct_names(channels), tuple(refused))
+        yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _load(channel: Any, kind: str) -> Load:

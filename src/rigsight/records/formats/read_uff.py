@@ -19,7 +19,6 @@ from rigsight.records.formats.channel import (
     check_count,
     check_size,
     stated_unit,
-    with_distinct_names,
 )
 
 LARGEST_FILE = 300_000_000
@@ -78,7 +77,7 @@ def open_uff(path: Path) -> Iterator[ChannelFile]:
             channels.append(_channel(path, file, i, name, header))
     if not types:
         raise ValueError("no dataset is complete")
-    yield ChannelFile("UFF", with_distinct_names(channels), tuple(refused))
+    yield ChannelFile(tuple(channels), tuple(refused))
 
 
 def _channel(path: Path, file: Any, number: int, name: str, header: dict[str, Any]) -> Channel:

@@ -21,7 +21,8 @@ from typing import IO, Any
 import numpy as np
 
 from rigsight.records.formats.channel import ChannelFile, TimeAxis
-from rigsight.records.formats.isolated_reader import PACKAGES, most_memory
+from rigsight.records.formats.isolated_reader import most_memory
+from rigsight.records.formats.known import PACKAGES, reader_of
 
 LONGEST_WORK = 600
 """Processor time [s]."""
@@ -39,7 +40,7 @@ def main(kind: str, path: Path) -> None:
 
         # The calling process ends a reader that loops; if it was killed, nothing does.
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_WORK, LONGEST_WORK))
-    reader = getattr(import_module(f"rigsight.records.formats.read_{kind}"), f"open_{kind}")
+    reader = reader_of(kind)
     try:
         # Before the limit is set: memory that libraries reserve for their threads does not depend on the file.
         import_module(PACKAGES[kind])
@@ -77,7 +78,6 @@ def _answer(answers: IO[bytes], content: dict[str, Any], data: bytes = b"") -> N
 
 def _contents(file: ChannelFile, axes: list[TimeAxis]) -> dict[str, Any]:
     return {
-        "format": file.format,
         "channels": [
             [one.name, one.n_samples, one.unit, None if one.axis is None else axes.index(one.axis)]
             for one in file.channels

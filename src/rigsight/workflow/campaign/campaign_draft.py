@@ -9,12 +9,12 @@ from pathlib import Path
 
 from rigsight.errors import InputError
 from rigsight.records import Role
-from rigsight.records.formats.channel_file import SUFFIXES
 from rigsight.records.formats.csv_channels import open_measurement
+from rigsight.records.formats.known import BY_SUFFIX
 from rigsight.rigs import Rig
 from rigsight.workflow.campaign.record_proposal import BLANK, Proposal, propose, quoted
 
-MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", *SUFFIXES)
+MEASURED_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc", *BY_SUFFIX)
 _SCORED = re.compile(r"valid|verif|test|check|pruef|prüf|score", re.IGNORECASE)
 
 

@@ -1,0 +1,167 @@
+"""Which notes stand beside a verdict: on the records, on how models were compared, and on what the verdict leaves open?
+
+A rule is one function that returns a sentence or None. A new one joins one of the two tuples; its sentence stands where the tuple
+is read in `verdict_notes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from rigsight.campaign import Campaign
+from rigsight.diagnose.data_quality.finding import DataQuality
+from rigsight.diagnose.fitting.fit_context import FitContext, Scored
+from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.search.predictability import growth_of_disturbances
+from rigsight.diagnose.verdict.judgement import Judgement
+from rigsight.identify.closed_loop import closed_loop_notes
+
+_REFERENCE_USED = (
+    "It is used as instrument when the frequency responses of two amplitudes are compared, if the input responds to it in both; "
+    "the responses in the report do not use it."
+)
+
+
+class _Found(Protocol):
+    """What a rule may read of an `Examination`; a further field of it is named here once a rule needs it."""
+
+    @property
+    def context(self) -> FitContext: ...
+    @property
+    def windowing(self) -> Windowing: ...
+    @property
+    def reidentified(self) -> Scored: ...
+    @property
+    def judgement(self) -> Judgement: ...
+    @property
+    def quality(self) -> DataQuality: ...
+    @property
+    def imitations(self) -> Sequence[Scored]: ...
+    @property
+    def doubts(self) -> Sequence[str]: ...
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What the notes are based on.
+
+    Attributes
+    ----------
+    campaign
+        Records and the given simulation.
+    found
+        What the examination found.
+    rng
+        For rules that simulate disturbances.
+    below_rest
+        The error of a model, in units of the noise floor measured at rest, that refuted this floor; None where none did.
+    """
+
+    campaign: Campaign
+    found: _Found
+    rng: np.random.Generator
+    below_rest: float | None = None
+
+
+Rule = Callable[[Basis], str | None]
+
+
+def verdict_notes(basis: Basis) -> tuple[str, ...]:
+    """Return all notes, in the order in which they are read."""
+    campaign, found = basis.campaign, basis.found
+    return (
+        *campaign.notes,
+        *(note for record in campaign.records for note in record.notes),
+        *closed_loop_notes(campaign.records, campaign.rig, _REFERENCE_USED),
+        *_told(ON_THE_COMPARISON, basis),
+        *found.quality.notes,
+        found.judgement.reason,
+        *found.doubts,
+        *_told(ON_WHAT_STAYS_OPEN, basis),
+    )
+
+
+def _told(rules: Sequence[Rule], basis: Basis) -> list[str]:
+    return [sentence for rule in rules if (sentence := rule(basis)) is not None]
+
+
+def open_factor_note(basis: Basis) -> str | None:
+    """Tell that a factor common to several parameters is open."""
+    factor = basis.campaign.open_factor
+    return None if factor is None else factor.sentence
+
+
+def moving_at_rest_note(basis: Basis) -> str | None:
+    """Tell that what was measured at rest is more than noise, because a model's error is smaller."""
+    if basis.below_rest is None:
+        return None
+    return (
+        f"A model's error is {basis.below_rest:.2g} of the noise floor measured at rest. So the rig was moving at rest, "
+        f"within its play or driven by a disturbance; the noise floor is taken from the top of the spectrum instead."
+    )
+
+
+def observer_note(basis: Basis) -> str | None:
+    """Tell that models are compared as observers."""
+    bandwidth = basis.found.windowing.bandwidth
+    if bandwidth is None:
+        return None
+    return (
+        f"The rig has no restoring force, so every model drifts in free run. Models are compared as observers: each tracks "
+        f"the measured motion up to {bandwidth:.3g} rad/s, so the errors are those that build up within "
+        f"{1.0 / bandwidth:.2g} s."
+    )
+
+
+def windows_note(basis: Basis) -> str | None:
+    """Tell that records are cut into windows of some cycles."""
+    cycles = basis.found.windowing.cycles
+    if cycles is None:
+        return None
+    return (
+        "In free run the motion is sensitive to small disturbances: one as small as the noise would change it by much more "
+        f"than the noise. The records are fitted and scored in windows of {cycles} cycles, each with its own "
+        "initial state."
+    )
+
+
+def sensitive_motion_note(basis: Basis) -> str | None:
+    """Tell that the error of the best model in free run may be chance, if the cause is unknown."""
+    found = basis.found
+    if found.windowing.cycles is not None or found.judgement.verdict != "unknown":
+        return None
+    growth = growth_of_disturbances(found.context, found.reidentified, found.judgement.model, basis.rng)
+    if growth <= VERDICT.sensitive:
+        return None
+    return (
+        f"The motion of the best model is sensitive to small disturbances: one as small as the noise changes it by "
+        f"{growth:.2g} times the noise, so its error may be chance. Record more motion or shorter records to find out."
+    )
+
+
+def imitations_note(basis: Basis) -> str | None:
+    """Tell which two effects imitate an unknown cause without being named."""
+    if basis.found.judgement.verdict != "unknown" or not basis.found.imitations:
+        return None
+    nearest = min(basis.found.imitations, key=lambda pair: pair.error_over_noise)
+    return (
+        f"Together {' and '.join(nearest.names)} leave {nearest.error_over_noise:.3g} times the noise floor, but they act as "
+        f"a single law, and other laws of this kind fit equally well, so they are not named."
+    )
+
+
+ON_THE_COMPARISON: tuple[Rule, ...] = (
+    open_factor_note,
+    moving_at_rest_note,
+    observer_note,
+    windows_note,
+    sensitive_motion_note,
+)
+"""How models were compared; read before the reason of the verdict."""
+ON_WHAT_STAYS_OPEN: tuple[Rule, ...] = (imitations_note,)
+"""Read after the reason of the verdict and the doubts about parameters."""

@@ -1,0 +1,122 @@
+"""Each rule tells its sentence where its condition holds, and nothing elsewhere."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigsight.diagnose.fitting.windows import Windowing
+from rigsight.diagnose.policy import VERDICT
+from rigsight.diagnose.verdict import verdict_notes as notes
+from rigsight.records import Record
+from rigsight.rigs import AXIS
+
+
+def basis(
+    verdict: str = "effect", *, below_rest: float | None = None, factor: Any = None, **found: Any
+) -> notes.Basis:
+    """What a rule reads, with nothing to tell about except what is given."""
+    campaign: Any = SimpleNamespace(
+        notes=("of the campaign",),
+        records=(Record(name="run", dt=0.1, signals={"u": np.zeros(3)}, units={}, notes=("of a record",)),),
+        rig=AXIS,
+        open_factor=factor,
+    )
+    judged = SimpleNamespace(verdict=verdict, reason="the reason", model=None)
+    found = {
+        "context": None,
+        "windowing": SimpleNamespace(bandwidth=None, cycles=None),
+        "reidentified": None,
+        "judgement": judged,
+        "quality": SimpleNamespace(notes=("of the quality",)),
+        "imitations": (),
+        "doubts": ("a doubt",),
+        **found,
+    }
+    return notes.Basis(campaign, SimpleNamespace(**found), np.random.default_rng(0), below_rest)
+
+
+@pytest.fixture
+def growth(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """How far disturbances grow, as a test sets it."""
+    chosen = SimpleNamespace(value=0.0)
+    monkeypatch.setattr(notes, "growth_of_disturbances", lambda *_: chosen.value)
+    return chosen
+
+
+def test_where_nothing_is_odd_no_rule_tells_anything() -> None:
+    plain = basis()
+    assert [rule(plain) for rule in (*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN)] == [None] * 6
+    expected = ("of the campaign", "of a record", "of the quality", "the reason", "a doubt")
+    assert notes.verdict_notes(plain) == expected
+
+
+def test_an_open_factor_is_told() -> None:
+    assert notes.open_factor_note(basis(factor=SimpleNamespace(sentence="It is open."))) == "It is open."
+
+
+def test_a_noise_floor_that_a_model_undercuts_is_told() -> None:
+    told = notes.moving_at_rest_note(basis(below_rest=0.31))
+    assert told is not None
+    assert "error is 0.31 of the noise floor measured at rest" in told
+
+
+def test_observers_are_told_with_the_time_over_which_errors_build_up() -> None:
+    told = notes.observer_note(basis(windowing=SimpleNamespace(bandwidth=4.0, cycles=None)))
+    assert told is not None
+    assert "up to 4 rad/s" in told
+    assert "within 0.25 s" in told
+
+
+def test_windows_are_told_with_their_cycles() -> None:
+    told = notes.windows_note(basis(windowing=Windowing.by_cycles({})))
+    assert told is not None
+    assert f"in windows of {VERDICT.window_cycles} cycles" in told
+
+
+def test_a_sensitive_motion_is_told_where_the_cause_is_unknown_and_records_are_whole(
+    growth: SimpleNamespace,
+) -> None:
+    growth.value = VERDICT.sensitive
+    assert notes.sensitive_motion_note(basis("unknown")) is None
+    growth.value = 40.0
+    told = notes.sensitive_motion_note(basis("unknown"))
+    assert told is not None
+    assert "changes it by 40 times the noise" in told
+    assert notes.sensitive_motion_note(basis("effect")) is None
+    assert notes.sensitive_motion_note(basis("unknown", windowing=Windowing.by_cycles({}))) is None
+
+
+def test_of_pairs_that_imitate_the_nearest_is_told_where_the_cause_is_unknown() -> None:
+    pairs = [SimpleNamespace(names=("a", name), error_over_noise=e) for name, e in (("b", 1.5), ("c", 1.25))]
+    told = notes.imitations_note(basis("unknown", imitations=pairs))
+    assert told is not None
+    assert told.startswith("Together a and c leave 1.25 times the noise floor")
+    assert notes.imitations_note(basis("effect", imitations=pairs)) is None
+
+
+def test_all_are_read_in_order_and_none_holds_a_brace(growth: SimpleNamespace) -> None:
+    """A brace would be a value that was not put in."""
+    growth.value = 40.0
+    pair = SimpleNamespace(names=("a", "b"), error_over_noise=1.5)
+    factor = SimpleNamespace(sentence="It is open.")
+    begun = []
+    for cycles in (None, 4):
+        full = basis(
+            "unknown", below_rest=0.3, factor=factor, imitations=(pair,),
+            windowing=SimpleNamespace(bandwidth=4.0, cycles=cycles),
+        )  # fmt: skip
+        told = notes.verdict_notes(full)
+        assert not [note for note in told if "{" in note or "}" in note]
+        begun.append([" ".join(note.split()[:3]) for note in told])
+    before = ["of the campaign", "of a record", "It is open.", "A model's error", "The rig has"]
+    after = ["of the quality", "the reason", "a doubt", "Together a and"]
+    assert begun == [[*before, "The motion of", *after], [*before, "In free run", *after]]
+
+
+def test_every_rule_is_called() -> None:
+    declared = {value for name, value in vars(notes).items() if name.endswith("_note")}
+    assert declared == {*notes.ON_THE_COMPARISON, *notes.ON_WHAT_STAYS_OPEN}
