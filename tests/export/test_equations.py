@@ -69,7 +69,7 @@ def test_a_description_ends_no_comment_and_no_string(target: str):
         own_model(["stiff"], 'a "b" */ c\n \\" """ d'), target, source='x"""*/\n\\y/model.json', name="rig"
     )
     assert isinstance(text, str)
-    if target in ("python", "control"):
+    if TARGETS[target].suffix == ".py":
         compile(text, "exported.py", "exec")
     assert '"b"' not in text
     assert "*/ c" not in text
