@@ -19,6 +19,7 @@ LONGEST_FILE = 600
 NAME_A_RIG = {
     "api/example.py": "the records of the ten lines of the README come from a virtual axis",
     "blind/campaign.py": "designs small and standard draw axes and running gears",
+    "blind/counted.py": "the rigs that the designs draw from",
     "blind/draw.py": "rolling effects are drawn on the running gear, the only built-in rig that rolls",
     "blind/handwritten/cells.py": "which rig each hidden effect of the handwritten design has",
     "blind/handwritten/plants.py": "whose equations are written by hand are built-in rigs",
@@ -64,6 +65,21 @@ def test_the_lock_pins_every_package_and_names_no_place(lock: str) -> None:
         assert "==" in line
         assert "://" not in line
         assert "file:" not in line
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout of git")
+def test_git_has_every_file() -> None:
+    """A commit without one of its files could not be imported, whatever .gitignore says."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--others", "-x", "__pycache__", "-x", "*.egg-info", "src", "tests"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if listed.returncode:
+        pytest.skip("git cannot be run here")
+    assert not listed.stdout, f"Add these files with git add, or remove them:\n{listed.stdout}"
 
 
 def test_every_language_is_printed_in_one_place() -> None:

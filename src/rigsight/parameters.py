@@ -25,7 +25,7 @@ class Parameter:
     description
         What the number means, one line.
     lower, upper
-        Physically admissible range; the simulation stays finite on all of it.
+        Physically admissible range. That the simulation stays finite is checked over `search`.
     null
         Value at which the effect that owns the parameter vanishes; None if another of its parameters does that.
     default

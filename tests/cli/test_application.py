@@ -37,6 +37,13 @@ def test_help_lists_the_commands() -> None:
         assert command in shown.stdout
 
 
+def test_the_package_runs_as_a_module() -> None:
+    shown = subprocess.run(
+        [sys.executable, "-m", "rigsight", "--version"], capture_output=True, text=True, check=True
+    )
+    assert shown.stdout.startswith("rigsight ")
+
+
 def test_help_imports_nothing_heavy() -> None:
     code = "import sys, rigsight.cli; sys.exit(bool({'numpy', 'sympy', 'pydantic', 'sqlite3'} & sys.modules.keys()))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -3,33 +3,52 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from rigsight.export import TARGETS
+from rigsight.export.targets import DELAY
+from rigsight.workflow.export import ROBOT_TARGETS
+
+FMUS = {name for name, target in TARGETS.items() if target.suffix == ".fmu"}
 Run = Callable[..., tuple[int, str, str]]
 
 
-@pytest.mark.parametrize(
-    ("target", "suffix", "part"),
-    [
-        ("python", ".py", "def simulate(t, u,"),
-        ("control", ".py", "system = control.NonlinearIOSystem("),
-        ("c", ".c", "int stage_step(stage_model *m"),
-        ("matlab", ".m", "function [outputs, states] = stage(t, u,"),
-        ("latex", ".tex", r"\begin{align*}"),
-        ("modelica", ".mo", "model stage "),
-    ],
-)
+PARTS = {
+    "python": "def simulate(t, u,",
+    "control": "system = control.NonlinearIOSystem(",
+    "c": "int stage_step(stage_model *m",
+    "matlab": "function [outputs, states] = stage(t, u,",
+    "latex": r"\begin{align*}",
+    "modelica": "model stage ",
+}
+"""Words that show the language; of another target its own name is looked for."""
+
+
+@pytest.mark.parametrize("target", [name for name in TARGETS if name not in FMUS])
 def test_a_file_is_written_and_named(
-    target: str, suffix: str, part: str, write_model: Callable[..., Path], tmp_path: Path, run: Run
+    target: str, write_model: Callable[..., Path], tmp_path: Path, run: Run
 ) -> None:
-    out = tmp_path / "new" / f"stage{suffix}"
+    out = tmp_path / "new" / f"stage{TARGETS[target].suffix}"
     code, stdout, stderr = run("export", write_model(), "--to", target, "--out", out)
     assert (code, stderr) == (0, "")
     assert stdout == f"{target}: {out}\n"
-    assert part in out.read_text(encoding="utf-8")
+    assert PARTS.get(target, "stage" if TARGETS[target].named else "") in out.read_text(encoding="utf-8")
+
+
+def test_help_names_every_target(run: Run) -> None:
+    """Help cannot read `TARGETS`: it would take a second to load."""
+    _, text, _ = run("export", "--help")
+    described = {
+        option.split()[0]: set(re.findall(r"\w+", option)) for option in re.split(r"\n  (?=-)", text)
+    }
+    stepping = {name for name, target in TARGETS.items() if target.fixed_step}
+    for option, expected in (("--to", {*TARGETS, *ROBOT_TARGETS}), ("--step", stepping)):
+        missing = expected - described[option]
+        assert not missing, f"Name {missing} in the help of {option} in cli/export.py."
 
 
 def test_the_folder_of_a_model_and_a_default_name_do(
@@ -106,7 +125,8 @@ def test_an_effect_that_a_target_cannot_say_is_named(
     code, _, stderr = run("export", model, "--to", "control", "--out", tmp_path / "stage.py")
     assert code == 2
     assert "'input_delay' cannot be exported to control" in stderr
-    assert "python, c, fmu, fmu3, matlab, latex, modelica" in stderr
+    able = ", ".join(name for name, target in TARGETS.items() if DELAY not in target.lacks)
+    assert f"Targets with it: {able}." in stderr
 
 
 def test_without_a_compiler_an_fmu_of_sources_is_offered(

@@ -5,16 +5,9 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
-import sympy as sp
 
-from rigsight.effects import CATALOGUE, kind_of
 from rigsight.export import export_model
 
-REFUSED = {e.name for e in CATALOGUE if e.torque is not None and e.torque.has(sp.sign)} | {
-    "input_delay",
-    "sensor_delay",
-    "time_shift",
-}
 SMOOTH, KINKED = 1e-6, 1e-4
 """A solver that knows no events crosses kinks with the error of its step."""
 
@@ -25,8 +18,8 @@ def system_of(case):
     return space["system"], space["REST"]
 
 
-def test_it_gives_the_outputs_of_the_engine(case):
-    if REFUSED.intersection(map(kind_of, case.model.structure.effect_names)):
+def test_it_gives_the_outputs_of_the_engine(case, refused):
+    if refused(case, "control"):
         pytest.skip("friction and delays are refused, which test_targets.py tests")
     if case.model.hold == "zoh" or case.inputs[0][0] != 0.0 or case.model.structure.rig.mechanism.prescribed:
         pytest.skip("python-control interpolates linearly and starts at rest without input")

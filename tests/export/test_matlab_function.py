@@ -22,19 +22,17 @@ pytestmark = [
 N_SAMPLES = 41
 LONG_STARTS = {"offsets", "start under load"}
 """Starts that are sought over tens of thousands of steps: a minute each in Octave, and left to the other languages."""
-LEFT_OUT = {*LONG_STARTS, "friction at two joints"}
-"""Also what is refused, which test_targets.py tests."""
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, case_named, case_names) -> Path:
+def results(tmp_path_factory, case_named, case_names, refused) -> Path:
     """The folder with the outputs of all models, out of one session of Octave, which takes a second to start."""
     folder = tmp_path_factory.mktemp("octave")
     script = ["warning('off', 'all');"]
     for i, name in enumerate(case_names):
-        if name in LEFT_OUT:
-            continue
         case = case_named(name)
+        if name in LONG_STARTS or refused(case, "matlab"):
+            continue
         text = export_model(case.model, "matlab", source="model.json", name=f"rig{i}")
         assert isinstance(text, str)
         (folder / f"rig{i}.m").write_text(text, encoding="utf-8")
@@ -58,8 +56,8 @@ def results(tmp_path_factory, case_named, case_names) -> Path:
     return folder
 
 
-def test_it_gives_the_outputs_of_the_engine(case, case_names, results: Path):
-    if case.name in LEFT_OUT:
+def test_it_gives_the_outputs_of_the_engine(case, case_names, refused, results: Path):
+    if case.name in LONG_STARTS or refused(case, "matlab"):
         pytest.skip("seeking this start takes Octave a minute, or it is refused")
     table = np.loadtxt(results / f"out{case_names.index(case.name)}.txt", ndmin=2)
     assert table.shape == (N_SAMPLES, len(case.outputs))

@@ -6,15 +6,12 @@ import re
 
 import numpy as np
 import pytest
-import sympy as sp
 
-from rigsight.effects import CATALOGUE, kind_of
 from rigsight.export import export_model
 from rigsight.records import Record
 from rigsight.simulate import simulate
 
 DT = 1e-3
-REFUSED = {e.name for e in CATALOGUE if e.torque is not None and e.torque.has(sp.sign)}
 
 
 def text_of(case) -> str:
@@ -23,13 +20,9 @@ def text_of(case) -> str:
     return text
 
 
-def expressible(case) -> bool:
-    return not REFUSED.intersection(map(kind_of, case.model.structure.effect_names))
-
-
-def test_each_unknown_has_one_equation_and_each_state_a_start(case):
-    if not expressible(case):
-        pytest.skip("dry friction is refused, which test_targets.py tests")
+def test_each_unknown_has_one_equation_and_each_state_a_start(case, refused):
+    if refused(case, "modelica"):
+        pytest.skip("what sticks is refused, which test_targets.py tests")
     text = text_of(case)
     head, _, body = text.partition("\nequation\n")
     declared = re.findall(r"^  (?:output )?Real (\w+)", head, re.MULTILINE)
@@ -55,11 +48,11 @@ def test_an_output_like_a_state_is_that_state(case_named):
     assert "output Real psi_measured" in text_of(case_named("sensor_delay"))
 
 
-def test_it_moves_as_in_the_engine(case):
+def test_it_moves_as_in_the_engine(case, refused):
     rumoca = pytest.importorskip("rumoca", reason="no Modelica compiler is installed (pip install rumoca)")
     structure = case.model.structure
     if (
-        not expressible(case)
+        refused(case, "modelica")
         or structure.rig.mechanism.prescribed
         or len(case.inputs) != 1
         or case.inputs[0][0] != 0.0

@@ -1,4 +1,4 @@
-"""Hidden effects of the trials of design ``rigs``: every rig with effects at every kind of its places."""
+"""Hidden effects of the trials of design ``rigs``: every counted rig with effects at every kind of its places."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from rigsight.blind.counted import COUNTED_RIGS, counted_effects
 from rigsight.blind.outside import OUTSIDE
 from rigsight.blind.subjects import NOISES, Kind, Noise, Tier
 from rigsight.diagnose.fitting.placed_effects import candidates_on
-from rigsight.effects import CATALOGUE, Effect, Place, kind_of, placed
+from rigsight.effects import Effect, Place, kind_of, placed
 from rigsight.rigs import RIGS, Rig
 
 Item = TypeVar("Item")
@@ -52,8 +53,8 @@ def placed_cells() -> tuple[PlacedSubject, ...]:
     The control is in turn no gap and wrong parameters, what is harder in turn two effects and one from outside.
     """
     cells: list[PlacedSubject] = []
-    for number, name in enumerate(RIGS):
-        offered = candidates_on(RIGS[name], CATALOGUE)
+    for number, name in enumerate(COUNTED_RIGS):
+        offered = candidates_on(RIGS[name], counted_effects())
         kinds = [place for place in Place if any(effect.place is place for effect in offered)]
         rows: list[tuple[Kind, Place | None, Tier | None]] = [
             ("single", place, tier) for place in kinds for tier in _TIERS
@@ -88,7 +89,7 @@ def draw_effects(rig: Rig, subject: PlacedSubject, rng: np.random.Generator) -> 
     """
     if subject.kind in ("none", "parameters"):
         return ()
-    offered = candidates_on(rig, CATALOGUE)
+    offered = candidates_on(rig, counted_effects())
     if subject.kind == "outside":
         return (_any_of(_outside_on(rig), rng),)
     if subject.kind == "single":

@@ -15,7 +15,7 @@ from rigsight.blind.laboratory.trial import draw_laboratory_trial
 from rigsight.errors import check_option
 
 Design = Literal["small", "standard", "joints", "rigs", "laboratory", "handwritten"]
-"""Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every built-in rig,
+"""Three on the running gear or an axis (`joints`: effects of servo and robot joints), one at all places of every counted rig,
 one with records as laboratories take them, one with plants whose equations are written by hand."""
 
 

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from rigsight.blind.counted import RELATED, counted_effects
 from rigsight.blind.outside import OUTSIDE
 from rigsight.effects import CATALOGUE, Effect, Place, effect_named
 from rigsight.errors import check_option
@@ -15,17 +16,13 @@ Kind = Literal["single", "pair", "none", "parameters", "outside"]
 Tier = Literal["faint", "clear", "strong"]
 Noise = Literal["low", "high"]
 CatalogueDesign = Literal["small", "standard", "joints"]
-"""Lists of cells on the running gear or an axis; together they contain every effect of the catalogue that is distinguishable
-there."""
+"""Lists of cells on the running gear or an axis; together they contain every counted effect that is distinguishable there."""
 
 OF_JOINTS = frozenset({
     "encoder_eccentricity", "load_dependent_friction", "maxwell_branch", "power_law_stiffness", "presliding_friction",
     "speed_limit", "time_shift", "torque_ripple",
 })  # fmt: skip
-"""Effects of measured servo and robot joints, which the catalogue got later.
-
-They have a design of their own, so that the trials of the two others stay those that were counted before.
-"""
+"""Effects of measured servo and robot joints, which have a design of their own: the two others were counted before."""
 ELSEWHERE = frozenset({"directional_friction", "inertia"})
 """Effects that neither rig has: friction that differs each way is a rest position there, and the motion is not prescribed."""
 
@@ -40,7 +37,6 @@ _COUNTS: dict[CatalogueDesign, dict[str, int]] = {
     "joints": {"pair": 0, "none": 4, "parameters": 4, "outside": 1},
 }
 """Trials of each kind besides three strengths at two noise levels of each single effect; outside: of each effect."""
-_HYSTERESES = frozenset({"bouc_wen_hysteresis", "iwan_hysteresis"})
 
 
 @dataclass(frozen=True)
@@ -117,7 +113,7 @@ def _cells(design: CatalogueDesign) -> list[Subject]:
 
 def _singles(design: str) -> tuple[Effect, ...]:
     later = design == "joints"
-    return tuple(e for e in CATALOGUE if e.name not in ELSEWHERE and (e.name in OF_JOINTS) == later)
+    return tuple(e for e in counted_effects() if e.name not in ELSEWHERE and (e.name in OF_JOINTS) == later)
 
 
 def _pair(rng: np.random.Generator) -> tuple[str, ...]:
@@ -131,12 +127,10 @@ def _pair(rng: np.random.Generator) -> tuple[str, ...]:
 
 
 def _tells_apart(first: Effect, second: Effect) -> bool:
-    related = first.name in second.parents or second.name in first.parents
-    both_hysteresis = {first.name, second.name} <= _HYSTERESES
+    names = frozenset({first.name, second.name})
     # The weight's sine needs an axis that swings wide, the wheel and the second sensor a running gear.
-    names = {first.name, second.name}
     other_rig = "gravity_pendulum" in names and any(needs_running_gear(e) for e in (first, second))
-    return not (related or both_hysteresis or other_rig)
+    return not (names in RELATED or other_rig)
 
 
 def needs_running_gear(effect: Effect) -> bool:

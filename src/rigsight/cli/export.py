@@ -73,7 +73,7 @@ def export(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Write a model for other tools: Python, python-control, C, an FMU, MATLAB, LaTeX, Modelica, MuJoCo or Isaac Lab.
+    """Write a model for other tools, such as C, MATLAB, an FMU or MuJoCo.
 
     One file, with the equations, the numbers and their units, and nothing of rigsight needed to run it. mjcf and isaac write the
     numbers and effects into the fields that MuJoCo and Isaac Lab have for them, and say what they have no field for.

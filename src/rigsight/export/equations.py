@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
 
 import sympy as sp
@@ -11,7 +11,6 @@ import sympy as sp
 from rigsight.effects import Place
 from rigsight.errors import InputError
 from rigsight.export.equilibrium import Balance, balance
-from rigsight.export.reserved_words import RESERVED
 from rigsight.parameters import Parameter
 from rigsight.rigs import Rig
 from rigsight.simulate import parameter_vector
@@ -167,7 +166,7 @@ def _check_delays(structure: Structure) -> None:
         )
 
 
-def exported(model: Model, hold: Hold, step: float) -> Exported:
+def exported(model: Model, hold: Hold, step: float, reserved: Set[str]) -> Exported:
     """Return a model in the form that every target prints.
 
     Parameters
@@ -178,6 +177,8 @@ def exported(model: Model, hold: Hold, step: float) -> Exported:
         How the input behaves between its samples.
     step
         Longest internal step [s].
+    reserved
+        Words that no name can be, those of all targets: a name is the same in each of them.
 
     Raises
     ------
@@ -186,9 +187,9 @@ def exported(model: Model, hold: Hold, step: float) -> Exported:
     """
     structure, values = without_vanished_effects(model.structure, model.values)
     _check_delays(structure)
-    names = _Names()
+    names = _Names(reserved)
     sources = _sources(structure.rig, names)
-    shown = _Names()
+    shown = _Names(reserved)
     outputs = [shown.quantity(s.name, s.name, s.unit, s.description) for s in structure.rig.outputs]
     parameters = tuple(names.quantity(p.name, p.name, p.unit, p.description) for p in structure.parameters)
     units = _state_units(structure)
@@ -265,7 +266,8 @@ class _Names:
     Outputs have their own, as most are the state of the same name.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, reserved: Set[str]) -> None:
+        self._reserved = reserved
         self._used: set[str] = set()
 
     def quantity(self, wished: str, source: str, unit: str, description: str) -> Quantity:
@@ -275,7 +277,7 @@ class _Names:
             name = f"n_{name}"
         while (
             name in self._used
-            or name in RESERVED
+            or name in self._reserved
             or re.fullmatch(r"(part|constant_)\d+|part(_[a-z]+)+(_\d+)+", name)
         ):
             name += "_"

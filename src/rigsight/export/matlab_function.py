@@ -13,9 +13,16 @@ from rigsight.export.equilibrium import NO_START, Balance
 from rigsight.export.friction import friction_mode, friction_sign, held_velocity, slip_rate, slope_symbol
 from rigsight.export.precomputed import equations_of
 from rigsight.export.python_function import min_steps
+from rigsight.export.reserved_words import words
 from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.matlab import MATLAB
 from rigsight.simulate.structure import TIME, input_symbols
+
+WORDS = words(
+    """break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd
+    switch try while"""
+)
+"""Of the language."""
 
 _ALL_PIECES = """function c = input_pieces(n, dt{inputs}) %#ok<INUSL>
 % Inputs between samples as cubics of the time since each sample [s]: rows of c(:, :, sample), one for each input.

@@ -7,10 +7,19 @@ import re
 from rigsight.export.at_rest import state_at_rest
 from rigsight.export.description import header_lines
 from rigsight.export.equations import Exported, Quantity
+from rigsight.export.reserved_words import words
 from rigsight.simulate.printing.language import part_name
 from rigsight.simulate.printing.modelica import MODELICA
 from rigsight.simulate.straight_line import StraightLine, straight_line
 from rigsight.simulate.structure import INPUT
+
+WORDS = words(
+    """algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif
+    elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if import in
+    initial inner input loop model not operator or outer output package parameter partial protected public pure record
+    redeclare replaceable return stream then time true type when while within"""
+)
+"""Of the language."""
 
 
 def modelica(exported: Exported, source: str, name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Mapping
 from importlib.resources import files
 
@@ -17,6 +18,8 @@ from rigsight.simulate.equilibrium import BALANCED
 from rigsight.simulate.printing.python import PYTHON
 from rigsight.simulate.structure import TIME, input_symbols
 
+WORDS = frozenset(keyword.kwlist)
+"""Of the language."""
 MIN_STEPS = 4
 """Steps per sample of a model with kinks or products, whose time scales depend on the motion."""
 MIN_STEPS_PRESCRIBED = 32

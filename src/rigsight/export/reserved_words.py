@@ -1,33 +1,22 @@
-"""Names that parameters, states and models cannot have, because a language or a template uses them."""
+"""Names that parameters, states and models cannot have, because several targets use them."""
 
 from __future__ import annotations
 
-import keyword
 
-
-def _words(text: str) -> frozenset[str]:
+def words(text: str) -> frozenset[str]:
+    """Return the words of a text."""
     return frozenset(text.split())
 
 
-C = _words(
+_C = words(
     """auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
 )
-MATLAB = _words(
-    """break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd
-    switch try while"""
-)
-MODELICA = _words(
-    """algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif
-    elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if import in
-    initial inner input loop model not operator or outer output package parameter partial protected public pure record
-    redeclare replaceable return stream then time true type when while within"""
-)
-_OF_TEMPLATES = _words(
+_OF_TEMPLATES = words(
     """input_value input_rate input_curvature friction_sign sign_of rates switches outputs limits modes state math np control
     numbers given max min abs sign pi eps delay"""
 )
-_C_MACROS = _words(
+_C_MACROS = words(
     """BUFSIZ EOF EXIT_FAILURE EXIT_SUCCESS EXPORTED FILENAME_MAX FOPEN_MAX FP_INFINITE FP_NAN FP_NORMAL FP_SUBNORMAL FP_ZERO
     HUGE_VAL HUGE_VALF HUGE_VALL INFINITY L_tmpnam MATH_ERREXCEPT MATH_ERRNO NAN NULL RAND_MAX SEEK_CUR SEEK_END SEEK_SET
     TMP_MAX bool linux math_errhandling stderr stdin stdout unix
@@ -37,5 +26,5 @@ _C_MACROS = _words(
     FRICTION_VELOCITIES GENERATIONS INDEPENDENT MOST_REPEATS NOISE N_DEGREES N_FRICTIONS N_LATE PROBE READS_LATE_RATE
     SIZE_FRICTIONS"""
 )
-RESERVED = C | _C_MACROS | MATLAB | MODELICA | _OF_TEMPLATES | frozenset(keyword.kwlist)
-"""A name inside an export is none of these, so that it is the same in all of them."""
+SHARED = _C | _C_MACROS | _OF_TEMPLATES
+"""What the text of the engine and the templates use; the words of a language stand in the module that writes it."""

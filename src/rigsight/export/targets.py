@@ -17,12 +17,16 @@ from rigsight.export.equations import Exported, exported, harmless
 from rigsight.export.fmu import Version, fmu
 from rigsight.export.internal_step import LONGEST, internal_step
 from rigsight.export.latex import latex
+from rigsight.export.matlab_function import WORDS as MATLAB
 from rigsight.export.matlab_function import matlab_function
+from rigsight.export.modelica import WORDS as MODELICA
 from rigsight.export.modelica import modelica
+from rigsight.export.python_function import WORDS as PYTHON
 from rigsight.export.python_function import python_function
-from rigsight.export.reserved_words import MATLAB, MODELICA
-from rigsight.simulate import Structure
+from rigsight.export.reserved_words import SHARED
+from rigsight.simulate import Structure, compose
 from rigsight.simulate.input_hold import Hold
+from rigsight.simulate.kinks import freeze
 from rigsight.simulate.model import Model
 from rigsight.simulate.structure import input_symbols
 
@@ -35,7 +39,6 @@ ACCELERATION = "the acceleration of a prescribed motion"
 FELT_ACCELERATION = "forces that go with the acceleration of a prescribed motion"
 """Known once the next sample is: what runs along with its input has none at a sample."""
 _SHORTEST = 1e-9
-_RESERVED = {"matlab": MATLAB, "modelica": MODELICA}
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class Target:
         Text or bytes for the model, the name of its source and its own name.
     lacks
         What it is written without.
+    words
+        Words of its language, which no name in any export is; those of C are in `rigsight.export.reserved_words`.
     steps
         True if it goes from sample to sample itself, so that the hold of the input is its business.
     fixed_step
@@ -63,6 +68,7 @@ class Target:
     summary: str
     write: Callable[[Exported, str, str], str | bytes]
     lacks: frozenset[str] = frozenset()
+    words: frozenset[str] = frozenset()
     steps: bool = True
     fixed_step: bool = False
     named: bool = True
@@ -73,11 +79,12 @@ TARGETS: dict[str, Target] = {
     for target in (
         Target(
             "python", ".py", "a Python function; needs numpy", lambda e, s, _: python_function(e, s),
-            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), fixed_step=True, named=False,
+            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), words=PYTHON, fixed_step=True, named=False,
         ),
         Target(
             "control", ".py", "a python-control NonlinearIOSystem", control_system,
-            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY, ACCELERATION, FELT_ACCELERATION}), steps=False, named=False,
+            lacks=frozenset({STICKING, DELAY, SENSOR_DELAY, ACCELERATION, FELT_ACCELERATION}), words=PYTHON, steps=False,
+            named=False,
         ),
         Target("c", ".c", "one C99 file without dependencies", c_source, lacks=frozenset({FELT_ACCELERATION})),
         Target("fmu", ".fmu", "an FMU: FMI 2.0, co-simulation", fmu, lacks=frozenset({FELT_ACCELERATION})),
@@ -86,16 +93,18 @@ TARGETS: dict[str, Target] = {
         ),
         Target(
             "matlab", ".m", "a MATLAB function; Octave runs it too", matlab_function,
-            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), fixed_step=True,
+            lacks=frozenset({STICKING_TOGETHER, FELT_ACCELERATION}), words=MATLAB, fixed_step=True,
         ),
         Target("latex", ".tex", "equations and numbers for a document", lambda e, s, _: latex(e, s), steps=False, named=False),
         Target(
             "modelica", ".mo", "a Modelica model", modelica,
-            lacks=frozenset({STICKING, ACCELERATION, FELT_ACCELERATION}), steps=False,
+            lacks=frozenset({STICKING, ACCELERATION, FELT_ACCELERATION}), words=MODELICA, steps=False,
         ),
     )
 }  # fmt: skip
 """In the order in which they are shown."""
+RESERVED = SHARED.union(*(target.words for target in TARGETS.values()))
+"""A name inside an export is none of these, so that it is the same in all of them."""
 
 
 def export_model(
@@ -146,7 +155,7 @@ def export_model(
         _check_name(chosen, name)
     if step is not None:
         _check_step(chosen, step)
-    content = exported(model, _hold(chosen, model, hold), step or LONGEST)
+    content = exported(model, _hold(chosen, model, hold), step or LONGEST, RESERVED)
     _check_expressible(chosen, content)
     if step is None and chosen.fixed_step:
         content = replace(content, step=internal_step(model))
@@ -173,7 +182,7 @@ def unsaid(content: Exported) -> dict[str, str]:
     structure: Structure = content.structure
     found = {}
     if content.frictions:
-        dry = [e.name for e in structure.effects if e.torque is not None and e.torque.has(sp.sign)]
+        dry = _sticking(content)
         found[STICKING] = (dry or [structure.rig.name])[0]
         if len(content.frictions) > 1:
             found[STICKING_TOGETHER] = "' and '".join(dry) or structure.rig.name
@@ -190,6 +199,15 @@ def unsaid(content: Exported) -> dict[str, str]:
         if effect.reading_delay is not None:
             found[SENSOR_DELAY] = effect.name
     return found
+
+
+def _sticking(content: Exported) -> list[str]:
+    """Return the effects that stick: a sign without a jump at v = 0 is damping."""
+    structure = content.structure
+    found = [e for e in structure.effects if e.torque is not None and e.torque.has(sp.sign)]
+    if len(found) > len(content.frictions):
+        found = [e for e in found if freeze(compose(structure.rig, [e])).frictions]
+    return [e.name for e in found]
 
 
 def _check_expressible(target: Target, content: Exported) -> None:
@@ -236,7 +254,7 @@ def _check_name(target: Target, name: str) -> None:
             f"'{name}' cannot be the name of a {target.name} model, which is that of its file: letters, digits and underscores, "
             "a letter first, at most 60. Name another file with --out."
         )
-    if name in _RESERVED.get(target.name, ()):
+    if name in target.words:
         raise InputError(
             f"'{name}' is a word of the language and no name for a {target.name} model. Name another file with --out."
         )

@@ -398,6 +398,29 @@ def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callabl
         read_campaign(folder)
 
 
+@pytest.mark.parametrize(
+    ("moved", "before", "told"),
+    [
+        (
+            "b = 0.3",
+            "J_z = 0.56",
+            "rig.parameters.b: unknown to .*It is a constant: give it under rig.constants.",
+        ),
+        (
+            "J_z = 0.56",
+            "b = 0.3",
+            "rig.constants.J_z: unknown to .*It is a parameter: give it under rig.parameters.",
+        ),
+    ],
+)
+def test_a_number_in_the_table_of_the_others_is_told(
+    moved: str, before: str, told: str, campaign: Callable[..., Path]
+) -> None:
+    text = (HEAD + RECORDS).replace(f"{moved}\n", "").replace(before, f"{before}\n{moved}")
+    with pytest.raises(InputError, match=told):
+        read_campaign(campaign(text))
+
+
 def test_what_is_missing_is_told_with_the_line_of_its_table(campaign: Callable[..., Path]) -> None:
     text = (HEAD + RECORDS).replace("b = 0.3\n", "")
     line = 1 + text.splitlines().index("[rig.constants]")

@@ -11,9 +11,10 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from rigsight.blind.counted import counted_effects
 from rigsight.blind.laboratory.stands import STANDS, Stand
 from rigsight.diagnose.fitting.placed_effects import candidates_on
-from rigsight.effects import CATALOGUE, Effect, Place, kind_of
+from rigsight.effects import Effect, Place, kind_of
 from rigsight.rigs import joint_of
 
 Item = TypeVar("Item")
@@ -39,7 +40,7 @@ FAMILIES: dict[Family, frozenset[str]] = {
     "sensor": frozenset({"sensor_delay", "sensor_lag", "time_shift", "encoder_eccentricity"}),
     "rolling": frozenset({"creep_saturation", "conicity_variation"}),
 }  # fmt: skip
-"""Effects that are rivals of one another."""
+"""Effects that are rivals of one another; together with `NEVER` those that were counted, and no later ones."""
 NEVER = frozenset({"gravity_pendulum"})
 """It needs a swing of a radian, which no stand makes; the standard design has it."""
 _LATE = frozenset({"sensor_delay", "sensor_lag", "time_shift"})
@@ -160,7 +161,7 @@ def effects_shown(stand: Stand, family: Family) -> list[Effect]:
     family
         Family of effects.
     """
-    offered = [e for e in candidates_on(stand.rig, CATALOGUE) if kind_of(e.name) in FAMILIES[family]]
+    offered = [e for e in candidates_on(stand.rig, counted_effects()) if kind_of(e.name) in FAMILIES[family]]
     return [effect for effect in offered if not _has_a_double(stand, effect)]
 
 

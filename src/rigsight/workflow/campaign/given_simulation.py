@@ -65,6 +65,7 @@ def checked_simulation(
     InputError
         Naming the key of what is unknown, missing or out of range, and what is allowed.
     """
+    _check_tables(where, rig, constants, parameters)
     known = _constants(where, rig, constants, of_records)
     try:
         structure = compose(rig, modelled)
@@ -106,6 +107,24 @@ def checked_numbers(
         except InputError as error:
             raise InputError(f"{here}: {error}") from None
     return checked
+
+
+def _check_tables(
+    where: Where, rig: Rig, constants: Mapping[str, float], parameters: Mapping[str, float]
+) -> None:
+    """Refuse a constant among the parameters, and a parameter among the constants, before one of them counts as missing."""
+    own_constants = {constant.name for constant in rig.constants}
+    own_parameters = {parameter.name for parameter in (*rig.parameters, *rig.alternative_parameters)}
+    for table, given, others, kind in (
+        ("parameters", parameters, own_constants - own_parameters, "constant"),
+        ("constants", constants, own_parameters - own_constants, "parameter"),
+    ):
+        for name in given:
+            if name in others:
+                raise InputError(
+                    f"{where.at('rig', table, name)}: unknown to {rig.name} under rig.{table}. It is a {kind}: give it under "
+                    f"rig.{kind}s."
+                )
 
 
 def _constants(
