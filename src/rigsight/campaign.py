@@ -1,4 +1,4 @@
-"""What is a campaign: one rig, its known numbers, the simulation in question, and the records about it?"""
+"""What is a campaign: one rig, its known numbers, the given simulation, and the records about it?"""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Campaign:
     records
         In the order of the file, with distinct names.
     modelled
-        Effects that the simulation in question has already; `parameters` holds all their values.
+        Effects that the given simulation has already; `parameters` holds all their values.
     path
         The toml file; None for a campaign that was made of records in memory.
     notes

@@ -81,7 +81,7 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
         (["init"], "Name the FOLDER"),
         (["export", "MODEL", "--to", "mjcf"], "name the MJCF or URDF file"),
         (["export", "MODEL", "--to", "mjcf", "--mjcf", CART], "has a joint"),
-        (["export", "MODEL", "--to", "mjcf", "--mjcf", CART, "--hold", "zoh"], "say nothing of mjcf"),
+        (["export", "MODEL", "--to", "mjcf", "--mjcf", CART, "--hold", "zoh"], "do not apply to mjcf"),
         (["export", "MODEL", "--to", "c", "--mjcf", CART], "leave it out for c"),
     ],
 )
@@ -152,7 +152,7 @@ def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run
     campaign.write_text(said.replace('simulator = "mujoco"', 'simulator = "fmu"'), "utf-8")
     code, _, stderr = run("identify", folder, "--out", tmp_path / "out")
     assert code == 2
-    assert "simulator is 'fmu'; the rig file leaves its bodies to mujoco" in stderr
+    assert "simulator is 'fmu', but the rig file simulates its bodies with mujoco" in stderr
     campaign.write_text(said.replace('simulator = "mujoco"', "#"), "utf-8")
     code, _, stderr = run("identify", folder, "--out", tmp_path / "out")
     assert code == 2

@@ -31,7 +31,7 @@ def compare_models(
     Parameters
     ----------
     campaign
-        A campaign, or the toml file or the folder that holds one.
+        A campaign, or the toml file or the folder that contains one.
     models
         Name -> model; or files, folders and names of published sets, as on the command line.
     method

@@ -109,7 +109,7 @@ def campaign_of(
     Parameters
     ----------
     campaign
-        A campaign, the toml file or the folder that holds one, or records of `rig`.
+        A campaign, the toml file or the folder that contains one, or records of `rig`.
     own_effects
         Effects that it may name beside those of the catalogue.
     rig

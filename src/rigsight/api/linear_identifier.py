@@ -78,7 +78,7 @@ class LinearIdentifier(CampaignEstimator):
         Parameters
         ----------
         campaign
-            A campaign, the toml file or the folder that holds one, or records of `rig`.
+            A campaign, the toml file or the folder that contains one, or records of `rig`.
 
         Returns
         -------

@@ -233,7 +233,7 @@ class _Bench:
     def given(
         self, subject: PlacedSubject, seen: Sequence[Record], refit: FitResult, rng: np.random.Generator
     ) -> dict[str, float]:
-        """Return the simulation in question: fitted to one sweep, well fitted to all, or with numbers that are off."""
+        """Return the given simulation: fitted to one sweep, well fitted to all, or with numbers that are off."""
         sweeps = [r for r in seen if r.kind == "sweep" and r.role == "estimation"]
         one = sweeps[int(rng.integers(len(sweeps)))]
         parameters = self.rig.parameters

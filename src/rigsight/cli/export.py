@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def export(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
+        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that contains one.")
     ],
     to: Annotated[
         str,

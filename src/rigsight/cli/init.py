@@ -111,9 +111,7 @@ def init(
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")
     if draft.n_blanks:
-        typer.echo(
-            f'Replace each "FILL IN" ({draft.n_blanks} times) in it. Then: rigsight diagnose {folder}'
-        )
+        typer.echo(f'Replace each "FILL IN" ({draft.n_blanks} times) in it. Then: rigsight diagnose {folder}')
     else:
         typer.echo(f"Check the comments in it. Then: rigsight diagnose {folder}")
 

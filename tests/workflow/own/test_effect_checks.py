@@ -51,7 +51,7 @@ def test_the_effect_has_to_fade_towards_its_null_value():
         replace(SECOND_DAMPER, parameters=(replace(DAMPING, null=30.0, starts=(4.0,)),))
     )
     assert failed is not None
-    assert "not close to the rig's" in failed
+    assert "not close to that of the rig without the effect" in failed
 
 
 def test_a_search_range_in_which_the_motion_escapes_is_told():

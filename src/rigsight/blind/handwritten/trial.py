@@ -145,7 +145,7 @@ def _by_names_of_fit(cell: Cell, own: dict[str, float]) -> dict[str, float]:
 def _given(
     bench: HandwrittenBench, seen: Sequence[Record], refit: FitResult, rng: np.random.Generator
 ) -> dict[str, float]:
-    """Return the simulation in question: fitted to one record or from a data sheet, well fitted, or with numbers that are off."""
+    """Return the given simulation: fitted to one record or from a data sheet, well fitted, or with numbers that are off."""
     first = [r for r in seen if r.role == "estimation"][:2]
     one = first[int(rng.integers(len(first)))]
     ends = _WRONG if bench.cell.kind == "parameters" else _OFF

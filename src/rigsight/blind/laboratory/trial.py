@@ -187,7 +187,7 @@ def handed(bench: LaboratoryBench, seen: Sequence[Record], rng: np.random.Genera
 
 
 def _given(bench: LaboratoryBench, rng: np.random.Generator) -> dict[str, float]:
-    """Return the simulation in question: numbers from drawings, without the offsets that no drawing has."""
+    """Return the given simulation: numbers from drawings, without the offsets that no drawing has."""
     off = {p.name: 1.0 + rng.uniform(*_OFF) * rng.choice([-1.0, 1.0]) for p in bench.rig.parameters}
     return {
         p.name: 0.0 if is_offset(p) else float(f"{bench.values[p.name] * off[p.name]:.{_DIGITS}g}")
