@@ -47,7 +47,7 @@ def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
     told = json.loads(stdout)
     assert code == 0
     assert told["left_out"] == [
-        "range of joints: slider; the rig moves past it; use the effect end_stop for it"
+        "range of joints: slider; the rig has no end stops there; use the effect end_stop"
     ]
     assert max(told["free_run"]["relative_difference"].values()) < 1e-5
 
@@ -74,7 +74,7 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
         (["init", "--mjcf", CART, "--model", "axis"], "leave out --model"),
         (["init", "--mjcf", CART, "--gear", "hinge"], "JOINT=STIFFNESS"),
         (["init", "--mjcf", CART, "--gear", "slidr=1"], "Did you mean 'slider'"),
-        (["init", "--mjcf", CART, "--gear", "slider=-1"], "is positive, got -1"),
+        (["init", "--mjcf", CART, "--gear", "slider=-1"], "must be positive, got -1"),
         (["init", "--mjcf", CART, "--gear", "slider=100"], "has no armature"),
         (["init", CART, "--mjcf", CART], "a file is in the way"),
         (["init", "--gear", "slider=100"], "name the model with --mjcf"),

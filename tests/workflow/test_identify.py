@@ -148,7 +148,9 @@ def test_a_hardening_spring_is_seen_in_the_amplitudes(hardening: Identification)
     assert "k_c rises" in hardening.amplitude_statement
     assert "rigsight diagnose" in hardening.amplitude_statement
     assert not {"l_0", "c_y"} & set(hardening.changing)
-    assert any("the model order of the linear equation is too low" in warning for warning in hardening.warnings)
+    assert any(
+        "the model order of the linear equation is too low" in warning for warning in hardening.warnings
+    )
 
 
 def test_no_set_serves_a_hardening_spring_and_its_lateral_part_stays_clean(hardening: Identification) -> None:

@@ -11,12 +11,12 @@ T = TypeVar("T")
 
 
 def named(what: str, name: str | None, known: Mapping[str, T]) -> T:
-    """Return the thing of this name, the first one for None.
+    """Return the item with this name, the first one for None.
 
     Parameters
     ----------
     what
-        What kind of thing, for messages.
+        Kind of item, for messages.
     name
         Its name, or None.
     known

@@ -1,4 +1,4 @@
-"""How does a rig look? Signals on the left, bodies in the middle, joints to the ground on the right."""
+"""Schematic of a rig: signals on the left, bodies in the middle, joints to the ground on the right."""
 
 from __future__ import annotations
 

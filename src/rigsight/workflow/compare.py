@@ -273,6 +273,6 @@ def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
         if other:
             notes.append(
                 f"Model '{competitor.name}' has other constants than the campaign: {', '.join(other)}. It is compared with "
-"its own constants."
+                "its own constants."
             )
     return notes

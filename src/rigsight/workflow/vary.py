@@ -124,7 +124,9 @@ def run_vary(
     if not chosen:
         raise InputError(f"Name a parameter to vary. The model has: {', '.join(read.structure.names)}.")
     if len(chosen) > 1 and (low is not None or high is not None):
-        raise InputError("--from and --to can be used with one parameter only: name one parameter, or leave them out.")
+        raise InputError(
+            "--from and --to can be used with one parameter only: name one parameter, or leave them out."
+        )
     tries = [_values(p, read.values[p.name], low, high, steps) for p in chosen]
     excitation, ratio = variation_sweep(read, pair, amplitude, band)
     prepare_kernels([read.structure], 1, listener)

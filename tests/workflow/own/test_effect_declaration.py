@@ -98,7 +98,10 @@ def test_every_field_is_checked(declared):
             changed_parameter(search=(0.0, "ten")),
             "parameters: search contains 'ten'; give two numbers in a tuple",
         ),
-        (changed_parameter(starts=0.3), "parameters: starts is 0.3; give numbers in a tuple (a single one needs a comma"),
+        (
+            changed_parameter(starts=0.3),
+            "parameters: starts is 0.3; give numbers in a tuple (a single one needs a comma",
+        ),
         ({"torque": None}, "got none; allowed at dynamics: torque, spring, deflection"),
         ({"spring": c * x}, "exactly one expression, got torque, spring"),
         ({"place": Place.SENSOR}, "torque is not allowed at the place sensor"),

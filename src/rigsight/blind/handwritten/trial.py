@@ -53,7 +53,7 @@ def draw_handwritten_trial(seed: int, trial: int) -> Trial:
     Raises
     ------
     SimulationError
-        If no plant that was drawn can be integrated, or no effect leaves a gap of the wished size.
+        If no plant that was drawn can be integrated, or no effect causes a gap of the requested size.
     """
     cell = handwritten_cell_of(seed, trial)
     return first_that_succeeds(lambda attempt: _drawn(cell, seed, trial, attempt), seed, trial)
@@ -75,7 +75,7 @@ def _drawn(cell: Cell, seed: int, trial: int, attempt: int) -> Trial:
     refit = bench.refit([r for r in seen if r.role == "estimation"])
     gap = bench.largest_left(bench.scored(refit, [r for r in seen if r.role == "validation"]))
     if cell.effect and gap < GAPS[0]:
-        raise SimulationError(f"{cell.effect} leaves {gap:.2g} noise floors.")
+        raise SimulationError(f"{cell.effect} causes a gap of {gap:.2g} noise floors.")
     key = {
         "schema_version": 2,
         "design": "handwritten",
@@ -115,7 +115,7 @@ def draw_bench(cell: Cell, rng: np.random.Generator) -> HandwrittenBench:
     Raises
     ------
     SimulationError
-        If no numbers are found with which the rig vibrates as a rig does.
+        If no parameter values with plausible poles are found.
     """
     rig = RIGS[cell.rig]
     values = draw_numbers(rig, rng)

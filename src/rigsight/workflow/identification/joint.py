@@ -259,9 +259,7 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str
             "such as a step beside a sweep, or another amplitude would test them."
         )
     if not math.isfinite(fit.probability):
-        return (
-            "There is no parameter that every record determines, so the records cannot be compared."
-        )
+        return "There is no parameter that every record determines, so the records cannot be compared."
     unserved = [
         f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
         for score in scores
@@ -280,7 +278,9 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str
             f"probability {fit.probability:.2g}."
         )
     chance = f"below {_BELOW:g}" if fit.probability < _BELOW else f"{fit.probability:.1g}"
-    text = f"No single parameter set fits all {len(names)} estimation records (probability of chance {chance})."
+    text = (
+        f"No single parameter set fits all {len(names)} estimation records (probability of chance {chance})."
+    )
     return f"{text} {_pull(fit, scores)}"
 
 

@@ -156,7 +156,8 @@ def null_gives_the_rig(effect: Effect) -> str | None:
     if np.array_equal(with_effect[bench.output], plain):
         return None
     changed = _difference(with_effect[bench.output], plain)
-return f"with {_told(null)} the simulation differs from that of the rig without the effect: {changed}."
+
+    return f"with {_told(null)} the simulation differs from that of the rig without the effect: {changed}."
 
 
 def vanishes_continuously(effect: Effect) -> str | None:

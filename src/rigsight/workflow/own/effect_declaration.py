@@ -191,7 +191,7 @@ def _expression_faults(
             continue
         known = [*own, *map(str, states), *readable]
         hint = nearest(symbol.name, known)
-yield f"{what}: {symbol} is not a parameter, state or signal here.{hint} Known: {', '.join(known)}."
+        yield f"{what}: {symbol} is not a parameter, state or signal here.{hint} Known: {', '.join(known)}."
     for function in sorted(expression.atoms(Application), key=str):
         if not isinstance(function, (*_KINKS, *_SMOOTH)):
             yield (

@@ -39,6 +39,8 @@ def own_simulators(named: Iterable[str]) -> None:
                 f"{file} has no function '{name}'.{nearest(name, functions)} It has: {', '.join(functions) or 'none'}."
             )
         if name in taken:
-            raise InputError(f"--simulator: {taken[name]} and {one} have the same function name; rename one of them.")
+            raise InputError(
+                f"--simulator: {taken[name]} and {one} have the same function name; rename one of them."
+            )
         taken[name] = one
         give_function(name, getattr(module, name))

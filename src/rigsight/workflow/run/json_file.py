@@ -34,7 +34,9 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
             raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB, so it is not a {what}.")
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}), so it is not a {what}.") from None
+        raise InputError(
+            f"{path.name} is not UTF-8 text (byte {error.start}), so it is not a {what}."
+        ) from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     try:
@@ -48,7 +50,9 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
     except (_MeaninglessError, ValueError) as error:
         raise InputError(f"{path.name}: {error}") from None
     if not isinstance(data, dict):
-        raise InputError(f"{path.name}: must contain one object in braces, got a {type(data).__name__}. {mend}")
+        raise InputError(
+            f"{path.name}: must contain one object in braces, got a {type(data).__name__}. {mend}"
+        )
     return data
 
 
