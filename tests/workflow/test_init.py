@@ -214,7 +214,7 @@ def test_nothing_is_written_where_there_is_nothing(tmp_path: Path) -> None:
     (tmp_path / "broken.mat").write_bytes(b"no")
     with pytest.raises(InputError, match=r"broken.mat: is no MATLAB file"):
         run_init(tmp_path)
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         run_init(tmp_path / "nowhere")
     assert [path.name for path in tmp_path.iterdir()] == ["broken.mat"]
 

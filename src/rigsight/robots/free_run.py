@@ -64,7 +64,7 @@ def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     """Let a rig and the model that it comes from run freely from one state, under constant controls.
 
     MuJoCo uses the Runge-Kutta method of fourth order with a small step. What is not in a rig file is switched off in it:
-    contacts, ranges and equality constraints. Dry friction is switched off in both, because MuJoCo's creeps where it should stick.
+    contacts, ranges and equality constraints. Dry friction is off in both, because MuJoCo's creeps where it should stick.
 
     Parameters
     ----------
