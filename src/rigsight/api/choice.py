@@ -28,5 +28,5 @@ def named(what: str, name: str | None, known: Mapping[str, T]) -> T:
         If there is none, or none of this name.
     """
     if not known:
-        raise InputError(f"The result holds no {what} to be shown.")
+        raise InputError(f"The result contains no {what} to show.")
     return next(iter(known.values())) if name is None else known[check_option(f"The {what}", name, known)]

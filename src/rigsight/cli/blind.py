@@ -61,7 +61,7 @@ def blind(
         typer.Option(
             metavar="DIR",
             show_default="none",
-            help="Run no trials; combine the scores of this and other benches. May be repeated.",
+            help="Run no trials; score the bench in DIR together with other benches (repeat this option).",
         ),
     ] = None,
     rescore: Annotated[

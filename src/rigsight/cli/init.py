@@ -36,7 +36,7 @@ def init(
         typer.Option(
             "--mjcf",
             metavar="FILE",
-            show_default="(no model)",
+            show_default="none",
             help="A MuJoCo model or URDF from which a rig file is written beside the campaign. Needs the extra mujoco.",
         ),
     ] = None,
@@ -45,7 +45,7 @@ def init(
         typer.Option(
             "--gear",
             metavar="JOINT=STIFFNESS",
-            show_default="(joints move their bodies rigidly)",
+            show_default="rigid joints",
             help="A joint with a compliant gear and its stiffness in N m/rad (N/m), so that play in the gear can be found. "
             "May be repeated.",
         ),

@@ -35,7 +35,7 @@ _LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
 """Room for labels and ticks, and for a line of a legend [inch]."""
 _STATES_HEIGHT = 3.0
 _BAR_ROOM = 0.84
-"""Room beside a map for the bar that tells its colors, with numbers and label [inch]."""
+"""Room beside a map for its color bar with ticks and label [inch]."""
 _DASHES = (0, (4, 2))
 _PERCENT = 100.0
 _SHADES = 15

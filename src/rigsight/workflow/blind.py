@@ -192,7 +192,7 @@ def rescore(
     Raises
     ------
     InputError
-        If the folder holds no bench, or key or results of a trial cannot be read.
+        If the folder contains no bench, or key or results of a trial cannot be read.
     """
     jobs = checked_jobs(n_jobs)
     folder = BenchFolder(Path(out).resolve())

@@ -25,9 +25,9 @@ from rigsight.simulate import compose
 from rigsight.simulate.linearization import linearize
 
 GAPS = (5.0, 100.0)
-"""Gap that the re-identified equations leave, in units of the noise floor: what an eye sees in a plot, up to a wrong model."""
+"""Gap of the re-identified equations in noise floors: from just visible in a plot to a wrong model."""
 _MOST_OF_MOTION = 0.5
-"""Gap in units of the reading's size that is not exceeded: whoever asks knows the rig better than that."""
+"""Largest gap, relative to the reading: a user's simulation is better than that."""
 _NOISE = (2e-4, 5e-3)
 """Noise of a sensor in units of its reading's size: from an interferometer's (74 dB) to a cheap potentiometer's (46 dB)."""
 _APART = 0.5
@@ -35,7 +35,7 @@ _APART = 0.5
 _NOISY = 1e-3
 """Noise from which a trial is called noisy: the middle of what is drawn."""
 _OFF, _WRONG = (0.02, 0.1), (0.05, 0.2)
-"""How far the given numbers are off where an effect is hidden, as data sheets are, and where they are what is wrong."""
+"""Errors of the given parameters: as of data sheets if an effect is hidden, larger if wrong parameters are the cause."""
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
 

@@ -243,7 +243,7 @@ class LaboratoryBench:
         Raises
         ------
         SimulationError
-            If they come nowhere near.
+            If the fit fails.
         """
         return self._fitted(compose(self.rig), records, self.values, self.free)
 
@@ -291,7 +291,9 @@ class LaboratoryBench:
         fit = GreyBoxFit(structure, pieces, self.scales, self.noise)
         found = fit.fit(start, list(free), max_evaluations=_EVALUATIONS)
         if not found.residuals:
-            raise SimulationError(f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}")
+            raise SimulationError(
+                f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"
+            )
         return found
 
 

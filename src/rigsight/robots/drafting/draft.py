@@ -57,9 +57,9 @@ class RigDraft:
     gears
         Place between a rotor and what it moves -> its joint.
     controls
-        Input that a drive is told -> number of the control in the model; -1 for what was added.
+        Input of a drive -> index of the control in the model; -1 for what was added.
     fields
-        Parameter or constant of the rig -> the numbers of the model that it stands for.
+        Parameter or constant of the rig -> the fields of the model that it represents.
     values
         Parameters as the model has them.
     left_out

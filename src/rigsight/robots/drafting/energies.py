@@ -185,7 +185,10 @@ def _moved(
         *(
             coordinate
             - known.numbers.constant(
-                f"{coordinate.name}_ref", joint.reference, unit, f"{coordinate.name} in the reference pose of the model"
+                f"{coordinate.name}_ref",
+                joint.reference,
+                unit,
+                f"{coordinate.name} in the reference pose of the model",
             )
             for joint, coordinate in zip(joints, coordinates, strict=True)
         )

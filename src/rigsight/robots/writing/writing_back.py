@@ -212,6 +212,6 @@ class _Writer:
         lines = [f"Written by rigsight export from {source.name}."]
         lines += [f"{line}" for line in self._written]
         lines += [f"MuJoCo has no field for {line}" for line in self._without_field]
-        # A comment of XML may hold no two hyphens.
+        # An XML comment must not contain two hyphens in a row.
         comment = "\n".join(lines).replace("--", "- -")
         return WrittenBack(f"<!-- {comment} -->\n{text}", tuple(self._written), tuple(self._without_field))

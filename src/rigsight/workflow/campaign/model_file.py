@@ -131,7 +131,7 @@ def _locate(model: Path) -> Path:
     path = model / MODEL_FILE
     if not path.is_file():
         raise InputError(
-            f"Folder {model} holds no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
+            f"Folder {model} contains no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
         )
     return path
 
