@@ -47,7 +47,7 @@ def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
             if _holds_same_samples(scored, fitted):
                 yield (
                     f"{file}: the validation record '{scored.name}' has exactly the samples of '{fitted.name}', which is fitted: "
-                    "its error is no validation. Name another file."
+                    "it validates nothing. Name another file."
                 )
 
 
