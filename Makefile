@@ -1,10 +1,10 @@
-# The Python that makes the environment; 3.11 or newer: make demo PYTHON=python3.12
+# The Python for the environment, 3.11 or newer: make demo PYTHON=python3.12
 PYTHON ?= python3
-# Test processes side by side.
+# Number of parallel test processes.
 WORKERS ?= 2
-# For each target of the fuzzer.
+# Seconds for each target of the fuzzer.
 SECONDS_EACH ?= 60
-# Seed of the blind benches; those from 1000 on are kept for the last word and never looked at before.
+# Seed of the blind benches; seeds from 1000 on are reserved for the final evaluation and not used before.
 SEED ?= 1
 
 VENV := .venv
@@ -16,10 +16,10 @@ FUZZER_INSTALLED := $(VENV)/.fuzzer-installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 
-# Nothing is byte-compiled ahead: Python does that for the few modules that are really imported, at their first import.
+# Nothing is byte-compiled in advance: Python compiles the few modules that are really used at their first import.
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
-# uv takes a third of pip's processor time. It does not read pip's settings (an index or a certificate of one's own), so where it
-# fails, soon, pip has its turn.
+# uv takes a third of pip's processor time. It does not read pip's settings (own index, own certificate), so if it fails,
+# which it does quickly, pip is used.
 UV_INSTALL := UV_HTTP_TIMEOUT=15 UV_HTTP_RETRIES=1 $(BIN)/python -m uv pip install --quiet --python $(BIN)/python
 install = $(UV_INSTALL) $(1) 2>/dev/null || $(PIP_INSTALL) $(1)
 NOW := date +%s
@@ -35,7 +35,7 @@ demo: $(RUNNABLE) $(COMPILER)  ## run the whole chain on the built-in virtual ri
 	@begun=$$($(NOW)); $(BIN)/rigsight demo --out demo && echo "The demo took $$(($$($(NOW)) - begun)) s."
 
 test: $(DEVELOPMENT)  ## run all tests
-	@# Tests start dozens of processes, each of which would compile a thousand Python files anew if Python could not keep them.
+	@# Tests start dozens of processes; each would compile a thousand Python files again if Python could not cache them.
 	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 check: $(DEVELOPMENT)  ## format, lint, types, layers
@@ -54,29 +54,29 @@ dist: $(DEVELOPMENT)  ## build wheel and source distribution in dist/
 	@$(BIN)/python -m hatchling build
 
 docs: $(DEVELOPMENT) $(DOCS_INSTALLED)  ## build the documentation site in build/site, links checked
-	@# Not --quiet: what is not told does not count as a warning, and would not end a strict build.
+	@# Not --quiet: suppressed warnings would not make a strict build fail.
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "The site is in build/site; open build/site/index.html."
 
 fuzz: $(DEVELOPMENT) $(FUZZER_INSTALLED)  ## fuzz everything that reads a file, a minute each; writes experiments/fuzzing/results.md
 	@$(BIN)/python experiments/fuzzing/run.py --seconds $(SECONDS_EACH)
 
-calibrate: $(DEVELOPMENT)  ## fit the calibration of probabilities anew to its table of training trials
+calibrate: $(DEVELOPMENT)  ## fit the calibration of probabilities again to its table of training trials
 	@$(BIN)/python experiments/calibration/fit.py
 
-blind-small: $(RUNNABLE) $(COMPILER)  ## diagnose the small list of drawn rigs whose effect is withheld; hours, goes on where it was stopped
+blind-small: $(RUNNABLE) $(COMPILER)  ## run the small blind bench; takes hours, continues where it was stopped
 	@$(BIN)/rigsight blind --design small --seed $(SEED) --out out/blind-small
 
-blind: $(RUNNABLE) $(COMPILER)  ## the standard blind bench; hours, goes on where it was stopped; writes docs/blind.md
+blind: $(RUNNABLE) $(COMPILER)  ## run the standard blind bench; takes hours, continues where it was stopped; writes docs/blind.md
 	@$(BIN)/rigsight blind --design standard --seed $(SEED) --out out/blind --markdown docs/blind.md
 
-clean:  ## remove results and caches; the environment stays (remove .venv to start afresh)
+clean:  ## remove results and caches; the environment is kept (remove .venv to start from scratch)
 	rm -rf demo out build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Stamps are written last: an interrupted installation is taken up again by the next call.
-# What rigsight runs with, pinned by the lock: a third of all that the lock holds. hatchling, which builds the package, comes from
-# there too, so that no unpinned build tool is fetched.
+# Stamps are written last: an interrupted installation is continued by the next call.
+# Runtime packages, pinned by the lock file, of which they are a third. hatchling, which builds the package, comes from
+# there too, so that no unpinned build tool is downloaded.
 $(RUNNABLE): pyproject.toml requirements.lock
 	@command -v $(PYTHON) >/dev/null || { echo "rigsight needs Python 3.11 or newer, and '$(PYTHON)' was not found. Name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3.12" >&2; exit 1; }
 	@test ! -x $(BIN)/python || $(BIN)/python -c '$(NEW_ENOUGH)' || { echo "$(VENV) holds a Python older than 3.11: remove it (rm -r $(VENV)) and call make again." >&2; exit 1; }
@@ -96,7 +96,7 @@ $(DEVELOPMENT): $(RUNNABLE) $(COMPILER)
 	@$(call install,--requirement requirements.lock)
 	@touch $@
 
-# Simulations are compiled: where the machine has no C compiler, one comes from the package index (a tenth of a gigabyte).
+# Simulations are compiled: if the machine has no C compiler, one is installed from the package index (0.1 GB).
 $(COMPILER): $(RUNNABLE)
 	@test -n "$$CC" || command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null \
 		|| { echo "No C compiler was found: installing one into $(VENV) ..."; \
@@ -108,7 +108,7 @@ $(DOCS_INSTALLED): docs/requirements.lock $(DEVELOPMENT)
 	@$(call install,--requirement docs/requirements.lock)
 	@touch $@
 
-# For Linux and Python 3.11 or 3.12 there are wheels; no part of the lock, because nothing but the fuzzer needs it.
+# Wheels exist for Linux and Python 3.11 or 3.12; not in the lock file, because only the fuzzer needs it.
 $(FUZZER_INSTALLED): $(DEVELOPMENT)
 	@$(call install,"atheris==3.0.0")
 	@touch $@

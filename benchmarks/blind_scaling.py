@@ -1,4 +1,4 @@
-"""How many blind trials a minute do one and two workers finish, by joblib and by Dask, and what would 1,000 do?
+"""Blind trials per minute with one and two workers, by joblib and by Dask, and the extrapolation to 1,000 workers.
 
     .venv/bin/python benchmarks/blind_scaling.py --trials 4
 
@@ -211,7 +211,7 @@ def megabytes(folder: Path) -> float:
 
 
 def project(trial: float, longest: float, per_trial: float, traffic: float) -> None:
-    """Print what many workers would do.
+    """Print the extrapolation to many workers.
 
     Parameters
     ----------
@@ -240,17 +240,17 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1, help="seed of the small design")
     parser.add_argument(
-        "--rounds", type=int, default=1, help="times that each way is gone; an even number cancels drift"
+        "--rounds", type=int, default=1, help="repetitions of each way; an even number cancels drift"
     )
     parser.add_argument("--ways", nargs="+", choices=("joblib", "dask"), default=("joblib", "dask"))
     parser.add_argument(
-        "--compiled", action="store_true", help="leave out the pass that compiles the kernels of these trials"
+        "--compiled", action="store_true", help="skip the pass that compiles the kernels of these trials"
     )
     parser.add_argument(
         "--stand-in",
         type=float,
         metavar="SECONDS",
-        help="run a loop of this time instead of trials, to try this script",
+        help="run a loop of this duration instead of trials, to test this script",
     )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="blind-scaling-") as name:
@@ -283,14 +283,14 @@ def main() -> None:
             )
         empty, start = time_of_an_empty_trial(), time_of_a_start()
         print(
-            f"  a trial that does nothing takes client and scheduler {1e3 * empty:.2f} ms ({N_EMPTY} of them)"
+            f"  client and scheduler need for an empty trial {1e3 * empty:.2f} ms ({N_EMPTY} of them)"
         )
-        print(f"  a process that diagnoses has started in {start:.2f} s (part of every trial)")
+        print(f"  start of a diagnosing process: {start:.2f} s (part of every trial)")
         ran, row, traffic = found[options.ways[-1], 2][-1].ran, 0.0, 0.0
         if ran[0].outcome is not None:
             row = time_of_a_row(ran[0].outcome, place)
             traffic = megabytes(place / "bench-0") / len(ran)
-            print(f"  its row takes {1e3 * row:.2f} ms; {traffic:.1f} MB per trial stay in the folder")
+            print(f"  storing its row: {1e3 * row:.2f} ms; {traffic:.1f} MB per trial remain in the folder")
         times = [one.end - one.begin for one in ran]
         # Records are written once and read twice: by the copy for the diagnosis and, those withheld, by the score.
         project(statistics.mean(times), max(times), empty + row, 2.0 * traffic)

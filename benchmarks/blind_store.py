@@ -1,4 +1,4 @@
-"""How long does it take to store, read and score the outcomes of 100,000 blind trials? The rows are made up."""
+"""Time to store, read and score the outcomes of 100,000 blind trials, with invented rows."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def main() -> None:
                 with TrialStore(part / STORE_FILE) as store:
                     store.add(outcomes[seed::PARTS])
         with (
-            timed(f"{ONE_BY_ONE} of them once more, a transaction each"),
+            timed(f"{ONE_BY_ONE} of them again, one transaction each"),
             TrialStore(parts[0] / STORE_FILE) as store,
         ):
             for outcome in outcomes[: ONE_BY_ONE * PARTS : PARTS]:
@@ -100,12 +100,12 @@ def main() -> None:
         sizes = {name: (Path(place) / "all" / name).stat().st_size for name in (BLIND_FILE, PAGE_FILE)}
         sizes[STORE_FILE] = sum((part / STORE_FILE).stat().st_size for part in parts)
     if content["n_trials"] != rows:
-        sys.exit(f"{content['n_trials']} rows came back.")
+        sys.exit(f"{content['n_trials']} rows were read back.")
     for name, size in sizes.items():
         sys.stdout.write(f"{name:58} {size / 1e6:7.1f} MB\n")
     # Kilobytes on Linux.
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    sys.stdout.write(f"{'memory, at most':58} {memory:7.2f} GB\n")
+    sys.stdout.write(f"{'largest memory':58} {memory:7.2f} GB\n")
 
 
 if __name__ == "__main__":

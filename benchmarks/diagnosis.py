@@ -1,4 +1,4 @@
-"""How long does a diagnosis take, how does that grow with the records, and what would scipy alone need for one effect?
+"""Time of a diagnosis, its growth with the length of the records, and the time that scipy alone would need for one effect.
 
 A running gear at 200 Hz: sweeps of 100 s at 0.25, 0.5 and 1 A and a step to fit, a sweep at 0.75 A to validate; every effect of
 the catalogue is a candidate. Kernels are compiled before the clock starts. The median is over rigs with different effects.
@@ -124,7 +124,7 @@ def main() -> None:
     print(
         f"scipy (solve_ivp LSODA rtol 1e-6) simulates the four records once in {one:.1f} s: least_squares with finite "
         f"differences,\n  {SIMULATIONS_PER_FIT} simulations, would fit ONE effect in {alone:.0f} s, "
-        f"{alone / statistics.median(times):.1f} times all candidates here"
+        f"{alone / statistics.median(times):.1f} times the diagnosis with all candidates"
     )
 
 

@@ -1,4 +1,4 @@
-"""The engine beside that of another checkout, in turns: compilation, one parameter set, many sets side by side.
+"""The engine compared with that of another checkout, in turns: compilation, one parameter set, many sets in parallel.
 
     python benchmarks/engine.py                                     # this checkout alone
     python benchmarks/engine.py --beside DIR                        # and another, with its own .venv if it has one

@@ -1,4 +1,4 @@
-"""Exported models beside the engine, in one run: difference and time per sample.
+"""Exported models compared with the engine, in one run: difference and time per sample.
 
 30 s of a sweep sampled at 10 ms, an effect at a time on the running gear. C and FMU hold the engine: what they differ from it by
 is rounding. Python steps by itself; the truth is the engine's answer at 1e-9, where it aims for 1e-6 otherwise. Times are those
@@ -67,7 +67,7 @@ int simulate(const double *u, long n, double dt, double *y) {
 
 @dataclass(frozen=True)
 class Row:
-    """What is said of one model: errors against the truth, and differences from the engine."""
+    """Results of one model: errors against the truth, and differences from the engine."""
 
     name: str
     engine_error: float
@@ -153,7 +153,7 @@ def c_loop(model: Model, place: Path, u: Floats) -> Callable[[], Floats]:
 
 
 def fmu_loop(model: Model, place: Path, u: Floats) -> Callable[[], Floats]:
-    """Drive the FMU through fmpy, a call of Python for each value: what its master costs is in it."""
+    """Drive the FMU through fmpy, one Python call for each value; the time includes fmpy itself."""
     try:
         import fmpy
         from fmpy.fmi2 import FMU2Slave

@@ -1,4 +1,4 @@
-"""What does a diagnosis with all effects say of measured gaps, in what time? python benchmarks/measured_gaps.py CAMPAIGN...
+"""Verdict and time of a diagnosis of measured gaps with all effects: python benchmarks/measured_gaps.py CAMPAIGN...
 
 The tests let only a few effects compete on measured records; this is the whole catalogue.
 """
@@ -21,7 +21,7 @@ def main(campaigns: list[str]) -> None:
             f"{campaign}: {diagnosis.verdict} {' and '.join(diagnosis.effects)}, {took:.0f} s ({worked:.0f} s of processor time)"
         )
         for rivals in diagnosis.ambiguous_with:
-            print(f"    not told from {' and '.join(rivals)}")
+            print(f"    not distinguished from {' and '.join(rivals)}")
         for candidate in diagnosis.candidates[:4]:
             name = " and ".join(candidate.effects) or "no effect"
             print(f"    {name}: {candidate.error_over_noise:.3g} x floor, probability {candidate.probability:.3g}")

@@ -1,4 +1,4 @@
-"""The simulator beside a hand-written C program and scipy, in one run: error and time on the hysteretic running gear.
+"""The simulator compared with a hand-written C program and scipy, in one run: error and time on the hysteretic running gear.
 
 150 s of a logarithmic sweep from 1e-3 to 640 rad/s at 1 A, sampled at 5 ms (30,001 samples), the published set R. Times are
 those of the fastest of several runs; compare the ratios, the nanoseconds are this machine's.
@@ -235,7 +235,7 @@ def main() -> None:
     rows = [own]
     c_row = c_program(model, u, exact)
     if c_row is None:
-        print("No C compiler (gcc or cc) found: the C program is left out.")
+        print("No C compiler (gcc or cc) found: the C program is skipped.")
     else:
         rows.append(c_row)
     rows.append(scipy_program(model, u, states))
@@ -260,7 +260,7 @@ def main() -> None:
     with ThreadPoolExecutor(2) as threads:
         two = N_SETS / fastest(lambda: list(threads.map(lambda part: batch(part)[-1], batches)), 3)
     print(
-        f"\nSets side by side, {substeps} substeps, error {error:.1e} (wish {BATCH_ACCURACY:g}), all samples:"
+        f"\nParallel sets, {substeps} substeps, error {error:.1e} (required {BATCH_ACCURACY:g}), all samples:"
     )
     print(f"  one thread   {one:8,.0f} sets/s   {1e9 / one / u.size:6.2f} ns/sample")
     print(f"  two threads  {two:8,.0f} sets/s   {1e9 / two / u.size:6.2f} ns/sample")

@@ -1,4 +1,4 @@
-"""Are the p-values of the adequacy check uniform under true models, and small under the equations without the effect?
+"""Distribution of the p-values of the adequacy check: uniform for true models, small for the equations without the effect.
 
     python experiments/adequacy/run.py --seed 2 --trials 80
 

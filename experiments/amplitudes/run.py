@@ -1,4 +1,4 @@
-"""Models fitted at one amplitude, at several, under more noise: how far do they carry? All of it in one command.
+"""Validity of models fitted at one amplitude, at several amplitudes and with more noise; the whole study in one command.
 
 run.py                    everything; finished stages are kept, so that it can be stopped and called again
 run.py --only joint       these configs only
@@ -28,7 +28,7 @@ OUT = HERE.parents[1] / "out/amplitudes"
 
 
 def run_study(study: Study, configs: Mapping[str, Config], out: Path, n_jobs: int | None = None) -> list[str]:
-    """Do what is not done yet, write `summary.md`, and return what was done."""
+    """Run the missing stages, write `summary.md`, and return what was done."""
     jobs = checked_jobs(n_jobs)
     prepare_kernels([VirtualRig().structure, compose(RUNNING_GEAR), calibrated_structure(study)], jobs)
     told = ["evaluation: measured"] if evaluation_stage(study, out).ensure() else []
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--only", nargs="+", metavar="CONFIG", default=[], help="names of files in configs/")
-    parser.add_argument("--jobs", type=int, default=None, help="configs worked on at the same time")
+    parser.add_argument("--jobs", type=int, default=None, help="number of configs processed in parallel")
     parser.add_argument("--out", type=Path, default=OUT, help=f"default {OUT}")
     asked = parser.parse_args(arguments)
     try:
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if unknown:
             raise SystemExit(f"Unknown: {', '.join(unknown)}. There are: {', '.join(configs)}.")
         if not discovery_exists():
-            print("This rigsight has no command 'discover' yet: its columns are left out.")
+            print("This version of rigsight has no command 'discover': its columns are left out.")
         chosen = {name: config for name, config in configs.items() if not asked.only or name in asked.only}
         run_study(study, chosen, asked.out, asked.jobs)
     except RigsightError as error:

@@ -1,4 +1,4 @@
-"""What does each stage do: measure, identify, calibrate, discover, compare?"""
+"""The stages of the study: measure, identify, calibrate, discover, compare."""
 
 from __future__ import annotations
 

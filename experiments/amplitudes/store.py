@@ -1,4 +1,4 @@
-"""How does a stage's result reach the disk so that a kill at any moment loses only the stage in flight?
+"""Results of stages on disk; a kill at any moment loses only the running stage.
 
 A stage works in a hidden folder of its own; one rename makes it the result. A result is used again if the settings written
 beside it are those asked for now. Programs are not among the settings: after a change of rigsight, remove the results.

@@ -1,4 +1,4 @@
-"""What is measured, fitted and compared: the configs of the study, read and checked."""
+"""The configs of the study: what is measured, fitted and compared, read and checked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which numbers of all comparisons stand in one small table, and what do they say?"""
+"""Summary table of all comparisons, and its conclusions."""
 
 from __future__ import annotations
 

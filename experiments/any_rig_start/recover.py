@@ -1,4 +1,4 @@
-"""Does a fit from its own start reach the noise, whatever the parameters of a rig are?
+"""Check that a fit from its own start values reaches the noise for arbitrary parameters of a rig.
 
 A draw is a rig whose parameters lie log-uniformly over two decades, and two records of 12 s at 200 Hz with 0.5 % of noise: a
 multisine and steps on every input, or, of a rig without inputs, two decays from random states.

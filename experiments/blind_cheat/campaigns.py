@@ -1,4 +1,4 @@
-"""Which campaigns does the cheat look at? 108 drawn trials of which no diagnosis was made."""
+"""The campaigns that the cheat examines: 108 drawn trials that were not diagnosed."""
 
 from __future__ import annotations
 

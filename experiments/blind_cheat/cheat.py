@@ -1,4 +1,4 @@
-"""Does anything in what a diagnosis gets tell what is hidden, other than the physics?
+"""Check that the files of a diagnosis reveal the hidden effect only by the physics.
 
 Draws 108 trials of the small design (seed 6: the first 100 and all others without an effect), unless `out/blind-cheat` holds
 them, and looks at their campaigns as a cheat would, who knows the source of the draws but not the keys.

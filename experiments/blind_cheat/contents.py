@@ -1,4 +1,4 @@
-"""Does anything that stands in the campaigns tell what is hidden: forms, sizes, digits, numbers, noise?"""
+"""Check that the contents of the campaigns do not reveal the hidden effect: format, sizes, digits, values, noise."""
 
 from __future__ import annotations
 

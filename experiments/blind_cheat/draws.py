@@ -1,4 +1,4 @@
-"""Do the draws tell what is hidden, to a cheat who knows their source: the rig, the seed, the random numbers?"""
+"""Check that the draws do not reveal the hidden effect to a cheat who knows their source code: rig, seed, random numbers."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def rig(_: list[Campaign]) -> None:
         counter = Counter(h for h, s in zip(hidden, both, strict=True) if s == one)
         most = ", ".join(f"{name} {count / counter.total():.1%}" for name, count in counter.most_common(4))
         print(f"  {one}: {counter.total() / n:.1%} of all; {most}")
-    print("p that a number of the rig does not depend on what is hidden, pendulums left out:")
+    print("p-value that a parameter of the rig is independent of the hidden effect, without pendulums:")
     for kind in sorted(set(rigs)):
         chosen = [
             (h, own) for h, r, own in zip(hidden, rigs, numbers, strict=True)
@@ -123,7 +123,7 @@ def seed(trials: list[Campaign]) -> None:
         right += matches == {(SEED, trial.number)}
     print(
         f"\n{len(tried) // 3} seeds and numbers tried in {seconds:.0f} s: {found} of {len(trials)} campaigns found again, "
-        f"{right} of them rightly"
+        f"{right} of them correctly"
     )
 
 

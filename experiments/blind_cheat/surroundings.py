@@ -1,4 +1,4 @@
-"""Do the surroundings of a diagnosing process tell what is hidden: the kernel cache, its environment, its files?"""
+"""Check that the surroundings of a diagnosis do not reveal the hidden effect: kernel cache, environment, files."""
 
 from __future__ import annotations
 

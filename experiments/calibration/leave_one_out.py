@@ -1,4 +1,4 @@
-"""Diagnose the single effects of a bench once more, each without the effect that is hidden among the candidates.
+"""Diagnose the single-effect trials of a bench again, each with its hidden effect removed from the candidates.
 
     .venv/bin/python experiments/calibration/leave_one_out.py BENCH FOLDER
 

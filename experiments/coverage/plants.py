@@ -1,4 +1,4 @@
-"""Which plants does the coverage study draw? A rig with one effect, forces from outside at its joints, and noisy sensors.
+"""The plants of the coverage study: a rig with one effect, external forces at its joints, and noisy sensors.
 
 The plant is the accurate integrator, at a quarter of the records' sample time and with forces that a bootstrap does not draw:
 each joint has one with a corner frequency of its own, which bends between the samples.

@@ -1,4 +1,4 @@
-"""How often does the truth lie within two standard errors, by the formula and by the bootstrap, and how wide are they?
+"""Coverage and width of intervals of two standard errors, by the formula and by the bootstrap.
 
     python experiments/coverage/run.py --seed 1 --draws 6
 
@@ -159,8 +159,8 @@ def main() -> None:
     )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--draws", type=int, default=6)
-    parser.add_argument("--only", default="", help="effects whose names begin so")
-    parser.add_argument("--table", action="store_true", help="print the table of what has been drawn")
+    parser.add_argument("--only", default="", help="only effects whose names begin with this text")
+    parser.add_argument("--table", action="store_true", help="print the table of the trials drawn so far")
     chosen = parser.parse_args()
     kept = HERE / f"draws_{chosen.seed}.jsonl"
     rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []

@@ -1,4 +1,4 @@
-"""Which equations does `rigsight discover` find on a running gear whose equations are known, and how far off are the numbers?
+"""The equations that `rigsight discover` finds on a running gear with known equations, and the errors of the coefficients.
 
 Measures a gear with Bouc-Wen hysteresis (its own numbers, or the sets R, B, P of the thesis) with four sweeps and a multisine,
 writes the campaign and discovers on it as the command does: what is given are files with u, psi and y, and nothing else.

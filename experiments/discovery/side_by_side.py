@@ -1,4 +1,4 @@
-"""What does plain pysindy find on the records that `rigsight discover` is given, and how well does it simulate?
+"""The equations that plain pysindy finds on the records of `rigsight discover`, and the errors of their simulation.
 
 pysindy gets numbers near one, the kinematic row for nothing (x' = v), its own derivatives (finite differences of two orders,
 Savitzky-Golay of several widths, spectral), a polynomial library and a custom one that holds all static terms of our rigs, and

@@ -1,4 +1,4 @@
-"""How far is a discovered Bouc-Wen model from the generator of the benchmark, on a noise-free multisine of another amplitude?
+"""Error of a discovered Bouc-Wen model against the generator of the benchmark, on a noise-free multisine of another amplitude.
 
 The generator is z' = alpha y' - beta (gamma |y'| z + delta y' |z|), m y'' + c y' + k y + z = u (Noel and Schoukens, doi
 10.4121/12967592). Its equations are integrated here by scipy, apart from rigsight's simulator.

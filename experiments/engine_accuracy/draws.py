@@ -1,4 +1,4 @@
-"""Which models and records is the engine's accuracy tried on? Every effect of the catalogue over its search box."""
+"""Models and records for the accuracy of the engine: every effect of the catalogue over its search box."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does the engine keep its 1e-6? Every effect over its search box against DOP853; writes results.md beside this file."""
+"""Accuracy of the engine (1e-6): every effect over its search box against DOP853; writes results.md beside this file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What do the equations do, by another integrator? scipy's DOP853, started anew at every sample and at every kink."""
+"""Solution of the equations by another integrator: scipy's DOP853, restarted at every sample and at every kink."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Give what the fuzzer kept to the program as it is, reading in a process of its own: apart.py NAME FOLDER."""
+"""Run the inputs that the fuzzer kept through the unmodified program, which reads in a separate process: apart.py NAME FOLDER."""
 
 from __future__ import annotations
 

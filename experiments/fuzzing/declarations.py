@@ -1,4 +1,4 @@
-"""How does a tree of plain values become an `Effect` as a user's file might declare it, without any text being run?"""
+"""Make an `Effect`, as a user's file might declare it, from a tree of plain values, without executing any text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How is a tree of tables changed so that it stays a file of its kind, and reaches what plain bytes never do?"""
+"""Mutations of a tree of tables that keep the file format, and so reach code that random bytes never reach."""
 
 from __future__ import annotations
 

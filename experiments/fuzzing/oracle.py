@@ -1,4 +1,4 @@
-"""Did an input end as promised: a value or one message, soon, in little memory?"""
+"""Check that an input ends in a value or one message, in limited time and memory."""
 
 from __future__ import annotations
 

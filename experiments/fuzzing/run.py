@@ -1,4 +1,4 @@
-"""Does everything that reads a file end in a value or one message? Every reader is fuzzed, guided by coverage.
+"""Fuzz every reader of files, guided by coverage: each input must end in a value or one message.
 
 run.py                        every target for a minute; what was found lies in out/fuzzing, the table in results.md here
 run.py --only TDMS --seconds 600
@@ -106,7 +106,7 @@ def _outcome(name: str, folder: Path, before: int, after: int) -> Outcome:
 def _counts(folder: Path) -> dict:
     file = folder / "counts.json"
     if not file.is_file():
-        raise SystemExit(f"{folder} holds no counts: the target did not start; see {folder / 'log.txt'}.")
+        raise SystemExit(f"{folder} contains no counts: the target did not start; see {folder / 'log.txt'}.")
     return json.loads(file.read_text(encoding="utf-8"))
 
 
@@ -131,14 +131,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--only", nargs="+", metavar="NAME", default=[], help="targets, as the table calls them"
+        "--only", nargs="+", metavar="NAME", default=[], help="names of targets in the table"
     )
-    parser.add_argument("--seconds", type=int, default=60, help="for each target, without the start")
+    parser.add_argument("--seconds", type=int, default=60, help="seconds for each target, without its start")
     parser.add_argument(
-        "--out", type=Path, default=OUT, help=f"default {OUT}; a corpus there is gone on with"
+        "--out", type=Path, default=OUT, help=f"default {OUT}; an existing corpus there is continued"
     )
     parser.add_argument(
-        "--table", type=Path, default=None, help=f"default {TABLE}, where every target is fuzzed"
+        "--table", type=Path, default=None, help=f"default {TABLE}, if every target is fuzzed"
     )
     asked = parser.parse_args(arguments)
     unknown = [name for name in asked.only if name not in TARGETS]
@@ -152,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if written is not None:
         written.write_text(table(outcomes), encoding="utf-8")
     if any(one.findings for one in outcomes):
-        raise SystemExit(f"Breaches were found; the inputs lie in {asked.out}.")
+        raise SystemExit(f"Violations were found; the inputs are in {asked.out}.")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Which small, sound inputs does the fuzzer start from?"""
+"""Small valid inputs from which the fuzzer starts."""
 
 from __future__ import annotations
 

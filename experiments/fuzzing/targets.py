@@ -1,4 +1,4 @@
-"""What reads something from outside, and how is it fed?"""
+"""The readers of external data, and how the fuzzer calls them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of a lightly damped peak do a local rational model and a Hann-window H1 show of the same record?
+"""Share of a lightly damped peak that a local rational model and a Hann-window H1 show of the same record.
 
 One linear sweep of 100 s drives a PT2 of 12 rad/s; the output carries white noise. The error is that of the peak's height,
 relative to the true maximum. H1 is given the segment length (of `SEGMENTS`) whose error over all draws is the least, a choice

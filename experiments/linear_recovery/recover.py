@@ -1,4 +1,4 @@
-"""Are the parameters of a linear running gear recovered within 1 %, and do the 95 % intervals hold what they promise?
+"""Check that the parameters of a linear running gear are recovered within 1 %, and that 95 % intervals have their coverage.
 
 Draws linear running gears around the thesis's sets, drives each with one logarithmic sweep of 100 s, adds sensor noise and a
 coloured torque disturbance that the record does not show, and identifies them in two ways:

@@ -1,4 +1,4 @@
-"""On a rig with one motion: how often is the true effect among those that a diagnosis looks at first?
+"""On a rig with one motion: how often the true effect is among those that a diagnosis fits first.
 
     python experiments/places/one_motion.py --draws 50 --seed 3
 

@@ -1,4 +1,4 @@
-"""How often is the true place of an effect among those that a diagnosis looks at first?
+"""How often the true place of an effect is among those that a diagnosis fits first.
 
     python experiments/places/run.py --draws 80
 

@@ -1,4 +1,4 @@
-"""What does mujoco.sysid leave of records of MuJoCo plants with something hidden in them, and what does rigsight name in them?"""
+"""Residual of mujoco.sysid on records of MuJoCo plants with hidden effects, and the effects that rigsight names in them."""
 
 from __future__ import annotations
 

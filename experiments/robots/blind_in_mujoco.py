@@ -1,4 +1,4 @@
-"""Effects hidden in MuJoCo plants that are drawn: its own friction, a late actuator, a second joint as play. Are they named?"""
+"""Blind trials with random MuJoCo plants: MuJoCo's friction, an actuator with delay, a second joint as play."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which diagnoses are repeated under rounding? Hysteresis by sliders, recovery on an axis, trials of the small blind bench."""
+"""The diagnoses that are repeated: hysteresis by sliders, recovery on an axis, trials of the small blind bench."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does a diagnosis depend on rounding? Repeats some with data disturbed by 1e-9 of the noise, other compilers, one and two jobs.
+"""Effect of rounding on diagnoses: repetitions with data disturbed by 1e-9 of the noise, other compilers, one and two jobs.
 
 run.py                     all builds, table in results.md beside this file
 run.py --trials 3 17       with these trials of the small blind bench, seed 9 (some minutes each)

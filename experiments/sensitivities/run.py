@@ -1,4 +1,4 @@
-"""How exact are derivatives that are carried along with a motion, what do they cost, and what do fits make of them?
+"""Accuracy and cost of derivatives that are integrated along with the motion, and their benefit in fits.
 
 run.py                     all tables, in results.md beside this file (3 minutes)
 run.py --repeats 20        times as the least of this many
@@ -282,7 +282,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--repeats", type=int, default=9, help="of each time")
+    parser.add_argument("--repeats", type=int, default=9, help="repetitions of each timing")
     asked = parser.parse_args()
     lines = [
         "# Derivatives: errors, costs, fits", "",

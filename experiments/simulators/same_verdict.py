@@ -1,4 +1,4 @@
-"""One rig, moved by its own equations, by MuJoCo, by an FMU and by a function of Python: the same verdict, and at what cost?"""
+"""One rig simulated by its own equations, MuJoCo, an FMU and a Python function: verdicts and times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which models do we fit to the virtual rig? One linear set, one Bouc-Wen set for a sweep, one hysteretic set for all."""
+"""Models fitted to the virtual rig: one linear set, one Bouc-Wen set for a sweep, one hysteretic set for all."""
 
 from __future__ import annotations
 

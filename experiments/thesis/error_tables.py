@@ -1,4 +1,4 @@
-"""How large are the errors of the parameter sets against the virtual rig? Tables 5.1, 6.1, 6.2 and the step comparison."""
+"""Errors of the parameter sets against the virtual rig: Tables 5.1, 6.1, 6.2 and the step comparison."""
 
 from __future__ import annotations
 

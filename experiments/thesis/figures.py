@@ -1,4 +1,4 @@
-"""How do the figures of the thesis look on the virtual rig?"""
+"""Figures of the thesis on the virtual rig."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which single model gives the frequency responses of Table 5.2 and the resonances of Figure 5.6?
+"""Search for a single model with the frequency responses of Table 5.2 and the resonances of Figure 5.6.
 
 The rig's only public measurements are one linear fit (a PT2) per sweep amplitude, each with other parameters. Here ONE
 running gear with effects of the catalogue, and with parameters that do not depend on amplitude, is fitted to all of them.

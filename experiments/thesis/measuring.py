@@ -1,4 +1,4 @@
-"""How is a record of the virtual rig read: with the method of the thesis, and with ours?
+"""Evaluation of a record of the virtual rig with the method of the thesis and with ours.
 
 Method of the thesis: ratio of Fourier transforms, cut at 80 and 30 rad/s, phase rescaled; a PT2 and a PT1 fitted to the
 magnitudes alone (its manual grid search); a PT2 fitted to a step; offsets as means. Ours: local rational method with the

@@ -1,4 +1,4 @@
-"""Which parameters do the thesis's method and ours find on the virtual rig? Tables 3.1, 4.1 and 5.2."""
+"""Parameters of the virtual rig by the method of the thesis and by ours: Tables 3.1, 4.1 and 5.2."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which numbers answer the questions that the thesis leaves open? docs/thesis.md says what follows from them."""
+"""Results for the open questions of the thesis; docs/thesis.md draws the conclusions."""
 
 from __future__ import annotations
 

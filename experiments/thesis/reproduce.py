@@ -1,4 +1,4 @@
-"""Tables and figures of the thesis, and its open questions, on the virtual rig: ours beside the published values.
+"""Tables, figures and open questions of the thesis on the virtual rig: our values beside the published ones.
 
 reproduce.py                 everything, some minutes
 reproduce.py NAME...         these only; the names stand in README.md

@@ -1,4 +1,4 @@
-"""What would the thesis have measured on the virtual rig? Its sweeps and steps, with more disturbance than in the demo.
+"""The sweeps and steps of the thesis on the virtual rig, with more disturbance than in the demo.
 
 The virtual rig is the library's: the one model that gives the thesis's tables (see fit_tables.py). The records of the rig itself
 are not public.

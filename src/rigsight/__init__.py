@@ -64,7 +64,7 @@ _HOMES = {
     "read_record": "rigsight.api.reading",
     "simulate_model": "rigsight.workflow.simulate",
 }
-"""Public name -> module that holds it."""
+"""Public name -> module that defines it."""
 
 __all__ = [
     "CATALOGUE",
@@ -95,7 +95,7 @@ __all__ = [
     "simulate_model",
 ]
 
-# Type checkers read the imports above, so that a name that does not exist is a mistake for them too.
+# Type checkers read the imports above, so that they report a name that does not exist.
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
@@ -104,7 +104,7 @@ if not TYPE_CHECKING:
         if name not in _HOMES:
             raise AttributeError(f"module 'rigsight' has no attribute '{name}'")
         found = getattr(import_module(_HOMES[name]), name)
-        # The next use finds it without asking.
+        # The next use finds it without this function.
         globals()[name] = found
         return found
 

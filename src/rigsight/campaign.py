@@ -1,4 +1,4 @@
-"""What is a campaign: one rig, its known numbers, the simulation in question, and the records about it?"""
+"""A campaign: one rig with its known constants, the given simulation, and the records."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from rigsight.simulate.drift import can_drift
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """A campaign, read or made of records, and checked.
+    """A campaign, read from a file or made from records, and checked.
 
     Attributes
     ----------
     title
-        What a report calls it.
+        Name in reports.
     rig
         The declared rig.
     constants
         All constants of the rig, defaults filled in [SI].
     parameters
-        The parameters that were given, as they were given [SI]; what is missing of the rig's is to be identified.
+        The given parameter values [SI]; missing ones are identified from the records.
     records
         In the order of the file, with distinct names.
     modelled
-        Effects that the simulation in question has already; `parameters` holds all their values.
+        Effects that the given simulation already has; `parameters` contains all their values.
     path
         The toml file; None for a campaign that was made of records in memory.
     notes
-        What was noticed about the campaign as a whole.
+        Notes on the campaign as a whole.
     """
 
     title: str
@@ -47,19 +47,19 @@ class Campaign:
     path: Path | None = None
     notes: tuple[str, ...] = ()
 
-    # That of the dataclass would hold every sample.
+    # The repr of the dataclass would contain every sample.
     def __repr__(self) -> str:
         names = [record.name for record in self.records]
         return f"Campaign({self.title!r}, rig={self.rig.name!r}, records={names!r})"
 
     @property
     def called(self) -> str:
-        """How messages call it: by its file, or by its title."""
+        """Its name in messages: the file or the title."""
         return self.title if self.path is None else self.path.name
 
     @property
     def folder(self) -> Path | None:
-        """The folder that holds its file."""
+        """The folder of its file."""
         return None if self.path is None else self.path.parent
 
     @property
@@ -69,22 +69,22 @@ class Campaign:
 
     @property
     def validation(self) -> tuple[Record, ...]:
-        """Records that are only ever scored."""
+        """Records that are only scored."""
         return tuple(record for record in self.records if record.role == "validation")
 
     @cached_property
     def given(self) -> dict[str, float]:
-        """The parameters that were given, alternatives turned into the rig's own [SI]."""
+        """The given parameter values, with alternatives converted into parameters of the rig [SI]."""
         return self.rig.in_own_parameters(self.parameters, self.constants)
 
     @cached_property
     def open_factor(self) -> OpenFactor | None:
-        """What the records that may be fitted tell up to a common factor only: those of a free motion."""
+        """Parameters that the estimation records determine only up to a common factor, because the motion is free."""
         return open_factor(self.rig, self.estimation, self.constants, self.given)
 
     @property
     def absent_spring(self) -> str | None:
-        """Name of the stiffness of one driven mass that is given without a spring."""
+        """Name of the stiffness parameter if the rig is one driven mass that is given without a spring."""
         if not (self.rig.has_one_motion and self.rig.is_driven):
             return None
         stiffness = self.rig.motion.stiffness
@@ -93,7 +93,7 @@ class Campaign:
 
     @cached_property
     def drifts(self) -> bool:
-        """True where nothing brings the rig back, so that in free run each error of a force is integrated twice."""
+        """True if the rig has no restoring force, so that in free run force errors are integrated twice."""
         if self.rig.has_one_motion:
             return self.absent_spring is not None
         return can_drift(self.rig, {**self.constants, **self.given})

@@ -62,7 +62,7 @@ def test_estimators_take_records_of_a_rig(campaign: rs.Campaign) -> None:
     records = list(campaign.records)
     fitted = rs.LinearIdentifier(n_jobs=1, rig="axis").fit(records)
     assert fitted.model_.structure.rig is RIGS["axis"]
-    with pytest.raises(rs.InputError, match="do not say which rig"):
+    with pytest.raises(rs.InputError, match="rig of the records is not given"):
         rs.LinearIdentifier().fit(records)
-    with pytest.raises(rs.InputError, match=r"about the rig 'axis', the estimator about 'servo'"):
+    with pytest.raises(rs.InputError, match=r"of the rig 'axis', but the estimator has rig='servo'"):
         rs.LinearIdentifier(rig="servo").fit(campaign)

@@ -28,14 +28,14 @@ def part(tmp_path: Path, outcome_like: Callable[..., Outcome]) -> Path:
     [
         (["--campaigns", "a"], ["--keys is missing"]),
         (["--keys", "a"], ["--campaigns is missing"]),
-        (["--merge", "a", "--rescore"], ["--merge and --rescore", "together"]),
+        (["--merge", "a", "--rescore"], ["--merge and --rescore", "cannot be combined"]),
         (["--merge", "a", "--campaigns", "b", "--keys", "c"], ["--merge and --campaigns"]),
         (["--rescore", "--trial", "3"], ["--rescore runs no trial"]),
         (["--trial", "three"], ["--trial must be a number", "'three'", "--campaigns"]),
         (["--trial", "9999", "--design", "small"], ["numbered from 0", "9999"]),
         (["--trial", "60", "--design", "laboratory"], ["numbered from 0 to 59", "60"]),
-        (["--campaigns", "gone", "--keys", "gone"], ["no folder", "--campaigns"]),
-        (["--rescore"], ["no blind bench", "--out"]),
+        (["--campaigns", "gone", "--keys", "gone"], ["not a folder", "--campaigns"]),
+        (["--rescore"], ["does not contain a blind bench", "--out"]),
         (["--merge", "gone"], ["no scored trials", "--rescore"]),
     ],
 )

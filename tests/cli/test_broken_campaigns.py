@@ -61,7 +61,7 @@ def jitter(folder: Path) -> None:
 
 toml = "campaign.toml"
 BROKEN_CAMPAIGNS: dict[str, tuple[Callable[[Path], None], tuple[str, ...]]] = {
-    "no toml": (lambda f: (f / toml).unlink(), ("holds no campaign.toml",)),
+    "no toml": (lambda f: (f / toml).unlink(), ("contains no campaign.toml",)),
     "invalid toml": (replaced(toml, "[rig]", "[rig"), (toml, "line 3")),
     "not utf-8": (lambda f: (f / toml).write_bytes(b"title = '\xff'"), (toml, "UTF-8")),
     "unknown key": (replaced(toml, "role", "rolle"), ("rolle", "Did you mean 'role'")),
@@ -77,7 +77,7 @@ BROKEN_CAMPAIGNS: dict[str, tuple[Callable[[Path], None], tuple[str, ...]]] = {
         ("records", "[[records]]"),
     ),
     "missing file": (replaced(toml, "fit.csv", "fitt.csv"), ("fitt.csv", "Did you mean 'fit.csv'")),
-    "path outside": (replaced(toml, "fit.csv", "../fit.csv"), ("leaves the campaign's folder",)),
+    "path outside": (replaced(toml, "fit.csv", "../fit.csv"), ("lies outside the campaign's folder",)),
     "missing column": (replaced("fit.csv", "t,u,x", "t,u,pos"), ("fit.csv", "no column 'x'", "Its columns")),
     "not a number": (cell(7, 2, "oops"), ("fit.csv", "line 8", "column 'x'", "oops")),
     "empty cell": (cell(7, 1, ""), ("line 8", "column 'u'", "empty")),

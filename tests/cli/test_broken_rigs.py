@@ -52,11 +52,11 @@ def linked(folder: Path) -> None:
 FILE = 'file = "train.toml"'
 BROKEN: dict[str, tuple[Change, tuple[str, ...]]] = {
     "neither model nor file": (replaced(toml, FILE, ""), ("rig.model: is missing", "rigsight rigs lists")),
-    "both": (replaced(toml, FILE, f'{FILE}\nmodel = "servo"'), ("rig.file: stands beside rig.model",)),
+    "both": (replaced(toml, FILE, f'{FILE}\nmodel = "servo"'), ("rig.file: cannot be given together with rig.model",)),
     "unknown rig": (replaced(toml, FILE, 'model = "drive_tran"'), ("Did you mean 'drive_train'", "two_link_arm")),
     "no rig file": (replaced(toml, "train.toml", "trian.toml"), ("rig.file", "Did you mean 'train.toml'")),
-    "rig file outside": (replaced(toml, "train.toml", "../train.toml"), ("rig.file", "leaves the campaign's")),
-    "rig file linked": (linked, ("rig.file", "is a link that leaves")),
+    "rig file outside": (replaced(toml, "train.toml", "../train.toml"), ("rig.file", "lies outside the campaign's")),
+    "rig file linked": (linked, ("rig.file", "is a link to a file outside")),
     "rig file is a folder": (replaced(toml, "train.toml", "."), ("rig.file", "does not exist")),
     "rig file no toml": (replaced(train, "[energy]", "[energy"), ("train.toml", "not valid TOML", "line")),
     "rig file with a slip": (replaced(train, '"phi_m - phi_l"', '"phi_m - phi_x"'), ("train.toml, line", "phi_x")),
@@ -84,15 +84,15 @@ BROKEN: dict[str, tuple[Change, tuple[str, ...]]] = {
     ),
     "mapping of no signal": (
         replaced(toml, '"both.csv"', '"both.csv"\ncolumns = { psi = "u" }'),
-        ("columns.psi: no signal of train", "motor_angle"),
+        ("columns.psi: is not a signal of train", "motor_angle"),
     ),
     "constant of no input": (
         replaced(toml, '"both.csv"', '"both.csv"\ninputs = { v = 1.0 }'),
-        ("inputs.v: no input of train", "Inputs: u"),
+        ("inputs.v: is not an input of train", "Inputs: u"),
     ),
     "constant beside its column": (
         replaced(toml, '"both.csv"', '"both.csv"\ninputs = { u = 1.0 }\ncolumns = { u = "u" }'),
-        ("inputs.u: stands beside columns.u",),
+        ("inputs.u: cannot be given together with columns.u",),
     ),
     "sensors that never move": (
         lambda f: np.savetxt(f / "both.csv", np.ones((80, 3)) * np.arange(80)[:, None] * [[0.01, 1.0, 0.0]],
@@ -164,7 +164,7 @@ COMMANDS: dict[str, tuple[Callable[[Path], list[object]], tuple[str, ...]]] = {
     ),
     "a constant that is no number": (
         lambda f: ["simulate", f / "model.json", f / "both.csv", "--constant", "k_t=much"],
-        ("--constant 'k_t=much'", "no number"),
+        ("--constant 'k_t=much'", "is not a number"),
     ),
 }
 

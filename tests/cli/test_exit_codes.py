@@ -86,7 +86,7 @@ def test_an_interrupted_diagnosis_leaves_nothing(
     assert process.returncode == 130, seen + stderr
     assert stdout == ""
     assert "Traceback" not in stderr
-    assert stderr.strip().endswith("interrupted; nothing was written; the same command goes on from there.")
+    assert stderr.strip().endswith("interrupted; nothing was written; the same command continues from there.")
     assert not out.parent.exists()
 
 
@@ -107,7 +107,7 @@ def test_requests_to_end_end_like_ctrl_c(
     before = signal.getsignal(number)
     code, stdout, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
     assert (code, stdout) == (expected, "")
-    assert stderr == "rigsight: interrupted; nothing was written; the same command goes on from there.\n"
+    assert stderr == "rigsight: interrupted; nothing was written; the same command continues from there.\n"
     assert not (tmp_path / "out").exists()
     assert signal.getsignal(number) == before
 
@@ -131,7 +131,7 @@ def test_a_request_that_comes_where_exceptions_are_dropped_is_not_lost(
     monkeypatch.setattr("rigsight.workflow.diagnose.prepare_kernels", lambda *_, **__: None)
     code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
     assert code == 130
-    assert stderr == "rigsight: interrupted; nothing was written; the same command goes on from there.\n"
+    assert stderr == "rigsight: interrupted; nothing was written; the same command continues from there.\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals differ there")
@@ -167,7 +167,7 @@ def test_output_that_finds_no_room_is_told(axis_campaign: Path) -> None:
             [RIGSIGHT, "inspect", record], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
     assert shown.returncode == 2
-    assert shown.stderr.startswith("rigsight: the output cannot be written: No space left on device.")
+    assert shown.stderr.startswith("rigsight: the output cannot be printed: No space left on device.")
     assert shown.stderr.count("\n") == 1
 
 
@@ -176,7 +176,10 @@ def test_output_that_finds_no_room_is_told(axis_campaign: Path) -> None:
     [
         (OSError(errno.ENOSPC, "No space left on device"), "set TMPDIR"),
         (FileNotFoundError(errno.ENOENT, "No usable temporary directory found in ['/tmp']"), "set TMPDIR"),
-        (PermissionError(errno.EACCES, "Permission denied", "/there"), "/there may not be read or written"),
+        (
+            PermissionError(errno.EACCES, "Permission denied", "/there"),
+            "no permission to read or write /there. Change its permissions",
+        ),
     ],
 )
 def test_a_disk_that_takes_or_gives_nothing_is_no_defect(
@@ -250,9 +253,9 @@ def test_a_bench_that_is_interrupted_goes_on_and_its_settings_are_no_results(
         write_together(tmp_path / "bench" / "keys", {"settings.json": "{}"})
         raise KeyboardInterrupt
 
-    with pytest.raises(SystemExit), report_errors(debug=False, left="the same command goes on from here"):
+    with pytest.raises(SystemExit), report_errors(debug=False, left="the same command continues from here"):
         interrupted()
-    assert capsys.readouterr().err == "rigsight: interrupted; the same command goes on from here.\n"
+    assert capsys.readouterr().err == "rigsight: interrupted; the same command continues from here.\n"
 
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EFBIG])
@@ -265,7 +268,9 @@ def test_a_limit_of_the_session_is_no_defect(
     monkeypatch.setattr("rigsight.workflow.diagnose.diagnose_campaign", limited)
     code, _, stderr = run("diagnose", axis_campaign, "-o", tmp_path / "out", "--quiet")
     assert code == 2
-    assert stderr.startswith(f"rigsight: a limit of this session stands in the way: {os.strerror(number)}.")
+    assert stderr.startswith(
+        f"rigsight: a resource limit of this session was reached: {os.strerror(number)}."
+    )
 
 
 def test_a_terminal_shows_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:

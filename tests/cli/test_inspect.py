@@ -99,7 +99,7 @@ def test_init_tells_what_is_left_to_do(tmp_path: Path, run: Run) -> None:
 
 def test_init_says_that_the_rig_is_a_guess_unless_it_was_told(tmp_path: Path, run: Run) -> None:
     write_text(tmp_path / "run.csv", ROWS, {})
-    assert "The rig is a guess from the channels" in run("init", tmp_path)[1]
+    assert "The rig was guessed from the channels" in run("init", tmp_path)[1]
     (tmp_path / "campaign.toml").unlink()
     assert "guess" not in run("init", tmp_path, "--model", "axis")[1]
 

@@ -99,8 +99,8 @@ def test_a_function_moves_a_rig(stage: Path, run: Run) -> None:
 @pytest.mark.parametrize(
     ("named", "message"),
     [
-        ("stage.py", "--simulator: got 'stage.py'. --simulator names a Python file and a function in it"),
-        ("stage.txt:f", "--simulator names a Python file"),
+        ("stage.py", "--simulator: got 'stage.py'. --simulator expects a Python file and a function in it"),
+        ("stage.txt:f", "--simulator expects a Python file"),
         ("none.py:accelerations", "does not exist"),
         ("stage.py:acceleration", "has no function 'acceleration'. Did you mean 'accelerations'?"),
     ],

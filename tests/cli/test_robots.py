@@ -20,7 +20,7 @@ def test_a_model_becomes_a_rig_file_and_a_campaign_once_records_are_there(tmp_pa
     code, stdout, stderr = run("init", folder, "--mjcf", CART)
     assert (code, stderr) == (0, "Equations of 2 coordinates ...\n")
     assert f"Written: {folder / 'cart_pole.toml'} (2 joints)" in stdout
-    assert "without dry friction: it moves as MuJoCo does" in stdout
+    assert "agrees with MuJoCo, without dry friction" in stdout
     assert "columns t, push_ctrl, slider_position, hinge_angle" in stdout
     assert read_rig_file(folder / "cart_pole.toml").name == "cart_pole"
     t = 0.01 * np.arange(200)
@@ -47,7 +47,7 @@ def test_machines_are_told_what_was_left_out(tmp_path: Path, run: Run) -> None:
     told = json.loads(stdout)
     assert code == 0
     assert told["left_out"] == [
-        "range of joints: slider; the rig moves past it; use the effect end_stop for it"
+        "range of joints: slider; the rig has no end stops there; use the effect end_stop"
     ]
     assert max(told["free_run"]["relative_difference"].values()) < 1e-5
 
@@ -62,7 +62,7 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
     model.write_text(limp, "utf-8")
     code, stdout, stderr = run("init", tmp_path / "stage", "--mjcf", model, "--quiet")
     assert (code, stdout) == (0, "")
-    assert "does not move as MuJoCo does" in stderr
+    assert "the free run of the rig differs from MuJoCo" in stderr
     head = (tmp_path / "stage" / "robot.toml").read_text("utf-8")
     assert "# - the option that switches damping of joints off: the rig has it" in head
 
@@ -74,14 +74,14 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
         (["init", "--mjcf", CART, "--model", "axis"], "leave out --model"),
         (["init", "--mjcf", CART, "--gear", "hinge"], "JOINT=STIFFNESS"),
         (["init", "--mjcf", CART, "--gear", "slidr=1"], "Did you mean 'slider'"),
-        (["init", "--mjcf", CART, "--gear", "slider=-1"], "is positive, got -1"),
+        (["init", "--mjcf", CART, "--gear", "slider=-1"], "must be positive, got -1"),
         (["init", "--mjcf", CART, "--gear", "slider=100"], "has no armature"),
         (["init", CART, "--mjcf", CART], "a file is in the way"),
         (["init", "--gear", "slider=100"], "name the model with --mjcf"),
         (["init"], "Name the FOLDER"),
         (["export", "MODEL", "--to", "mjcf"], "name the MJCF or URDF file"),
         (["export", "MODEL", "--to", "mjcf", "--mjcf", CART], "has a joint"),
-        (["export", "MODEL", "--to", "mjcf", "--mjcf", CART, "--hold", "zoh"], "say nothing of mjcf"),
+        (["export", "MODEL", "--to", "mjcf", "--mjcf", CART, "--hold", "zoh"], "do not apply to mjcf"),
         (["export", "MODEL", "--to", "c", "--mjcf", CART], "leave it out for c"),
     ],
 )
@@ -142,7 +142,7 @@ def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run
     )
     code, stdout, _ = run("init", folder, "--mjcf", model, "--as-it-is")
     assert code == 0
-    assert "it moves as MuJoCo does" in stdout
+    assert "agrees with MuJoCo" in stdout
     assert "Not taken over" not in stdout
     text = (folder / "robot.toml").read_text("utf-8")
     assert '[simulator]\nkind = "mujoco"\nfile = "../robot.xml"' in text
@@ -152,7 +152,7 @@ def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run
     campaign.write_text(said.replace('simulator = "mujoco"', 'simulator = "fmu"'), "utf-8")
     code, _, stderr = run("identify", folder, "--out", tmp_path / "out")
     assert code == 2
-    assert "simulator is 'fmu'; the rig file leaves its bodies to mujoco" in stderr
+    assert "simulator is 'fmu', but the rig file simulates its bodies with mujoco" in stderr
     campaign.write_text(said.replace('simulator = "mujoco"', "#"), "utf-8")
     code, _, stderr = run("identify", folder, "--out", tmp_path / "out")
     assert code == 2
@@ -163,7 +163,7 @@ def test_bodies_are_left_to_mujoco_with_what_binds_them(tmp_path: Path, run: Run
     ("options", "message"),
     [
         (("--mjcf", CART, "--as-it-is", "--gear", "hinge=50"), "a gear splits a joint in two"),
-        (("--as-it-is",), "--as-it-is is of a robot's model"),
+        (("--as-it-is",), "--as-it-is applies only to the model of a robot"),
     ],
 )
 def test_options_that_contradict_each_other_are_told(

@@ -63,8 +63,8 @@ def test_without_a_force_the_map_of_states_shows_the_residual_alone(diagnosis: D
     blind = tuple(replace(part, force_mean=math.nan) for part in diagnosis.localization.by_state)
     where = replace(diagnosis.localization, by_state=blind)
     (maps,) = output_maps(replace(diagnosis, localization=where))
-    assert "what the equations lack" in str(output_maps(diagnosis)[0].figures[1].image)
-    assert "what the equations lack" not in str(maps.figures[1].image)
+    assert "force missing in the equations" in str(output_maps(diagnosis)[0].figures[1].image)
+    assert "force missing in the equations" not in str(maps.figures[1].image)
 
 
 def test_the_budget_shows_its_intervals(page_of: Callable[[str], str]) -> None:

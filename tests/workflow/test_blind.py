@@ -259,7 +259,7 @@ def test_rescoring_scores_what_is_diagnosed_and_runs_nothing(tmp_path: Path, ste
     assert [t["noise"] for t in content["trials"]] == ["low", "high"]
     assert steps.done["diagnose", "001"] == 1
     assert rescore(tmp_path, n_jobs=1)["n_trials"] == 2
-    with pytest.raises(InputError, match="no blind bench"):
+    with pytest.raises(InputError, match="does not contain a blind bench"):
         rescore(tmp_path / "elsewhere")
 
 

@@ -190,7 +190,7 @@ def test_other_constants_than_the_campaign_has_are_told(gear: Path, tmp_path: Pa
     campaign.write_text(campaign.read_text().replace("v = 1.0", "v = 2.0"), encoding="utf-8")
     notes = run_compare(tmp_path, ["nominal"], n_jobs=1).notes
     assert notes == (
-        "Model 'nominal' has other constants than the campaign: v = 1 (campaign: 2). It is compared as it is.",
+        "Model 'nominal' has other constants than the campaign: v = 1 (campaign: 2). It is compared with its own constants.",
     )
 
 

@@ -162,7 +162,7 @@ def test_every_command_takes_a_decay(tmp_path: Path) -> None:
 
 def test_a_file_without_an_input_is_proposed_as_a_free_motion(tmp_path: Path) -> None:
     folder = campaign(tmp_path / "c")
-    assert "nothing drives the rig" in run_inspect(folder / "high.csv").proposal
+    assert "taken as 0 (no excitation)" in run_inspect(folder / "high.csv").proposal
     (folder / "campaign.toml").unlink()
     draft = run_init(folder)
     assert (draft.model, draft.n_blanks) == ("axis", 0)

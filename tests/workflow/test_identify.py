@@ -64,7 +64,7 @@ def test_the_joint_set_is_better_than_any_record_alone(linear: Identification) -
     for name, value in TRUTH.items():
         assert abs(fit.values[name] - value) < 4.0 * fit.standard_errors[name], name
         assert fit.standard_errors[name] < min(r.estimates[name][1] for r in linear.records), name
-    assert linear.joint.statement.startswith("One parameter set serves all 3")
+    assert linear.joint.statement.startswith("One parameter set fits all 3")
     assert linear.joint.conicity is not None
     low, high = linear.joint.conicity.interval or (np.nan, np.nan)
     assert low < 0.024 < high
@@ -81,7 +81,7 @@ def test_validation_records_are_scored_and_never_fitted(linear: Identification) 
 
 
 def test_a_validation_amplitude_outside_what_was_identified_is_told(linear: Identification) -> None:
-    told = [warning for warning in linear.warnings if "outside what was identified" in warning]
+    told = [warning for warning in linear.warnings if "outside the identified range" in warning]
     assert len(told) == 1
     assert "'beyond'" in told[0]
     assert "1.5 A" in told[0]
@@ -148,13 +148,15 @@ def test_a_hardening_spring_is_seen_in_the_amplitudes(hardening: Identification)
     assert "k_c rises" in hardening.amplitude_statement
     assert "rigsight diagnose" in hardening.amplitude_statement
     assert not {"l_0", "c_y"} & set(hardening.changing)
-    assert any("not the whole of the rig" in warning for warning in hardening.warnings)
+    assert any(
+        "the model order of the linear equation is too low" in warning for warning in hardening.warnings
+    )
 
 
 def test_no_set_serves_a_hardening_spring_and_its_lateral_part_stays_clean(hardening: Identification) -> None:
     joint = hardening.joint
-    assert joint.statement.startswith("No single parameter set serves all 3")
-    assert "pulls most" in joint.statement
+    assert joint.statement.startswith("No single parameter set fits all 3")
+    assert "The difference is largest for" in joint.statement
     # The lateral equation is linear all the same; a wrong yaw angle must not spoil its numbers.
     assert joint.pooled is not None
     for name in ("l_0", "c_y"):

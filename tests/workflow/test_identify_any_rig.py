@@ -414,5 +414,5 @@ def test_a_rig_of_one_motion_in_other_words_is_refused_where_words_count() -> No
     stage = rig_of_text(words.replace('damping = "d"', 'damping = "damper"'))
     t = np.linspace(0.0, 1.0, 50)
     record = Record("one", 0.02, {"u": np.sin(t), "x": np.cos(t)}, {"u": "N", "x": "m"})
-    with pytest.raises(InputError, match="'stage' of your own yet: of rigs of one motion it takes axis"):
+    with pytest.raises(InputError, match="your rig 'stage': for rigs of one motion it supports only axis"):
         regression_data(make_campaign(stage, [record]))

@@ -55,7 +55,7 @@ def test_a_drive_in_kilonewtons_is_converted(tmp_path: Path) -> None:
 def test_a_time_that_is_hardly_in_seconds_is_asked_about(tmp_path: Path) -> None:
     write_text(tmp_path / "run.csv", {"t": 1e3 * T, "u": SWEEP, "x": ANSWER}, {})
     run_init(tmp_path)
-    assert "sample time 10 s; is it in ms?" in (tmp_path / "campaign.toml").read_text("utf-8")
+    assert "sample time of 10 s; is it in ms?" in (tmp_path / "campaign.toml").read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -106,7 +106,7 @@ def test_the_last_channel_is_taken_for_the_last_signal_and_asked_about(tmp_path:
     write_text(tmp_path / "a.csv", {"t": T, "u": SWEEP, "y": ANSWER}, {})
     draft = run_init(tmp_path)
     text = draft.path.read_text("utf-8")
-    assert 'x = "y"  # taken to be in m; check; the only channel left: check' in text
+    assert 'x = "y"  # assumed in m; check; guessed: the only remaining channel; check' in text
     assert "init --model" in text
     assert "rigsight rigs NAME" in text
     np.testing.assert_array_equal(read_campaign(tmp_path).records[0]["x"], ANSWER)
@@ -214,12 +214,12 @@ def test_a_campaign_is_never_overwritten(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_where_there_is_nothing(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no measured file"):
+    with pytest.raises(InputError, match="no usable measured file"):
         run_init(tmp_path)
     (tmp_path / "broken.mat").write_bytes(b"no")
     with pytest.raises(InputError, match=r"broken.mat: is no MATLAB file"):
         run_init(tmp_path)
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         run_init(tmp_path / "nowhere")
     assert [path.name for path in tmp_path.iterdir()] == ["broken.mat"]
 

@@ -169,7 +169,7 @@ def test_one_parameter_has_a_picture_of_the_plain_name_and_progress_and_the_same
         ({"model": "nowhere/model.json"}, "does not exist"),
         ({"parameters": ["bta"]}, "Did you mean 'beta'"),
         ({"parameters": []}, "Name a parameter"),
-        ({"parameters": ["beta", "a"], "low": 1.0}, "belong to one parameter"),
+        ({"parameters": ["beta", "a"], "low": 1.0}, "can be used with one parameter only"),
         ({"parameters": ["a"], "high": 1.5}, r"--to.*\[0, 1\]"),
         ({"low": 5.0, "high": 5.0}, "only one value"),
         ({"steps": 1}, "--steps"),

@@ -11,12 +11,12 @@ T = TypeVar("T")
 
 
 def named(what: str, name: str | None, known: Mapping[str, T]) -> T:
-    """Return the thing of this name, the first one for None.
+    """Return the item with this name, the first one for None.
 
     Parameters
     ----------
     what
-        What kind of thing, for messages.
+        Kind of item, for messages.
     name
         Its name, or None.
     known
@@ -28,5 +28,5 @@ def named(what: str, name: str | None, known: Mapping[str, T]) -> T:
         If there is none, or none of this name.
     """
     if not known:
-        raise InputError(f"The result holds no {what} to be shown.")
+        raise InputError(f"The result contains no {what} to show.")
     return next(iter(known.values())) if name is None else known[check_option(f"The {what}", name, known)]

@@ -24,20 +24,20 @@ def compare_models(
     n_jobs: int | None = None,
     verbose: bool = False,
 ) -> ComparisonResult:
-    """Score models on all records of a campaign: frequency responses, steps and free runs, each beside its noise floor.
+    """Score models on all records of a campaign: frequency responses, steps and free runs, each with its noise floor.
 
     What ``rigsight compare`` does.
 
     Parameters
     ----------
     campaign
-        A campaign, or the toml file or the folder that holds one.
+        A campaign, or the toml file or the folder that contains one.
     models
         Name -> model; or files, folders and names of published sets, as on the command line.
     method
         Estimator of all frequency responses: ``"local_rational"``, ``"local_polynomial"``, ``"h1"`` or ``"thesis"``.
     step_seconds
-        Time from a step in which it is compared [s].
+        Time after a step over which it is compared [s].
     n_jobs
         Records compared at the same time; None for one per processor.
     verbose

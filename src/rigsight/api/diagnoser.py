@@ -20,10 +20,10 @@ from rigsight.workflow.run.progress_display import listening
 
 
 class Diagnoser(CampaignEstimator):
-    """Name the effect that a simulation leaves out, where it acts, and how far the gap shrinks with it.
+    """Find the effect that is missing in a simulation, where it acts, and how far it closes the gap.
 
-    Each candidate is added to the simulation and fitted to the estimation records by output error; the validation records
-    judge. What ``rigsight diagnose`` does.
+    Each candidate is added to the simulation and fitted to the estimation records by output error; the ranking
+    is by the validation records. The same as ``rigsight diagnose``.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ class Diagnoser(CampaignEstimator):
     verbose
         Show progress on stderr.
     rig
-        Rig of the records where `fit` is given records alone: a built-in one by its name, or one of your own.
+        Rig of the records if `fit` gets records instead of a campaign: the name of a built-in rig, or a rig of your own.
 
     Attributes
     ----------
     diagnosis_
-        What was found: verdict, ranking, gap budget.
+        The result: verdict, ranking, gap budget.
     model_
         The diagnosed simulation, with the effects of the verdict added.
 
@@ -52,7 +52,7 @@ class Diagnoser(CampaignEstimator):
 
     Examples
     --------
-    A stage whose given simulation knows its mass, damper and linear spring, and not that the spring hardens:
+    A stage with a hardening spring; its given simulation has the mass, the damper and a linear spring:
 
     >>> import rigsight as rs
     >>> campaign = rs.example_campaign()
@@ -87,7 +87,7 @@ class Diagnoser(CampaignEstimator):
         Parameters
         ----------
         campaign
-            A campaign, the toml file or the folder that holds one, or records of `rig`.
+            A campaign, the toml file or the folder that contains one, or records of `rig`.
 
         Returns
         -------

@@ -92,7 +92,7 @@ class DiagnosisResult(Diagnosis):
         Raises
         ------
         InputError
-            If there is no such picture, record or output, or no number to draw by record.
+            If there is no such picture, record or output, or no parameter was estimated by record.
         """
         check_option("The picture", picture, get_args(Picture))
         if picture == "gap":
@@ -112,9 +112,9 @@ class DiagnosisResult(Diagnosis):
         ----------
         table
             ``"candidates"``: a row per set of effects that was tried, best first; errors are NRMSE on the validation records.
-            ``"gap"``: a row per output with the NRMSE of each stage. ``"parameters"``: a row per fitted number of the named
-            simulation, with its standard error and unit. ``"trust"``: a row per number and group (a record, an amplitude, windows
-            of a length) with the value that it has there, and how the number differs between groups.
+            ``"gap"``: a row per output with the NRMSE of each stage. ``"parameters"``: a row per fitted parameter of the
+            diagnosed simulation, with its standard error and unit. ``"trust"``: a row per parameter and group (a record, an
+            amplitude, windows of a length) with its value there, and how the parameter differs between groups.
 
         Raises
         ------

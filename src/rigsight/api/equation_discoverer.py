@@ -18,7 +18,7 @@ from rigsight.workflow.run.progress_display import listening
 
 
 class EquationDiscoverer(CampaignEstimator):
-    """Discover the governing equations by sparse regression, refined by output-error fits and selected on held-out records.
+    """Discover the equations of motion by sparse regression, refined by output-error fits and selected on held-out records.
 
     What ``rigsight discover`` does.
 
@@ -30,7 +30,7 @@ class EquationDiscoverer(CampaignEstimator):
     pointwise
         Regress sample by sample instead of in the weak form.
     one_by_one
-        Discover on each estimation record alone as well.
+        Also discover on each estimation record alone.
     seed
         Seed of the ensembles.
     n_jobs
@@ -38,12 +38,12 @@ class EquationDiscoverer(CampaignEstimator):
     verbose
         Show progress on stderr.
     rig
-        Rig of the records where `fit` is given records alone: a built-in one by its name, or one of your own.
+        Rig of the records if `fit` gets records instead of a campaign: the name of a built-in rig, or a rig of your own.
 
     Attributes
     ----------
     discovery_
-        What was found: equations, coefficients with standard errors, inclusion probabilities.
+        The result: equations, coefficients with standard errors, inclusion probabilities.
     model_
         The simulation with the equations found.
 
@@ -87,7 +87,7 @@ class EquationDiscoverer(CampaignEstimator):
         Parameters
         ----------
         campaign
-            A campaign, the toml file or the folder that holds one, or records of `rig`.
+            A campaign, the toml file or the folder that contains one, or records of `rig`.
 
         Returns
         -------

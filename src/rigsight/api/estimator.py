@@ -21,7 +21,7 @@ from rigsight.workflow.simulate import simulate_model
 if TYPE_CHECKING:
 
     class BaseEstimator:
-        """What is used of scikit-learn's, which has no types: on an unknown base no misspelled attribute would be seen."""
+        """The used part of scikit-learn's base class, which is untyped: with it, misspelled attributes would go unnoticed."""
 
         def get_params(self, deep: bool = True) -> dict[str, Any]:
             """Return the settings."""
@@ -39,7 +39,7 @@ class CampaignEstimator(BaseEstimator):
     Attributes
     ----------
     model_
-        The simulation that `fit` found, with all its numbers.
+        The fitted simulation, with all its parameter values.
     """
 
     model_: Model
@@ -79,12 +79,12 @@ class CampaignEstimator(BaseEstimator):
         Parameters
         ----------
         deep
-            Without meaning here: no setting is an estimator.
+            Ignored: no setting is an estimator.
         """
         return super().get_params(deep)
 
     def set_params(self, **params: Any) -> Self:
-        """Change settings and return the estimator; it has to be fitted anew.
+        """Change settings and return the estimator; it must be fitted again.
 
         Parameters
         ----------
@@ -104,12 +104,12 @@ def campaign_of(
     own_effects: Iterable[Effect] = (),
     rig: str | Rig | None = None,
 ) -> Campaign:
-    """Return a campaign, read where its file or folder is named, or made of records.
+    """Return a campaign: as given, read from its file or folder, or made from records.
 
     Parameters
     ----------
     campaign
-        A campaign, the toml file or the folder that holds one, or records of `rig`.
+        A campaign, the toml file or the folder that contains one, or records of `rig`.
     own_effects
         Effects that it may name beside those of the catalogue.
     rig
@@ -118,21 +118,21 @@ def campaign_of(
     Raises
     ------
     InputError
-        Naming file and key of what cannot be used; or if records come without a rig, or a campaign is about another one.
+        Naming file and key of what cannot be used; or if records are given without a rig, or a campaign is of another rig.
     """
     found = None if rig is None else rig_of(rig)
     if isinstance(campaign, Sequence) and not isinstance(campaign, str):
         if found is None:
             raise InputError(
-                "Records alone do not say which rig they are of: name it, as in rs.Diagnoser(rig=...), or make a campaign of "
-                "them with rs.make_campaign(rig, records)."
+                "The rig of the records is not given: name it, for instance rs.Diagnoser(rig=...), or make a campaign with "
+                "rs.make_campaign(rig, records)."
             )
         return make_campaign(found, campaign)
     own_rigs = () if found is None or found.name in RIGS else (found,)
     read = campaign if isinstance(campaign, Campaign) else read_campaign(campaign, own_effects, own_rigs)
     if found is not None and read.rig.mechanism != found.mechanism:
         raise InputError(
-            f"The campaign '{read.title}' is about the rig '{read.rig.name}', the estimator about '{found.name}'. Leave rig out, "
-            "or give records of that rig."
+            f"The campaign '{read.title}' is of the rig '{read.rig.name}', but the estimator has rig='{found.name}'. Leave rig "
+            "out, or give records of that rig."
         )
     return read

@@ -12,7 +12,7 @@ from rigsight.workflow.campaign.in_memory import make_campaign, make_model
 
 _GIVEN = {"m": 2.0, "d": 5.0, "k": 800.0}
 _K_3 = 5e6
-"""Cubic stiffness that the given simulation lacks [N/m^3]."""
+"""Cubic stiffness that is missing in the given simulation [N/m^3]."""
 _NOISE = 2e-5
 """Standard deviation of the sensor noise [m]."""
 _DT = 5e-3
@@ -20,15 +20,15 @@ _BAND = (3.0, 60.0)
 """First and last angular frequency of the sweeps [rad/s]."""
 _N_SAMPLES = 2000
 _REST = 200
-"""Samples before the sweep, in which the noise is seen alone."""
+"""Samples of rest before the sweep, which show only noise."""
 
 
 def example_campaign(seed: int = 0) -> Campaign:
     """Return two sweeps of a simulated stage, an axis with a hardening spring, and a simulation without the hardening.
 
     The stage obeys ``m x'' + d x' + k x + k_3 x^3 = u`` with m = 2 kg, d = 5 N s/m, k = 800 N/m and k_3 = 5e6 N/m^3; its sensor
-    has noise of 0.02 mm. The given simulation has the same numbers and no k_3. One sweep of 4 N is for estimation, one of 3 N for
-    validation; each lasts 10 s.
+    has noise of 0.02 mm. The given simulation has the same parameter values and no k_3. One sweep of 4 N is for estimation, one
+    of 3 N for validation; each lasts 10 s.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class IdentificationResult(Identification):
         Parameters
         ----------
         picture
-            ``"responses"``: frequency responses of all records over each other, measured and fitted. ``"amplitudes"``: the
+            ``"responses"``: frequency responses of all records in one plot, measured and fitted. ``"amplitudes"``: the
             parameters of each record over its amplitude. ``"bode"``: one record with the 95 % bands.
         record
             Name of the record, for ``"bode"``; by default the first.
@@ -74,13 +74,13 @@ class IdentificationResult(Identification):
             drawing = bode_figure(named("record", record, {r.record.name: r for r in self.records}), self)
         if drawing is None:
             raise InputError(
-                f"The picture '{picture}' has nothing to show: no sweep or multisine gave a response, or no fit succeeded. The "
-                "warnings of the result say why."
+                f"The picture '{picture}' would be empty: no sweep or multisine gave a response, or no fit succeeded. See the "
+                "warnings of the result for the reason."
             )
         return drawing
 
     def to_dataframe(self, table: Table = "records") -> pd.DataFrame:
-        """Return the parameters as a table in SI units, a row per number.
+        """Return the parameters as a table in SI units, a row per parameter.
 
         Parameters
         ----------

@@ -20,8 +20,8 @@ from rigsight.workflow.run.progress_display import listening
 class LinearIdentifier(CampaignEstimator):
     """Identify the parameters of the linear rig, from each record alone and from all of them together.
 
-    Frequency responses of sweeps and multisines are estimated and fitted, steps are fitted over time, and one set of numbers
-    is fitted to all estimation records by output error. What ``rigsight identify`` does.
+    Frequency responses of sweeps and multisines are estimated and fitted, steps are fitted in the time domain, and one parameter
+    set is fitted to all estimation records by output error. The same as ``rigsight identify``.
 
     Parameters
     ----------
@@ -34,14 +34,14 @@ class LinearIdentifier(CampaignEstimator):
     verbose
         Show progress on stderr.
     rig
-        Rig of the records where `fit` is given records alone: a built-in one by its name, or one of your own.
+        Rig of the records if `fit` gets records instead of a campaign: the name of a built-in rig, or a rig of your own.
 
     Attributes
     ----------
     identification_
-        What was found: numbers of each record and of all together, with standard errors.
+        The result: parameters of each record and of all together, with standard errors.
     model_
-        The linear simulation with the numbers of all records together.
+        The linear simulation with the parameters of all records together.
 
     References
     ----------
@@ -78,7 +78,7 @@ class LinearIdentifier(CampaignEstimator):
         Parameters
         ----------
         campaign
-            A campaign, the toml file or the folder that holds one, or records of `rig`.
+            A campaign, the toml file or the folder that contains one, or records of `rig`.
 
         Returns
         -------

@@ -36,17 +36,17 @@ def read_record(
     path
         Delimited text, or a measurement file of a format that ``rigsight inspect`` reads.
     rig
-        Whose signals it holds: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x), ``"element"`` (t, x, force), the name
+        Rig of the signals: ``"running_gear"`` (t, u, psi, y), ``"axis"`` (t, u, x), ``"element"`` (t, x, force), the name
         of another built-in rig, or a rig of your own.
     columns
         Columns of the signals and of time ``t``, and their conversion to SI units; by default the columns with the same names. A
-        record of a closed loop may hold the ``reference`` of its controller beside them.
+        record of a closed loop may also contain the ``reference`` of its controller.
     require_outputs
         False to simulate the record: its time and inputs suffice.
     name
-        How results call the record, by default the file's name without its ending.
+        Name of the record in results, by default the file's name without its suffix.
     role
-        ``"estimation"`` may be fitted, ``"validation"`` is only ever scored.
+        ``"estimation"`` records may be fitted, ``"validation"`` records are only scored.
     kind
         What drove the rig: ``"sweep"``, ``"step"``, ``"multisine"`` or ``"operation"``.
     amplitude
@@ -58,7 +58,7 @@ def read_record(
     resample
         Sample time [s] onto which signals are interpolated; without it, signals that do not share one time axis are refused.
     constants
-        Constants of the rig that have another value in this record: a known payload.
+        Constants of the rig with a different value in this record, such as a known payload.
 
     Returns
     -------

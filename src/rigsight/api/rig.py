@@ -14,7 +14,7 @@ Tables = Mapping[str, Table]
 
 
 class Rig(DeclaredRig):
-    """A rig of one's own: what drives it, what moves, the places where effects can act, and what is recorded of it.
+    """A rig of your own: its inputs, coordinates and energies, the places at which effects can act, and its sensors.
 
     Takes the tables of a rig file under their names, and checks them in the same way; ``rigsight rigs NAME`` prints the file of
     a built-in rig. Expressions are texts of declared names; ``d(phi)`` is the rate of the coordinate ``phi``.
@@ -53,7 +53,7 @@ class Rig(DeclaredRig):
     Raises
     ------
     InputError
-        Naming the table and key of what is wrong, and what to write instead.
+        Naming the table and key of the error, and what to write instead.
 
     Examples
     --------
@@ -116,7 +116,7 @@ class Rig(DeclaredRig):
         Raises
         ------
         InputError
-            Naming the file, line and column of what is wrong, and what to write instead.
+            Naming the file, line and column of the error, and what to write instead.
         """
         rig = cls.__new__(cls)
         rig._take(read_rig_file(Path(path)))

@@ -33,13 +33,13 @@ _BAND = (0.25, 2.0)
 _WHERE_NOTHING_MOVES = (3.0, 45.0)
 """Natural frequencies [rad/s] that count for a rig on which every motion is prescribed."""
 _LARGEST_FREQUENCY = 100.0
-"""Of an input [rad/s]: a tenth of the samples' own, so that whoever draws lines between them is near."""
+"""Highest frequency of an input [rad/s]: a tenth of the sample rate, so that linear interpolation is accurate."""
 _N_LINES = 40
 _RISE = 1.0
 _MOTION = (0.03, 0.5)
-"""Largest deviation of a coordinate from rest [rad, m]: what a rig on a table does."""
+"""Largest deviation of a coordinate from rest [rad, m], as of a rig on a table."""
 _MOST_BENT = 0.3
-"""Share by which the motion may differ from what a twentieth of the inputs makes of it, before anything is hidden."""
+"""Relative difference of the motion without an effect from the scaled motion at a twentieth of the inputs."""
 _FRACTION = 0.05
 _LESS = 0.7
 _TRIES = 16
@@ -160,7 +160,7 @@ def _campaign(
         )
 
     def step(name: str, role: Role | None, share: float) -> Run:
-        # No machine prescribes a motion that jumps.
+        # A prescribed motion cannot jump.
         if prescribing & set(rig.mechanism.inputs):
             return multisine(name, role, share)
         return Run(name, role, "step", "zoh", in_proportion(doublets(amplitudes, band, rng), share))
@@ -189,7 +189,7 @@ def _unit(
     rig: Rig, structure: Structure, values: Mapping[str, float], name: str, band: tuple[float, float]
 ) -> float:
     """Return how far any coordinate moves for a small sweep of one input, per unit of it."""
-    # Small beside any control law's range and any angle; the size of the numbers is that of SI units.
+    # Small compared with the range of any control law and any angle, in SI units.
     small = 1e-3
     waves: dict[str, Waveform] = {other: Sweep(0.0, *band, DURATION) for other in rig.mechanism.inputs}
     waves[name] = Sweep(small, *band, DURATION)
@@ -203,7 +203,7 @@ def _unit(
 
 
 def _bent(structure: Structure, values: Mapping[str, float], run: Run) -> float:
-    """Return by how much the motion differs from that under small inputs, relative to itself; endless where there is none."""
+    """Return by how much the motion differs from that under small inputs, relative to itself; infinite if there is no motion."""
     small = replace(run, waveforms=in_proportion(run.waveforms, _FRACTION))
     try:
         whole, little = (simulate(structure, values, r.record()) for r in (run, small))
@@ -254,7 +254,7 @@ def doublets(
     amplitudes: Mapping[str, float], band: tuple[float, float], rng: np.random.Generator
 ) -> dict[str, Waveform]:
     """Return a doublet for each input, one after the other, each as long as a slow period."""
-    # It jumps just before a sample of the records, for plant and record alike: in between no hold of a record shows it.
+    # It jumps just before a sample of the records, for plant and record alike, because a hold cannot represent a jump in between.
     length = DT * round(min(2.0 * math.pi / band[0] / 2.0, DURATION / 8.0) / DT)
     return {
         name: Doublet(

@@ -29,15 +29,15 @@ Floats = NDArray[np.float64]
 FREQUENCIES = (3.0, 45.0)
 """Natural frequencies [rad/s]: several periods in a record of 20 s, and twenty samples of 5 ms in the shortest."""
 DAMPING_RATIOS = (0.01, 0.3)
-"""Of poles that oscillate: what decays neither seems endless nor vanishes within a period."""
+"""Damping ratios of oscillating poles: the decay lasts more than a period and less than a record."""
 _RATES = (0.3, 200.0)
-"""Sizes of poles that do not oscillate [1/s]: those of a record and of its samples."""
+"""Sizes of poles that do not oscillate [1/s]: between the length of a record and its sample time."""
 _INSIDE = 0.05
 """Share of a band, in logarithms, that the search stays away from its ends."""
 _SPREAD = 0.6
 """Standard deviation of the logarithm of each number before it is moved."""
 _DAMPERS = math.exp(-3.0)
-"""Size about which a number is drawn that stands in a joint's damping alone: one SI unit would leave no vibration."""
+"""Mean size of parameters that occur only in the damping of a joint: one SI unit would leave no vibration."""
 _PULL = 0.05
 """Weight of the distance to the first draw relative to a factor e outside a band: it decides what the bands do not determine."""
 _LEAST_APART = 0.1
@@ -46,7 +46,7 @@ _CONFIGURATIONS = 8
 _OFFSET = 0.1
 """Standard deviation of an offset in units of the size of its kind in the records."""
 _ZERO = 1e-6
-"""Share of the largest pole below which one lies at zero: what nothing brings back."""
+"""Share of the largest pole below which a pole counts as zero: a motion without restoring force."""
 _DRAWS = 20
 
 
@@ -63,20 +63,20 @@ def draw_numbers(rig: Rig, rng: np.random.Generator) -> dict[str, float]:
     Raises
     ------
     SimulationError
-        If none of many draws vibrates as a rig does.
+        If none of many draws has plausible natural frequencies and damping.
     """
     search = _Search(rig)
     for _ in range(_DRAWS):
         values = search.drawn(rng)
         if values is not None:
             return values
-    raise SimulationError(f"No numbers were found with which {rig.name} vibrates as a rig does.")
+    raise SimulationError(f"No parameter values were found with which {rig.name} has plausible poles.")
 
 
 def draw_offsets(
     rig: Rig, records: list[Record], values: Mapping[str, float], rng: np.random.Generator
 ) -> dict[str, float]:
-    """Return the numbers that shift a reading or a rest, small beside the motion in these records.
+    """Return the offsets of readings and rest positions, small compared with the motion in these records.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def draw_offsets(
     found = {}
     for p in offsets:
         dimension = p.dimension or size_of(p.name)
-        # The size of an unknown offset is no base quantity; what sensors read in its unit tells it.
+        # The size of an unknown offset follows from the sensors that read in its unit.
         own = dimension == size_of(p.name)
         size = _size_of_kind(rig, p, records) if own else characteristic_value(dimension, scales)
         found[p.name] = _OFFSET * size * rng.normal()
@@ -104,19 +104,19 @@ def draw_offsets(
 
 
 def is_offset(parameter: Parameter) -> bool:
-    """Return True for a number that is zero unless it is stated."""
+    """Return True for a parameter whose default is zero."""
     return parameter.default == 0.0
 
 
 def _size_of_kind(rig: Rig, parameter: Parameter, records: list[Record]) -> float:
-    """Return the size of a reading in the parameter's own unit, 0 where no sensor reads such a thing."""
+    """Return the size of a reading in the unit of the parameter, 0 if no sensor reads in this unit."""
     alike = [s.name for s in rig.outputs if s.unit == parameter.unit]
     return max((float(np.std(r[name])) for r in records for name in alike), default=0.0)
 
 
 @dataclass(frozen=True)
 class _Bands:
-    """Between which ends natural frequencies, damping ratios, other rates and the least eigenvalue of the inertia lie."""
+    """Bands of natural frequencies, damping ratios, other rates and the smallest eigenvalue of the inertia."""
 
     frequencies: tuple[float, float]
     ratios: tuple[float, float]

@@ -18,12 +18,12 @@ from rigsight.rigs import RIGS, Rig
 Item = TypeVar("Item")
 
 _TIERS: tuple[Tier, ...] = ("clear", "strong")
-"""A faint effect shows neither its law nor its place."""
+"""Strengths of the effects; of a faint one neither law nor place could be found."""
 
 
 @dataclass(frozen=True)
 class PlacedSubject:
-    """What one trial of a rig of any shape hides.
+    """The hidden effect of one trial on a rig with several places.
 
     Attributes
     ----------
@@ -48,9 +48,9 @@ class PlacedSubject:
 
 @cache
 def placed_cells() -> tuple[PlacedSubject, ...]:
-    """Return all cells: singles at each kind of place and of each strength, and for each rig a control and something harder.
+    """Return all cells: singles at each kind of place and of each strength, and for each rig a control and a harder trial.
 
-    The control is in turn no gap and wrong parameters, what is harder in turn two effects and one from outside.
+    Controls alternate between no gap and wrong parameters, harder trials between two effects and one outside the catalogue.
     """
     cells: list[PlacedSubject] = []
     for number, name in enumerate(COUNTED_RIGS):
@@ -102,7 +102,7 @@ def draw_effects(rig: Rig, subject: PlacedSubject, rng: np.random.Generator) -> 
 
 
 def _drawn_kind(effects: list[Effect], rng: np.random.Generator) -> Effect:
-    """Draw the law first and then its place: a law that can stand anywhere is not drawn more often for that."""
+    """Draw the law first and then its place, so that a law with many possible places is not drawn more often."""
     law = _any_of(sorted({kind_of(effect.name) for effect in effects}), rng)
     return _any_of([effect for effect in effects if kind_of(effect.name) == law], rng)
 
@@ -116,7 +116,7 @@ def _elsewhere(rig: Rig, one: Effect, other: Effect) -> bool:
 
 
 def _outside_on(rig: Rig) -> list[Effect]:
-    """Return the effects from outside at the joints at which they do something: one of a spring needs a spring."""
+    """Return the effects from outside at the joints at which they have an effect: one that changes a spring needs a spring."""
     found: list[Effect] = []
     for effect in (effect for effect in OUTSIDE if effect.place is Place.DYNAMICS):
         if rig.has_one_motion:

@@ -65,7 +65,7 @@ def draw_placed_trial(seed: int, trial: int) -> Trial:
     Raises
     ------
     SimulationError
-        If no rig that was drawn can be integrated, or no effect leaves a gap of the wished size.
+        If no rig that was drawn can be integrated, or no effect causes a gap of the requested size.
     """
     subject = placed_subject_of(seed, trial)
     return first_that_succeeds(lambda attempt: _drawn(subject, seed, trial, attempt), seed, trial)
@@ -218,7 +218,9 @@ class _Bench:
         fit = GreyBoxFit(compose(self.rig), records, self.scales, self.noise)
         found = fit.fit(self.values, [p.name for p in self.rig.parameters], max_evaluations=_EVALUATIONS)
         if not found.residuals:
-            raise SimulationError(f"No equations without effects come near this motion: {found.message}")
+            raise SimulationError(
+                f"The equations without effects cannot be fitted to this motion: {found.message}"
+            )
         return found
 
     def gap(self, records: Sequence[Record], refit: FitResult, floor: Mapping[str, float]) -> float:
@@ -233,7 +235,7 @@ class _Bench:
     def given(
         self, subject: PlacedSubject, seen: Sequence[Record], refit: FitResult, rng: np.random.Generator
     ) -> dict[str, float]:
-        """Return the simulation in question: fitted to one sweep, well fitted to all, or with numbers that are off."""
+        """Return the given simulation: fitted to one sweep, well fitted to all, or with numbers that are off."""
         sweeps = [r for r in seen if r.kind == "sweep" and r.role == "estimation"]
         one = sweeps[int(rng.integers(len(sweeps)))]
         parameters = self.rig.parameters

@@ -108,7 +108,7 @@ def draw_rig(rng: np.random.Generator, rig: Rig | None, swings_wide: bool) -> Li
     mass = math.exp(rng.uniform(-2.0, 2.0))
     omega = rng.uniform(7.0, 20.0)
     small, wide = math.exp(rng.uniform(math.log(0.003), math.log(0.7))), rng.uniform(*_WIDE)
-    # Half of all axes swing wide whatever is hidden, so that a wide swing does not tell of a pendulum.
+    # Half of all axes swing wide whatever the effect, so that a wide swing does not reveal a pendulum.
     size = wide if rng.random() < 0.5 or swings_wide else small
     damping = rng.uniform(0.05, 0.35)
     # At resonance the displacement is that of a slow input over twice the damping ratio.

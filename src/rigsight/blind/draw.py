@@ -55,7 +55,7 @@ class Trial:
     linear
         The rig.
     given
-        Parameters of the simulation whose gap is in question.
+        Parameters of the given simulation.
     records
         What the diagnosis sees.
     withheld
@@ -86,7 +86,7 @@ def draw_trial(design: CatalogueDesign, seed: int, trial: int) -> Trial:
     Raises
     ------
     SimulationError
-        If no plant that was drawn can be integrated, or is near enough to a linear one to be re-identified.
+        If no plant that was drawn can be integrated, or is close enough to a linear one to be re-identified.
     """
     return first_that_succeeds(lambda attempt: _drawn(design, seed, trial, attempt), seed, trial)
 
@@ -245,7 +245,7 @@ class _Bench:
     def _damped(self, plant: Plant, rest: NDArray[np.float64], force: float) -> float:
         """Return the factor that keeps a disturbance below the sensor noise in the plant too.
 
-        A spring that is loose, or nearly all memory, yields to a disturbance that the linear rig hardly shows.
+        A disturbance that hardly moves the linear rig moves a loose or strongly hysteretic spring much more.
         """
         experiment = self.experiments[0]
         disturbance = _draw_disturbance(experiment, force, np.random.default_rng(0))
@@ -277,7 +277,7 @@ class _Bench:
         fit = GreyBoxFit(self.structure, records, self.scales, self.noise)
         found = fit.fit(self.linear.values, self._free, max_evaluations=_EVALUATIONS)
         if not found.residuals:
-            raise SimulationError(f"No linear equations come near this motion: {found.message}")
+            raise SimulationError(f"Linear equations cannot be fitted to this motion: {found.message}")
         return found
 
     @property
@@ -294,7 +294,7 @@ class _Bench:
     def given(
         self, subject: Subject, seen: Sequence[Record], refit: FitResult, rng: np.random.Generator
     ) -> dict[str, float]:
-        """Return the simulation in question: fitted to one sweep, well fitted to all, or with numbers that are off."""
+        """Return the given simulation: fitted to one sweep, well fitted to all, or with numbers that are off."""
         sweeps = [r for r in seen if r.kind == "sweep" and r.role == "estimation"]
         one = sweeps[int(rng.integers(len(sweeps)))]
         off = [rng.uniform(*_OFF) * rng.choice([-1.0, 1.0]) for _ in self.linear.rig.parameters]

@@ -116,7 +116,7 @@ class Plant:
         Raises
         ------
         SimulationError
-            If the motion has no end, or events pile up.
+            If the motion diverges, or events accumulate.
         """
         late = self._equations.reading_delay
         grid = dt * np.arange(n_samples, dtype=np.float64)
@@ -128,12 +128,12 @@ class Plant:
         try:
             run.integrate(initial_state, start, float(grid[-1]), wanted)
         except (OverflowError, ValueError, ZeroDivisionError) as error:
-            raise SimulationError(f"The motion of {self.structure.rig.name} has no end: {error}.") from None
+            raise SimulationError(f"The motion of {self.structure.rig.name} diverges: {error}.") from None
         outputs = self._outputs(wanted[0])
         if late > 0.0:
             outputs[:, 0] = self._outputs(wanted[1])[:, 0]
         if not np.all(np.isfinite(outputs)):
-            raise SimulationError(f"The motion of {self.structure.rig.name} left the range of numbers.")
+            raise SimulationError(f"The motion of {self.structure.rig.name} overflows.")
         return outputs
 
     def _outputs(self, reached: _Samples) -> NDArray[np.float64]:
@@ -202,7 +202,7 @@ class _Run:
                 idle = idle + 1 if t - begin < _INSTANT else 0
                 self._events += 1
                 if idle > _MOST_WITHOUT_PROGRESS or self._events > _MOST_EVENTS:
-                    raise SimulationError(f"Events pile up at {t:.6g} s: the plant chatters.")
+                    raise SimulationError(f"Events accumulate at {t:.6g} s: the plant chatters.")
                 self._pass(event[1], t, state)
         return state
 

@@ -1,7 +1,7 @@
-"""Which numbers does a hidden effect get, so that it leaves a gap of the wished size?
+"""Parameter values of a hidden effect, so that it causes a gap of the requested size.
 
 The shape (which effect, which proportions) is drawn from ranges wider than the declared starts, so that a search does not begin
-where the truth is; the strength is then scaled until the linear equations, identified anew on two sweeps, leave the wished
+at the truth; the strength is then scaled until the error of the linear equations, re-identified on two sweeps, is the requested
 multiple of the noise floor.
 """
 
@@ -33,7 +33,7 @@ _TRIALS = 7
 _CLOSE = 0.15
 _SMALLEST = 1e-5
 _LEAST_OF_WISHED = 0.5
-"""Share of the wished gap that an effect must leave; one that cannot at its place is drawn again."""
+"""Share of the requested gap that an effect must cause; one that cannot at its place is drawn again."""
 
 
 def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
@@ -62,7 +62,7 @@ def draw_shape(effect: Effect, scales: Mapping[str, float], rng: np.random.Gener
         difference = unit * math.exp(rng.uniform(math.log(1.5), math.log(20.0)))
         shape[pair.first], shape[pair.second] = 0.5 * (total + difference), 0.5 * (total - difference)
     if {"T_c", "T_s"} <= shape.keys():
-        # Friction that grows with speed would be no Stribeck friction.
+        # Friction that grows with speed would not be Stribeck friction.
         shape["T_s"] = shape["T_c"] * rng.uniform(1.25, 2.0)
     return shape
 
@@ -107,7 +107,7 @@ def _unit(effect: Effect, dimension: str, scales: Mapping[str, float]) -> float:
 
 
 def strength_for(gap: Callable[[float], float], wished: float) -> float:
-    """Return the strength at which a gap is near the wished size, or the strongest that is allowed.
+    """Return the strength at which a gap is close to the requested size, or the largest allowed strength.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
             high = min(high, strength)
         else:
             low = max(low, strength)
-        # A gap in proportion to the strength is the rule; a threshold needs bisection.
+        # Usually the gap is proportional to the strength; a threshold needs bisection.
         step = strength * wished / reached if 0.0 < reached < math.inf else 0.5 * strength
         inside = low < step < high
         strength = (
@@ -142,7 +142,7 @@ def strength_for(gap: Callable[[float], float], wished: float) -> float:
 
 @dataclass(frozen=True)
 class Sized:
-    """An effect of a wished size: its strength, the gap that it leaves alone, and its parameters by their own names."""
+    """An effect of a requested size: its strength, the gap that it causes alone, and its parameters by their own names."""
 
     strength: float
     gap: float
@@ -157,7 +157,7 @@ def sized(
     wished: float,
     least: float | None = None,
 ) -> Sized:
-    """Return an effect with the strength at which it leaves a gap near the wished size.
+    """Return an effect with the strength at which it causes a gap close to the requested size.
 
     Parameters
     ----------
@@ -168,12 +168,12 @@ def sized(
     wished
         Gap to reach together with the noise, in units of the noise.
     least
-        Least gap that will do; default is half of the wished one.
+        Smallest accepted gap; default is half of the requested one.
 
     Raises
     ------
     SimulationError
-        If the effect cannot leave that.
+        If the effect cannot cause that.
     """
     reached: dict[float, float] = {}
 
@@ -184,5 +184,5 @@ def sized(
     strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
     most = reached.get(strength, 0.0)
     if most < (_LEAST_OF_WISHED * wished if least is None else least):
-        raise SimulationError(f"{effect.name} leaves {most:.2g} noise floors at most.")
+        raise SimulationError(f"{effect.name} causes a gap of at most {most:.2g} noise floors.")
     return Sized(strength, most, scaled(effect, shape, strength, scales))

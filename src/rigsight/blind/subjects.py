@@ -1,4 +1,4 @@
-"""What is hidden in which trial? A fixed list of cells, shuffled by the seed: nothing follows from a trial's number."""
+"""The hidden effects of trials: a fixed list of cells, shuffled by the seed, so that a trial's number reveals nothing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ OF_JOINTS = frozenset({
     "encoder_eccentricity", "load_dependent_friction", "maxwell_branch", "power_law_stiffness", "presliding_friction",
     "speed_limit", "time_shift", "torque_ripple",
 })  # fmt: skip
-"""Effects of measured servo and robot joints, which have a design of their own: the two others were counted before."""
+"""Effects of servo and robot joints, which were added to the catalogue later.
+
+They have a design of their own, so that the trials of the two older designs stay unchanged.
+"""
 ELSEWHERE = frozenset({"directional_friction", "inertia"})
 """Effects that neither rig has: friction that differs each way is a rest position there, and the motion is not prescribed."""
 
@@ -41,7 +44,7 @@ _COUNTS: dict[CatalogueDesign, dict[str, int]] = {
 
 @dataclass(frozen=True)
 class Subject:
-    """What one trial hides.
+    """The hidden effects of one trial.
 
     Attributes
     ----------
@@ -134,9 +137,9 @@ def _tells_apart(first: Effect, second: Effect) -> bool:
 
 
 def needs_running_gear(effect: Effect) -> bool:
-    """Return True if only a running gear shows the effect for what it is.
+    """Return True if the effect is distinguishable only on a running gear.
 
-    On a rig with one output a sensor that is late is a drive that is late.
+    On a rig with one output, a sensor delay is the same as an input delay.
     """
     return effect.place in (Place.LATERAL_DYNAMICS, Place.SENSOR) and effect.name in {
         e.name for e in CATALOGUE

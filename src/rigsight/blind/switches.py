@@ -1,4 +1,4 @@
-"""Which smooth equations does a structure obey between two kinks, and what says that the next kink is reached?
+"""Smooth equations of a structure between two kinks, and conditions for reaching the next kink.
 
 Every ``Abs``, ``sign`` and ``positive_part`` becomes a number that is frozen until its argument changes sign; a state with a
 limit is either free or held at an end of its range.
@@ -19,7 +19,7 @@ from rigsight.simulate.structure import INPUT, TIME
 _KINKS = (sp.Abs, sp.sign, positive_part)
 _TORQUE = sp.Symbol("disturbing_torque", real=True)
 _Magnitude = sp.Function("fabs", real=True)
-"""The size under a broken power: no sign may be frozen there, a power of a slightly negative number has no value."""
+"""The absolute value under a non-integer power: its sign must not be frozen, since a power of a negative number is undefined."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def _limit(structure: Structure, index: int, numbers: Mapping[sp.Symbol, sp.Expr
 def _function(
     names: Sequence[sp.Symbol], expressions: Sequence[sp.Expr], modules: str = "math"
 ) -> Callable[..., list[Any]]:
-    # Names that Python can read, the same in every run: with them, sums are taken in the same order.
+    # Valid Python names that are the same in every run, so that sums are evaluated in the same order.
     own = {name: sp.Symbol(f"a{i:03d}", real=True) for i, name in enumerate(names)}
     bound = [sp.sympify(expression).xreplace(own) for expression in expressions]
     return sp.lambdify(list(own.values()), bound, modules=modules, cse=True)  # type: ignore[no-any-return]
@@ -149,7 +149,7 @@ class _Freezer:
             lambda e: sp.Pow(_Magnitude(e.base.args[0]), e.exp),
         )
         while True:
-            # Sets have no order of their own, and sums of floats depend on it.
+            # Sets are unordered, and sums of floats depend on the order.
             kinks = sorted(expression.atoms(*_KINKS), key=sp.default_sort_key)
             innermost = [e for e in kinks if not e.args[0].atoms(*_KINKS)]
             if not innermost:

@@ -91,7 +91,7 @@ class Step:
 class Doublet:
     """Zero, then `amplitude` for `length` [s] from `start` [s] on, its opposite for as long, and zero again.
 
-    What nothing brings back is at rest again behind it, not too far from where it was.
+    A rig without restoring force is at rest again after it, not too far from where it was.
     """
 
     amplitude: float

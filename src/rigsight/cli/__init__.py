@@ -1,7 +1,7 @@
-"""How does a command line become one call of a public function, and an error an exit code?
+"""The command line: each command calls one public function, and errors become exit codes.
 
-One file per command, listed in `application`; what commands share stands in `options`, `exit_codes`, `signals` and `terminal`.
-Everything heavy is imported inside the commands, so that ``rigsight --help`` answers at once.
+One file per command, listed in `application`; shared code is in `options`, `exit_codes`, `signals` and `terminal`.
+Heavy imports are inside the commands, so that ``rigsight --help`` is fast.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ def main() -> None:
 
 
 def _end_at_once(code: int) -> NoReturn:
-    """End without taking the interpreter apart: what an interrupted compilation leaves of LLVM crashes there."""
+    """End without the interpreter's shutdown, in which LLVM crashes after an interrupted compilation."""
     from rigsight.workflow.run.results import ENDING_SIGNALS
 
     for number in ENDING_SIGNALS:
-        # One is enough: another would only complain.
+        # The first signal is enough; another would only print an error.
         signal.signal(number, signal.SIG_IGN)
-    # What worker processes shared is given back.
+    # Release what worker processes shared.
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -51,7 +51,7 @@ def command_line() -> None:
     try:
         from rigsight.cli import application
     except KeyboardInterrupt:
-        # The parser is not there yet, which tells later interruptions.
+        # The parser, which reports later interruptions, is not loaded yet.
         sys.stderr.write("rigsight: interrupted.\n")
         raise SystemExit(130) from None
     application.main()

@@ -1,4 +1,4 @@
-"""Which commands are there, in which order are they shown, and what surrounds them all?"""
+"""The list of commands, in the order in which they are shown, and the options common to all."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
 
 app = typer.Typer(
     name="rigsight",
-    help="Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks.",
-    epilog="'rigsight COMMAND --help' tells more. Start with 'rigsight demo'.",
+    help="Find the effect that is missing in the simulation of a rig, from measured records, and how far it closes the gap.",
+    epilog="'rigsight COMMAND --help' describes a command. Start with 'rigsight demo'.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -54,7 +54,7 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line."""
-    # Candidates are fitted side by side; matrix products that spread over the same processors only wait for each other.
+    # Candidates are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with report_output_errors(), ended_by_signals():
         app()
@@ -74,7 +74,7 @@ def rigsight(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Name the effect that the simulation of a rig leaves out, from measured records, and say how far the gap shrinks."""
+    """Find the effect that is missing in the simulation of a rig, from measured records, and how far it closes the gap."""
 
 
 for _name, _command in COMMANDS.items():

@@ -1,4 +1,4 @@
-"""What does ``rigsight blind`` accept, run and show?"""
+"""The command ``rigsight blind``."""
 
 from __future__ import annotations
 
@@ -16,24 +16,26 @@ from rigsight.workflow.run.progress_display import listening
 
 
 def blind(
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Its folder.")] = Path("blind"),
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the bench.")] = Path(
+        "blind"
+    ),
     trials: Annotated[
-        int | None, typer.Option(min=1, show_default="one of every cell", help="Number of trials.")
+        int | None, typer.Option(min=1, show_default="one per cell of the design", help="Number of trials.")
     ] = None,
     trial: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NUMBER|NAME",
             show_default="all",
-            help="Run only this trial, or this campaign. May be repeated.",
+            help="Run only this trial (drawn rigs), or only the campaign of this name. May be repeated.",
         ),
     ] = None,
     design: Annotated[
         Literal["small", "standard", "joints", "rigs", "laboratory", "handwritten"],
         typer.Option(
-            help="Which list of cells is drawn from; joints has the effects of servo and robot joints, rigs every built-in rig "
-            "with effects at all its places, laboratory records as laboratories take them (filters, feedback, stiction, ...), "
-            "handwritten plants that are composed from no declaration."
+            help="Kinds of trials to draw. joints: effects of servo and robot joints; rigs: every built-in rig with effects at "
+            "all its places; laboratory: records with the imperfections of laboratory measurements (filters, feedback, "
+            "stiction, ...); handwritten: plants with equations written by hand, independent of the catalogue."
         ),
     ] = "standard",
     seed: Seed = 0,
@@ -42,7 +44,7 @@ def blind(
         typer.Option(
             metavar="DIR",
             show_default="rigs are drawn",
-            help="Diagnose the campaigns in this folder, a folder each, instead of drawing rigs.",
+            help="Diagnose existing campaigns instead of drawing rigs; each is a subfolder of DIR.",
         ),
     ] = None,
     keys: Annotated[
@@ -50,7 +52,8 @@ def blind(
         typer.Option(
             metavar="DIR",
             show_default="none",
-            help='Keys of these campaigns, NAME.json each; the least is {"kind": "single", "effects": ["backlash"]}.',
+            help="Folder with the key NAME.json of each campaign. Smallest key: "
+            '{"kind": "single", "effects": ["backlash"]}.',
         ),
     ] = None,
     merge: Annotated[
@@ -58,15 +61,15 @@ def blind(
         typer.Option(
             metavar="DIR",
             show_default="none",
-            help="Run nothing; score this bench with others as one. May be repeated.",
+            help="Run no trials; score the bench in DIR together with other benches (repeat this option).",
         ),
     ] = None,
     rescore: Annotated[
-        bool, typer.Option("--rescore", help="Run nothing; score anew what is diagnosed in --out.")
+        bool, typer.Option("--rescore", help="Run no trials; score the diagnosed trials in --out again.")
     ] = False,
     markdown: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", show_default="none", help="Write the score as Markdown as well."),
+        typer.Option(metavar="FILE", show_default="none", help="Also write the score as Markdown."),
     ] = None,
     cluster: Annotated[
         str | None,
@@ -81,12 +84,13 @@ def blind(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Diagnose rigs whose effect is withheld, drawn ones or campaigns of your own, and score the verdicts by sealed keys.
+    """Diagnose trials whose true effect is withheld, and score the verdicts against sealed keys.
 
-    Writes results and one row per trial into DIR as they are finished, and the score into DIR/blind.json and DIR/blind.html.
-    Started again, it goes on where it was interrupted.
+    The rigs of the trials are drawn at random, or are those of existing campaigns (--campaigns, --keys). Each result is written
+    into DIR when its trial is finished, the score into DIR/blind.json and DIR/blind.html. After an interruption, the same command
+    continues with the remaining trials.
     """
-    with report_errors(debug, "the same command goes on from here"), listening(quiet) as listener:
+    with report_errors(debug, "the same command continues from here"), listening(quiet) as listener:
         from rigsight.cli.trial_process import START
         from rigsight.workflow import blind as bench
         from rigsight.workflow.bench.score_files import merge as merged
@@ -133,10 +137,10 @@ def blind(
 def _check_together(
     campaigns: Path | None, keys: Path | None, merge: Sequence[Path], rescore: bool, trial: Sequence[str]
 ) -> None:
-    """Refuse options that ask for two things at once, or for half of one."""
+    """Refuse options that exclude each other, or of which only one of two is given."""
     if (campaigns is None) != (keys is None):
         missing = "--keys" if keys is None else "--campaigns"
-        raise InputError(f"--campaigns and --keys belong together; {missing} is missing.")
+        raise InputError(f"--campaigns and --keys must be given together; {missing} is missing.")
     asked = [
         name
         for name, given in (
@@ -147,15 +151,15 @@ def _check_together(
         if given
     ]
     if len(asked) > 1:
-        raise InputError(f"{' and '.join(asked)} cannot be asked for together. Leave all but one out.")
+        raise InputError(f"{' and '.join(asked)} cannot be combined. Give only one of them.")
     if trial and (merge or rescore):
-        raise InputError(f"{asked[0]} runs no trial, so --trial says nothing there. Leave it out.")
+        raise InputError(f"{asked[0]} runs no trials, so --trial has no effect. Leave it out.")
 
 
 def _numbers(given: Sequence[str]) -> list[int]:
     for text in given:
         if not (text.isascii() and text.isdecimal()):
             raise InputError(
-                f"--trial must be a number, got '{text}'. A name goes with --campaigns and --keys."
+                f"--trial must be a number, got '{text}'. Names are allowed only with --campaigns and --keys."
             )
     return [int(text) for text in given]

@@ -1,4 +1,4 @@
-"""What does ``rigsight compare`` accept, run and show?"""
+"""The command ``rigsight compare``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ def compare(
         list[str],
         typer.Argument(
             metavar="MODEL...",
-            help="Each a model.json, the folder that holds one, or a published set such as hysteresis_r; NAME=MODEL names it.",
+            help="Each a model.json, a folder that contains one, or a published set such as hysteresis_r. NAME=MODEL gives it "
+            "a name in the results.",
         ),
     ],
     out: ResultsFolder = Path("comparison"),
@@ -28,11 +29,11 @@ def compare(
         typer.Option(
             "--method",
             metavar="NAME",
-            help="How all frequency responses are estimated: local_rational, local_polynomial, h1 or thesis.",
+            help="Estimator of the frequency responses: local_rational, local_polynomial, h1 or thesis.",
         ),
     ] = "local_rational",
     step_seconds: Annotated[
-        float, typer.Option(metavar="SECONDS", help="How long a step is compared, from its begin on.")
+        float, typer.Option(metavar="SECONDS", help="Time after a step over which it is compared.")
     ] = 4.0,
     simulator: Simulators = None,
     jobs: Jobs = None,
@@ -40,9 +41,9 @@ def compare(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Score models on all records: frequency responses, steps and free runs, each beside its noise floor.
+    """Score models on all records: frequency responses, steps and free runs, each with its noise floor.
 
-    Writes comparison.json, comparison.csv, comparison.html and figures into DIR, all or none.
+    Writes comparison.json, comparison.csv, comparison.html and figures into DIR; all files or none.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.compare import run_compare

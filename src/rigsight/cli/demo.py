@@ -1,4 +1,4 @@
-"""What does ``rigsight demo`` accept, run and show?"""
+"""The command ``rigsight demo``."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def demo(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Run the whole chain on a virtual rig whose simulation misses an effect.
+    """Make a campaign of a virtual rig with a hidden effect, and diagnose it.
 
-    Writes DIR/campaign (records and campaign.toml, as a measurement would leave them), diagnosis.json, model.json, report.html.
+    Writes DIR/campaign (records and campaign.toml, as from a measurement), DIR/diagnosis.json, DIR/model.json, DIR/report.html.
     """
     with report_errors(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.demo import HIDDEN_EFFECT, run_demo
@@ -38,6 +38,8 @@ def demo(
         from rigsight.report import summary
 
         show(summary(diagnosis))
-        typer.echo(f"\nThe virtual rig hid {HIDDEN_EFFECT}; the diagnosis was not told.")
+        typer.echo(
+            f"\nThe hidden effect of the virtual rig is {HIDDEN_EFFECT}; the diagnosis had no access to it."
+        )
         show_files({"Report": out / "report.html", "Model": out / "model.json"})
-        typer.echo(f"rigsight diagnose {shlex.quote(str(out / 'campaign'))} repeats it.")
+        typer.echo(f"To repeat the diagnosis: rigsight diagnose {shlex.quote(str(out / 'campaign'))}")

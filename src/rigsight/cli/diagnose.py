@@ -1,4 +1,4 @@
-"""What does ``rigsight diagnose`` accept, run and show?"""
+"""The command ``rigsight diagnose``."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def diagnose(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Say which effect a simulation misses, where it acts, and how far the gap shrinks with it.
+    """Find which effect is missing in a simulation, where it acts, and how far it closes the gap.
 
-    Writes diagnosis.json, model.json and report.html into DIR, all or none.
+    Writes diagnosis.json, model.json and report.html into DIR; all files or none.
     """
     with report_errors(debug, GOES_ON), listening(quiet) as listener:
         from rigsight.workflow.diagnose import run_diagnose

@@ -1,4 +1,4 @@
-"""What does ``rigsight discover`` accept, run and show?"""
+"""The command ``rigsight discover``."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def discover(
         typer.Option(
             "--method",
             metavar="NAME",
-            help="discrepancy: regress what the rig's own terms leave; full: the whole acceleration.",
+            help="discrepancy: regress the residual of the rig's own terms; full: regress the whole acceleration.",
         ),
     ] = "discrepancy",
     pointwise: Annotated[
         bool, typer.Option("--pointwise", help="Regress sample by sample instead of in the weak form.")
     ] = False,
     one_by_one: Annotated[
-        bool, typer.Option("--one-by-one", help="Discover on each estimation record alone as well.")
+        bool, typer.Option("--one-by-one", help="Also discover on each estimation record alone.")
     ] = False,
     simulator: Simulators = None,
     seed: Seed = 0,
@@ -37,9 +37,9 @@ def discover(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Find the governing equations behind the records by sparse regression and free-run simulation.
+    """Find the equations of motion from the records, by sparse regression and free-run simulation.
 
-    Writes discovery.json, model.json and discovery.svg into DIR, all or none.
+    Writes discovery.json, model.json and discovery.svg into DIR; all files or none.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.discover import run_discover

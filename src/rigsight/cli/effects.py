@@ -1,4 +1,4 @@
-"""What does ``rigsight effects`` accept, run and show?"""
+"""The command ``rigsight effects``."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def list_effects(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """List the effects that a diagnosis tries, and check effects of your own before they compete.
+    """List the effects that a diagnosis tries, and check effects of your own.
 
-    A file's effects are simulated and fitted: exit code 2 and the reason if one fails a check.
+    The effects of a file are simulated and fitted. If one fails a check, the reason is printed and the exit code is 2.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.effects import CATALOGUE

@@ -1,7 +1,7 @@
-"""How does an error become one message on stderr and an exit code?
+"""Errors become one message on stderr and an exit code.
 
-Exit codes: 0 success, 1 a defect of rigsight, 2 input that cannot be used or a disk that does not take results, 130 Ctrl-C, 143
-and 129 ended by kill and by a terminal that went away, 141 nobody reads the output any more.
+Exit codes: 0 success; 1 a defect of rigsight; 2 unusable input, or results that cannot be written; 130 Ctrl-C; 143 ended by kill;
+129 the terminal was closed; 141 the output is no longer read.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ DEFECT, BAD_INPUT, UNREAD = 1, 2, 141
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EACCES, errno.EPERM)
 _OF_THE_SESSION = (errno.EMFILE, errno.ENFILE, errno.EFBIG)
 _MOST_NAMED = 3
-"""Folders with results that an interruption names one by one; a bench has hundreds."""
+"""Largest number of result folders that an interruption lists by name; a bench has hundreds."""
 _NOTHING = "nothing was written"
-GOES_ON = f"{_NOTHING}; the same command goes on from there"
-"""What an interrupted diagnosis leaves: no file, but the fits that it has done."""
+GOES_ON = f"{_NOTHING}; the same command continues from there"
+"""Of an interrupted diagnosis no result file remains, but the finished fits are kept."""
 
 
 @contextlib.contextmanager
@@ -53,7 +53,7 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
     with noting_folders() as written:
         try:
             with warnings.catch_warnings():
-                # Trial parameters far off the mark overflow; fits expect that and go elsewhere.
+                # Fits try parameter values at which a simulation overflows; they handle this themselves.
                 warnings.simplefilter("ignore")
                 yield
         except RigsightError as error:
@@ -67,38 +67,39 @@ def report_errors(debug: bool, left: str = _NOTHING) -> Iterator[None]:
         except OSError as error:
             if error.errno in _OF_THE_SESSION:
                 leave(
-                    f"a limit of this session stands in the way: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
+                    f"a resource limit of this session was reached: {error.strerror}. Raise it (ulimit -a lists them); {left}.",
                     BAD_INPUT,
                     is_of_the_machine=True,
                 )
             if error.errno not in _OF_THE_DISK and "temporary directory" not in str(error):
                 _leave_defect(error)
-            # Results have messages of their own; what is left is what is read, and what lies between.
+            # Result files have messages of their own; here remain input files and temporary files.
             if error.errno in (errno.EACCES, errno.EPERM) and error.filename:
                 leave(
-                    f"{error.filename} may not be read or written. Change its permissions; {left}.", BAD_INPUT
+                    f"no permission to read or write {error.filename}. Change its permissions; {left}.",
+                    BAD_INPUT,
                 )
             place = f" ({error.filename})" if error.filename else ""
             leave(
-                f"a temporary file or the output cannot be written{place}: {error.strerror}. Make room there, or set TMPDIR to a "
-                f"folder that can be written; {left}.",
+                f"a temporary file or the output cannot be written{place}: {error.strerror}. Free disk space, or set TMPDIR to a "
+                f"writable folder; {left}.",
                 BAD_INPUT,
                 is_of_the_machine=True,
             )
         except MemoryError:
-            message = "this needs more memory than there is. Shorten the records, or lower --jobs."
+            message = "not enough memory. Shorten the records, or lower --jobs."
             leave(message, BAD_INPUT, is_of_the_machine=True)
         except Exception as error:
             _leave_defect(error)
 
 
 class CommandExit(SystemExit):
-    """The process ends, and has said why.
+    """The process ends after its message was printed.
 
     Attributes
     ----------
     is_of_the_machine
-        Whether its disk, memory or limits are to blame, and the same command may work elsewhere or later.
+        True if disk, memory or limits of this machine are the cause, so that the same command may succeed elsewhere or later.
     """
 
     def __init__(self, code: int, is_of_the_machine: bool = False) -> None:
@@ -117,7 +118,7 @@ def _leave_defect(error: Exception) -> NoReturn:
 
 @contextlib.contextmanager
 def report_output_errors() -> Iterator[None]:
-    """Map what happens outside `report_errors`, while a finished command shows its results, to a message and an exit code.
+    """Map errors outside `report_errors`, while a finished command prints its results, to a message and an exit code.
 
     Raises
     ------
@@ -131,7 +132,7 @@ def report_output_errors() -> Iterator[None]:
     except CommandExit:
         raise
     except SystemExit as leaving:
-        # The parser says 130 for everything that reads as Ctrl-C, and 1 where nobody reads; the signal stands behind it.
+        # The parser exits with 130 for every KeyboardInterrupt and with 1 for a closed pipe; the cause is in the context.
         behind = leaving.__context__.__cause__ if leaving.__context__ is not None else None
         if isinstance(behind, KeyboardInterrupt):
             leave("interrupted.", exit_code(behind))
@@ -147,17 +148,17 @@ def report_output_errors() -> Iterator[None]:
             raise
         _forget_output()
         leave(
-            f"the output cannot be written: {error.strerror}. Files that the command writes are complete.",
+            f"the output cannot be printed: {error.strerror}. The result files are complete.",
             BAD_INPUT,
         )
 
 
 def _named(folders: Iterable[Path]) -> str:
-    """Return folders in words; many by the folder that holds them all."""
+    """Return a list of folders as text; many are replaced by their number and common parent folder."""
     names = sorted({str(folder) for folder in folders})
     if len(names) <= _MOST_NAMED:
         return ", ".join(names)
-    # Some may be named from here and some from the root.
+    # Some paths may be relative and others absolute.
     return f"{len(names)} folders in {os.path.commonpath([Path(name).absolute() for name in names])}"
 
 
@@ -167,13 +168,13 @@ def _leave_unread() -> NoReturn:
 
 
 def _forget_output() -> None:
-    """Let what nobody takes go nowhere, so that the interpreter does not complain at its end."""
+    """Redirect stdout to the null device, so that the interpreter prints no error when it exits."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def leave(message: str, code: int, is_of_the_machine: bool = False) -> NoReturn:
-    """Say on stderr why the command ends, and end it.
+    """Print on stderr why the command ends, and end it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What does ``rigsight export`` accept, run and show?"""
+"""The command ``rigsight export``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def export(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
+        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that contains one.")
     ],
     to: Annotated[
         str,
@@ -34,7 +34,7 @@ def export(
             "-o",
             metavar="FILE",
             show_default="the rig's name with the target's suffix",
-            help="File to write; function, C prefix and model are named after it.",
+            help="File to write; the function, C prefix or model gets its name.",
         ),
     ] = None,
     hold: Annotated[
@@ -43,7 +43,7 @@ def export(
             "--hold",
             metavar="HOLD",
             show_default="the model's",
-            help="How the input will behave between samples: zoh (constant) or foh (linear).",
+            help="Behavior of the input between samples: zoh (constant) or foh (linear).",
         ),
     ] = None,
     step: Annotated[
@@ -51,12 +51,13 @@ def export(
         typer.Option(
             "--step",
             metavar="SECONDS",
-            show_default="from the model's own time scales",
-            help="Longest internal step of python and matlab; step of the physics of isaac.",
+            show_default="from the time constants of the model",
+            help="Largest internal time step (python, matlab); physics time step (isaac).",
         ),
     ] = None,
     source_only: Annotated[
-        bool, typer.Option("--source-only", help="An FMU without a binary: the importing tool compiles it.")
+        bool,
+        typer.Option("--source-only", help="Write an FMU without a binary; the importing tool compiles it."),
     ] = False,
     mjcf: Annotated[
         Path | None,
@@ -64,7 +65,7 @@ def export(
             "--mjcf",
             metavar="FILE",
             show_default="(none)",
-            help="The MuJoCo model or URDF from which rigsight init made the rig, for mjcf and isaac.",
+            help="For mjcf and isaac: the MuJoCo model or URDF from which rigsight init made the rig.",
         ),
     ] = None,
     effects: OwnEffects = None,
@@ -75,8 +76,8 @@ def export(
 ) -> None:
     """Write a model for other tools, such as C, MATLAB, an FMU or MuJoCo.
 
-    One file, with the equations, the numbers and their units, and nothing of rigsight needed to run it. mjcf and isaac write the
-    numbers and effects into the fields that MuJoCo and Isaac Lab have for them, and say what they have no field for.
+    Writes one file with the equations, the parameter values and their units; it runs without rigsight. mjcf and isaac write
+    parameter values and effects into the fields of MuJoCo and Isaac Lab, and list what these have no field for.
     """
     with report_errors(debug):
         from rigsight.workflow.export import run_export

@@ -1,4 +1,4 @@
-"""What does ``rigsight identify`` accept, run and show?"""
+"""The command ``rigsight identify``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def identify(
         typer.Option(
             "--method",
             metavar="NAME",
-            help="How frequency responses are estimated: local_rational, local_polynomial; h1 or thesis of one input.",
+            help="Estimator of the frequency responses: local_rational or local_polynomial; with one input also h1 or thesis.",
         ),
     ] = "local_rational",
     resolution: Annotated[
@@ -29,8 +29,8 @@ def identify(
         typer.Option(
             "--resolution",
             metavar="RAD_S",
-            show_default="what each record gives",
-            help="Width in frequency wished for: of a local band, or between averaged frequencies.",
+            show_default="chosen for each record",
+            help="Frequency resolution: width of the local bands, or spacing of the averaged frequencies.",
         ),
     ] = None,
     simulator: Simulators = None,
@@ -39,10 +39,11 @@ def identify(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Fit frequency responses and steps: the parameters of the rig, by record and for all together.
+    """Identify the parameters of the rig from frequency responses and steps, for each record and for all together.
 
-    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR, all or none; of a rig of any
-    shape identification.html with the responses of every sensor to every input, poles, and what the records determine.
+    Writes identification.json, model.json, a Bode plot for each record and amplitudes.svg into DIR; all files or none. For rigs
+    with several motions or from a rig file it also writes identification.html with the responses of every sensor to every input,
+    the poles, and which parameters the records determine.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.identify import run_identify

@@ -1,4 +1,4 @@
-"""What does ``rigsight init`` accept, run and show?"""
+"""The command ``rigsight init``."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def init(
         Path | None,
         typer.Argument(
             metavar="FOLDER",
-            show_default="this folder, with --mjcf",
-            help="The folder that holds the measured files.",
+            show_default="the current folder, with --mjcf",
+            help="Folder of the measured files.",
         ),
     ] = None,
     model: Annotated[
@@ -27,8 +27,8 @@ def init(
         typer.Option(
             "--model",
             metavar="RIG",
-            show_default="the one that the channels fit best",
-            help="A rig that rigsight rigs lists, or one of --rigs.",
+            show_default="the rig that matches the channels best",
+            help="Name of a rig: one that 'rigsight rigs' lists, or one declared with --rigs.",
         ),
     ] = None,
     mjcf: Annotated[
@@ -36,8 +36,8 @@ def init(
         typer.Option(
             "--mjcf",
             metavar="FILE",
-            show_default="(no model)",
-            help="A MuJoCo model or URDF to write a rig file from, beside the campaign. Needs the extra mujoco.",
+            show_default="none",
+            help="A MuJoCo model or URDF from which a rig file is written beside the campaign. Needs the extra mujoco.",
         ),
     ] = None,
     gear: Annotated[
@@ -45,15 +45,17 @@ def init(
         typer.Option(
             "--gear",
             metavar="JOINT=STIFFNESS",
-            show_default="(joints move their bodies rigidly)",
-            help="A joint of the model whose gear gives way, in N m/rad (N/m): play at it can be found then. May be repeated.",
+            show_default="rigid joints",
+            help="A joint with a compliant gear and its stiffness in N m/rad (N/m), so that play in the gear can be found. "
+            "May be repeated.",
         ),
     ] = None,
     as_it_is: Annotated[
         bool,
         typer.Option(
             "--as-it-is",
-            help="Leave the model's bodies to MuJoCo: contacts, ranges, equalities and tendons too. Diagnoses take longer.",
+            help="Simulate the bodies in MuJoCo, with contacts, joint ranges, equality constraints and tendons. Diagnoses take "
+            "longer.",
         ),
     ] = False,
     rigs: OwnRigs = None,
@@ -64,8 +66,8 @@ def init(
 ) -> None:
     """Write a commented campaign.toml for the measured files of a folder.
 
-    Guesses signals, units, kinds, amplitudes and roles, and says so in comments; a campaign that exists is not overwritten. With
-    --mjcf, writes the rig file of a robot's model as well, and checks it against MuJoCo.
+    Signals, units, kinds, amplitudes and roles are guessed; comments in the file mark each guess. An existing campaign is not
+    overwritten. With --mjcf, the rig file of a robot model is written as well and checked against MuJoCo.
     """
     if mjcf is not None:
         _init_from_mjcf(
@@ -76,10 +78,10 @@ def init(
         from rigsight.errors import InputError
 
         if gear or as_it_is:
-            option = "--gear is of a joint" if gear else "--as-it-is is"
-            raise InputError(f"{option} of a robot's model; name the model with --mjcf.")
+            option = "--gear" if gear else "--as-it-is"
+            raise InputError(f"{option} applies only to the model of a robot; name the model with --mjcf.")
         if folder is None:
-            raise InputError("Name the FOLDER that holds the measured files, or a model with --mjcf.")
+            raise InputError("Name the FOLDER of the measured files, or the model of a robot with --mjcf.")
         from rigsight.workflow.init import run_init
         from rigsight.workflow.own.own_simulators import own_simulators
 
@@ -102,13 +104,14 @@ def init(
     typer.echo(f"Written: {draft.path} ({draft.model}, {count} record{'' if count == 1 else 's'})")
     if model is None:
         typer.echo(
-            f"The rig is a guess from the channels; remove the file and say --model for another ({', '.join(draft.others)}), or "
-            "--rigs FILE --model NAME for a rig file of your own (rigsight rigs NAME prints one to begin with)."
+            f"The rig was guessed from the channels. If it is wrong, remove the file and run init again with --model "
+            f"({', '.join(draft.others)}), or with --rigs FILE --model NAME for a rig file of your own (rigsight rigs NAME "
+            "prints one to start from)."
         )
     for name, reason in draft.left_out:
         typer.echo(f"Not used: {name}: {reason}")
     if draft.n_blanks:
-        typer.echo(f'Fill in what reads "FILL IN" ({draft.n_blanks} times). Then: rigsight diagnose {folder}')
+        typer.echo(f'Replace each "FILL IN" ({draft.n_blanks} times) in it. Then: rigsight diagnose {folder}')
     else:
         typer.echo(f"Check the comments in it. Then: rigsight diagnose {folder}")
 
@@ -130,15 +133,15 @@ def _init_from_mjcf(
         from rigsight.workflow.init import run_init_from_mjcf
 
         if model is not None or rigs:
-            raise InputError("--mjcf gives the rig; leave out --model and --rigs.")
+            raise InputError("--mjcf already defines the rig; leave out --model and --rigs.")
         written = run_init_from_mjcf(
             folder, file, gears=dict(map(_gear, gears or [])), as_it_is=as_it_is, listener=listener
         )
     draft, run = written.draft, written.run
     if not run.agrees:
         typer.echo(
-            f"rigsight: the rig does not move as MuJoCo does: the largest relative difference is {run.worst:.1g}, allowed is "
-            f"{run.allowed:g}. See what was not taken over, at the head of {written.path}.",
+            f"rigsight: the free run of the rig differs from MuJoCo: the largest relative difference is {run.worst:.1g}, allowed "
+            f"is {run.allowed:g}. The head of {written.path} lists what was not taken over.",
             err=True,
         )
     if json:
@@ -163,8 +166,7 @@ def _init_from_mjcf(
     beside = f", without {' and '.join(run.left_out)}" if run.left_out else ""
     if run.agrees:
         typer.echo(
-            f"Free run of {run.duration:.1f} s beside MuJoCo{beside}: it moves as MuJoCo does, largest relative difference "
-            f"{run.worst:.1g}."
+            f"A free run of {run.duration:.1f} s agrees with MuJoCo{beside}; largest relative difference {run.worst:.1g}."
         )
     for note in draft.notes:
         typer.echo(note)
@@ -172,8 +174,8 @@ def _init_from_mjcf(
         typer.echo(f"Not taken over: {what}")
     if written.campaign is None:
         typer.echo(
-            f"Put records into {folder}, with columns t, {', '.join((*draft.controls, *draft.sensors))}. "
-            "Then the same command again."
+            f"Put the measured files into {folder}, with columns t, {', '.join((*draft.controls, *draft.sensors))}. "
+            "Then run the same command again."
         )
     else:
         typer.echo(
@@ -188,4 +190,4 @@ def _gear(text: str) -> tuple[str, float]:
     try:
         return joint, float(stiffness)
     except ValueError:
-        raise InputError(f"--gear: JOINT=STIFFNESS, such as elbow=500, got '{text}'.") from None
+        raise InputError(f"--gear: got '{text}'; write JOINT=STIFFNESS, for instance elbow=500.") from None

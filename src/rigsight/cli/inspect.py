@@ -1,4 +1,4 @@
-"""What does ``rigsight inspect`` accept, run and show?"""
+"""The command ``rigsight inspect``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def inspect(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Look into a measured file: channels, units, rates, ranges, gaps, and how a campaign would name them."""
+    """Show the channels of a measured file with units, sample rates, ranges and gaps, and propose its entry in a campaign."""
     with report_errors(debug):
         from rigsight.workflow.inspect import run_inspect
         from rigsight.workflow.own.own_rigs import own_rigs
@@ -40,7 +40,7 @@ def inspect(
     elif not quiet:
         show(_table(found))
         for name, (step, gaps) in found.times.items():
-            told_gaps = "does not rise" if step is None else f"step {step:.6g}, {gaps} gaps"
+            told_gaps = "does not increase" if step is None else f"step {step:.6g}, {gaps} gaps"
             typer.echo(f"Time '{name}': {told_gaps}")
         for refused in found.refused:
             typer.echo(f"No signal: '{refused.name}' {refused.reason}")
@@ -79,7 +79,7 @@ def _table(found: Inspection) -> Table:
                 str(channel.n_not_finite or ""),
             )
         )
-    # What no channel has to say leaves its room to the names.
+    # A column that is empty for all channels is left out.
     told_of = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in rows)]
     table = Table(title=escape(f"{found.file} ({found.format})"), box=box.SIMPLE, title_justify="left")
     for i in told_of:

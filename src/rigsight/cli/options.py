@@ -1,4 +1,4 @@
-"""Which arguments and options do several commands share?"""
+"""Arguments and options that several commands share."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import typer
 
 
 def effect_names(begun: str) -> list[str]:
-    """Return the names of the catalogue that begin so, for the shell's completion."""
+    """Return the effects of the catalogue whose names begin with this text, for completion in the shell."""
     from rigsight.effects import CATALOGUE
 
     return [effect.name for effect in CATALOGUE if effect.name.startswith(begun)]
 
 
 Campaign = Annotated[
-    Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that holds one.")
+    Path, typer.Argument(metavar="CAMPAIGN", help="A campaign.toml or the folder that contains it.")
 ]
 ResultsFolder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
 OwnEffects = Annotated[
@@ -25,7 +25,7 @@ OwnEffects = Annotated[
         "--effects",
         metavar="FILE",
         show_default="none",
-        help="A Python file that declares effects of your own; it is run. May be repeated.",
+        help="A Python file that declares effects of your own; the file is executed. May be repeated.",
     ),
 ]
 OwnRigs = Annotated[
@@ -34,7 +34,7 @@ OwnRigs = Annotated[
         "--rigs",
         metavar="FILE",
         show_default="none",
-        help="A file that declares a rig of your own, which is then known by its name. May be repeated.",
+        help="A rig file that declares a rig of your own, which can then be used by its name. May be repeated.",
     ),
 ]
 Simulators = Annotated[
@@ -43,12 +43,13 @@ Simulators = Annotated[
         "--simulator",
         metavar="FILE.py:FUNCTION",
         show_default="none",
-        help="A function of Python that moves the bodies of a rig whose file says so; its file is run. May be repeated.",
+        help="A Python function that computes the motion of the bodies, for rig files with an external simulator; the Python "
+        "file is executed. May be repeated.",
     ),
 ]
 Seed = Annotated[
     int,
-    typer.Option("--seed", min=0, max=2**63 - 1, help="Seed of everything random."),
+    typer.Option("--seed", min=0, max=2**63 - 1, help="Seed of all random numbers."),
 ]
 Jobs = Annotated[
     int | None,
@@ -57,11 +58,9 @@ Jobs = Annotated[
         "-j",
         min=1,
         show_default="one per processor",
-        help="Candidates fitted, records identified or trials run at the same time.",
+        help="Number of parallel jobs: candidates fitted, records identified or trials run at the same time.",
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
-Json = Annotated[
-    bool, typer.Option("--json", help="Print the result as JSON instead of a summary, for other programs.")
-]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON instead of a summary.")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]

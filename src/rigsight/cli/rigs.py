@@ -1,4 +1,4 @@
-"""What does ``rigsight rigs`` accept, run and show?"""
+"""The command ``rigsight rigs``."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from rigsight.cli.terminal import show_as_json
 def list_rigs(
     name: Annotated[
         str | None,
-        typer.Argument(help="Print this rig's file, to copy and change.", show_default="list all"),
+        typer.Argument(help="Print the file of this rig, as a template.", show_default="list all"),
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", metavar="FILE", help="Draw the rig NAME instead, into a PNG or SVG file."),
+        typer.Option("--picture", metavar="FILE", help="Draw the rig NAME into a PNG or SVG file instead."),
     ] = None,
     rigs: OwnRigs = None,
     simulator: Simulators = None,
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """List the rigs that come with rigsight and check files of your own, print the file of one, or draw it.
+    """List the built-in rigs, check rig files of your own, print the file of a rig, or draw it.
 
-    Exit code 2 and the place in the file if one of --rigs cannot be used.
+    If a file of --rigs cannot be used, the error and its place in the file are printed and the exit code is 2.
     """
     with report_errors(debug):
         from rigsight.errors import InputError, check_option
@@ -43,7 +43,9 @@ def list_rigs(
             from rigsight.workflow.rigs import write_rig_picture
 
             if name is None:
-                raise InputError("Which rig is to be drawn? Name it: rigsight rigs NAME --picture FILE.png.")
+                raise InputError(
+                    "--picture needs the name of the rig to draw: rigsight rigs NAME --picture FILE.png."
+                )
             written = str(write_rig_picture(known[check_option("Rig", name, known)], picture))
             show_as_json({"name": name, "picture": written}) if json else typer.echo(written)
             return

@@ -1,4 +1,4 @@
-"""How does a signal that asks rigsight to end become the same clean end as Ctrl-C?"""
+"""Termination signals end rigsight as cleanly as Ctrl-C."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from types import FrameType
 from rigsight.workflow.run.results import ENDING_SIGNALS
 
 _AGAIN_AFTER = 0.05
-"""Seconds after which a request is repeated that came where an exception would be dropped."""
+"""Seconds after which a signal is raised again that arrived where an exception would be swallowed."""
 _DROPPING = ("__del__", "_raw_object_cache_notify", "_raw_object_cache_getbuffer")
-"""Functions whose callers print an exception and go on: finalizers, and what LLVM calls while it compiles."""
+"""Functions whose callers print an exception and continue: finalizers, and callbacks of LLVM during compilation."""
 
 
 class Ended(KeyboardInterrupt):
-    """The process was asked to end, by kill or by a terminal that goes away; everything that Ctrl-C clears up is cleared up."""
+    """The process was asked to end, by kill or because its terminal was closed; it cleans up as after Ctrl-C."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -26,11 +26,11 @@ class Ended(KeyboardInterrupt):
 
 @contextlib.contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Turn requests to end, Ctrl-C among them, into `Ended`, except those that are ignored, as under nohup."""
+    """Raise `Ended` on termination signals and Ctrl-C, except on signals that are ignored, as under nohup."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    # Who runs the command line inside another program may have handlers of their own.
+    # A program that runs the command line inside itself may have handlers of its own.
     usual = (signal.SIG_DFL, signal.default_int_handler)
     before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
     mine = {number: handler for number, handler in before.items() if handler in usual}
@@ -44,7 +44,7 @@ def ended_by_signals() -> Iterator[None]:
 
 
 def exit_code(error: BaseException | None) -> int:
-    """Return the exit code after an interruption: 128 and the number of its signal, 130 for Ctrl-C."""
+    """Return the exit code after an interruption: 128 plus the number of its signal, 130 for Ctrl-C."""
     return 128 + (error.number if isinstance(error, Ended) else int(signal.SIGINT))
 
 
@@ -58,7 +58,7 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _repeat(number: int) -> None:
-    # To the main thread, which may be waiting; a signal to this one would not wake it.
+    # The signal goes to the main thread, which may be waiting; a signal to this thread would not wake it.
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
         signal.pthread_kill(main, number)

@@ -1,4 +1,4 @@
-"""What does ``rigsight simulate`` accept, run and show, and how are its ``--column`` and ``--initial-state`` read?"""
+"""The command ``rigsight simulate``, and how its ``--column`` and ``--initial-state`` are parsed."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 def simulate(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that holds one.")
+        Path, typer.Argument(metavar="MODEL", help="A model.json or the folder that contains it.")
     ],
     record: Annotated[
         Path,
         typer.Argument(
-            metavar="RECORD", help="A measured file with time and inputs; other columns are ignored."
+            metavar="RECORD", help="A measured file with time and inputs; further columns are ignored."
         ),
     ],
     out: Annotated[
@@ -34,7 +34,7 @@ def simulate(
             "--out",
             "-o",
             metavar="FILE",
-            show_default="RECORD_simulated.csv in this folder",
+            show_default="RECORD_simulated.csv in the current folder",
             help="CSV file to write.",
         ),
     ] = None,
@@ -43,7 +43,7 @@ def simulate(
         typer.Option(
             "--column",
             metavar="SIGNAL=COLUMN",
-            help="Where a signal stands: u=current or u=2. May be repeated.",
+            help="Column of a signal, by name or number: u=current or u=2. May be repeated.",
         ),
     ] = None,
     unit: Annotated[
@@ -51,7 +51,7 @@ def simulate(
         typer.Option(
             "--unit",
             metavar="SIGNAL=UNIT",
-            show_default="SI, or what the file states",
+            show_default="the unit in the file, else SI",
             help="Unit of a signal's column: t=ms. May be repeated.",
         ),
     ] = None,
@@ -59,8 +59,8 @@ def simulate(
         str | None,
         typer.Option(
             metavar="STATE=VALUE,...|estimated",
-            show_default="rest at the first input",
-            help="States that start elsewhere (psi=0.01,w=0), or 'estimated' from the outputs in the record.",
+            show_default="equilibrium at the first input sample",
+            help="Initial values of states (psi=0.01,w=0), or 'estimated' to fit them to the outputs in the record.",
         ),
     ] = None,
     constant: Annotated[
@@ -68,8 +68,8 @@ def simulate(
         typer.Option(
             "--constant",
             metavar="NAME=VALUE",
-            show_default="the model's",
-            help="A constant of the rig that is another one in this record: m_load=1.2. May be repeated.",
+            show_default="as in the model",
+            help="A constant of the rig with a different value in this record: m_load=1.2. May be repeated.",
         ),
     ] = None,
     effects: OwnEffects = None,
@@ -81,7 +81,8 @@ def simulate(
 ) -> None:
     """Predict the outputs of a model for the inputs of a record.
 
-    Writes a CSV with time, inputs and simulated sensors in SI units (running_gear: t,u,psi,y; axis: t,u,x; element: t,x,force).
+    Writes a CSV file with time, inputs and simulated outputs in SI units (running_gear: t,u,psi,y; axis: t,u,x; element:
+    t,x,force).
     """
     file = out or Path(f"{record.stem}_simulated.csv")
     with report_errors(debug), listening(quiet):
@@ -130,7 +131,7 @@ def _constants(given: list[str]) -> dict[str, float]:
         try:
             constants[name] = float(value)
         except ValueError:
-            raise InputError(f"--constant '{text}' cannot be read; '{value}' is no number.") from None
+            raise InputError(f"--constant '{text}' cannot be read; '{value}' is not a number.") from None
     return constants
 
 

@@ -1,4 +1,4 @@
-"""What does a command read back from the terminal, and what does it show there when it has finished?"""
+"""The command line as typed, and the output of finished commands on the terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def command_line() -> str:
-    """Return the command as typed, so that a result can say what repeats it."""
+    """Return the command as typed, so that results can quote it."""
     return shlex.join(["rigsight", *sys.argv[1:]])
 
 
@@ -27,19 +27,19 @@ def show(summary: RenderableType) -> None:
 
 
 def show_json(file: Path) -> None:
-    """Show a JSON file that was written, as it is, on stdout."""
+    """Print a JSON file that was written, unchanged, on stdout."""
     typer.echo(file.read_text(encoding="utf-8").rstrip("\n"))
 
 
 def show_as_json(content: Mapping[str, Any]) -> None:
-    """Show content as JSON on stdout; `schema_version` comes first."""
+    """Print content as JSON on stdout; `schema_version` comes first."""
     from rigsight.workflow.run.results import json_text
 
     typer.echo(json_text({"schema_version": 1, **content}), nl=False)
 
 
 def show_files(files: Mapping[str, Path]) -> None:
-    """Show, after an empty line, where results lie: a label and a path each, paths below each other."""
+    """Print an empty line, then the paths of results with a label each, aligned."""
     typer.echo()
     width = max(map(len, files)) + 1
     for label, path in files.items():

@@ -1,4 +1,4 @@
-"""How does a process that diagnoses a blind trial run the command line, and say whether the trial or the machine ended it?"""
+"""The process that diagnoses a blind trial: it runs the command line; its exit code distinguishes errors of the machine."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from rigsight.workflow.bench.parent_watch import end_with_parent
 from rigsight.workflow.bench.trial import MACHINE
 
 START = ("-c", f"from {__name__} import main; main()")
-"""Arguments with which Python starts the process; it is named here, so that nothing below names the command line."""
+"""Arguments with which Python starts the process; defined here, so that lower packages do not import the command line."""
 
 
 def main() -> None:
-    """Run the command line as a child that ends, and clears its folder, with the process that started it."""
+    """Run the command line as a child that ends, and removes its folder, when the process that started it has ended."""
     end_with_parent(str(Path.cwd()))
     try:
         command_line()

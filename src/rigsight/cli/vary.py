@@ -1,4 +1,4 @@
-"""What does ``rigsight vary`` accept, run and show?"""
+"""The command ``rigsight vary``."""
 
 from __future__ import annotations
 
@@ -19,32 +19,42 @@ def vary(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="A model.json, the folder that holds one, or a published set such as hysteresis_r.",
+            help="A model.json, a folder that contains one, or a published set such as hysteresis_r.",
         ),
     ],
     parameter: Annotated[
         list[str],
-        typer.Option(metavar="NAME", help="The parameter to vary. May be repeated: one picture each."),
+        typer.Option(metavar="NAME", help="The parameter to vary. May be repeated; each gives one figure."),
     ],
     low: Annotated[
         float | None,
-        typer.Option("--from", metavar="VALUE", show_default="half the model's", help="First value."),
+        typer.Option(
+            "--from", metavar="VALUE", show_default="half the value in the model", help="First value."
+        ),
     ] = None,
     high: Annotated[
         float | None,
-        typer.Option("--to", metavar="VALUE", show_default="twice the model's", help="Last value."),
+        typer.Option(
+            "--to", metavar="VALUE", show_default="twice the value in the model", help="Last value."
+        ),
     ] = None,
     steps: Annotated[int, typer.Option(help="Number of values.")] = 5,
     amplitude: Annotated[float, typer.Option(help="Amplitude of the sweep, in the unit of the input.")] = 1.0,
     lowest: Annotated[
         float | None,
         typer.Option(
-            metavar="OMEGA", show_default="1/12 of the natural frequency", help="Begin of the band [rad/s]."
+            metavar="OMEGA",
+            show_default="1/12 of the natural frequency",
+            help="Lower end of the band [rad/s].",
         ),
     ] = None,
     highest: Annotated[
         float | None,
-        typer.Option(metavar="OMEGA", show_default="6 times the natural frequency", help="Its end [rad/s]."),
+        typer.Option(
+            metavar="OMEGA",
+            show_default="6 times the natural frequency",
+            help="Upper end of the band [rad/s].",
+        ),
     ] = None,
     source: Annotated[
         str | None,
@@ -52,7 +62,9 @@ def vary(
     ] = None,
     response: Annotated[
         str | None,
-        typer.Option("--output", metavar="NAME", show_default="the first", help="Sensor that answers."),
+        typer.Option(
+            "--output", metavar="NAME", show_default="the first", help="Output whose response is shown."
+        ),
     ] = None,
     simulator: Simulators = None,
     out: ResultsFolder = Path("vary"),
@@ -62,7 +74,7 @@ def vary(
 ) -> None:
     """Show how the frequency response of a model changes with a parameter.
 
-    Writes vary.svg, vary.png (vary_NAME.svg, ... where several parameters are named) and vary.json into DIR, all or none.
+    Writes vary.svg, vary.png (vary_NAME.svg, ... for several parameters) and vary.json into DIR; all files or none.
     """
     with report_errors(debug), listening(quiet) as listener:
         from rigsight.workflow.own.own_simulators import own_simulators
@@ -70,7 +82,7 @@ def vary(
 
         own_simulators(simulator or [])
         if (lowest is None) != (highest is None):
-            raise InputError("--lowest and --highest go together: give both, or neither.")
+            raise InputError("--lowest and --highest must be given together: give both, or neither.")
         band = None if lowest is None or highest is None else (lowest, highest)
         variations = run_vary(
             model,
@@ -90,4 +102,4 @@ def vary(
     elif not quiet:
         for variation in variations:
             typer.echo(table_text(variation) + "\n")
-        typer.echo(f"Pictures and numbers: {out}")
+        typer.echo(f"Figures and values: {out}")

@@ -110,7 +110,7 @@ def examine(
     Parameters
     ----------
     campaign
-        Records and the simulation in question.
+        Records and the given simulation.
     effects
         Candidates.
     rng

@@ -24,15 +24,15 @@ from rigsight.errors import InputError, MachineError
 VARIABLE = "CC"
 _COMMON = ("cc", "gcc", "clang")
 _ROOM = 1_000_000
-"""What a compiler needs for its files [bytes]; with less left, the disk is what failed."""
+"""Disk space that a compiler needs [bytes]; with less, a failure is attributed to the disk."""
 _SHARED = {
     "Linux": (".so", ("-shared", "-fPIC", "-fvisibility=hidden")),
     "Darwin": (".dylib", ("-dynamiclib", "-fPIC", "-fvisibility=hidden")),
     "Windows": (".dll", ("-shared",)),
 }
 NO_COMPILER = (
-    "No C compiler was found, but simulations are compiled. Install one: 'pip install rigsight[compiler]' (nothing else is "
-    f"needed), or Debian's gcc with 'apt-get install gcc', or name one in the variable {VARIABLE}."
+    "No C compiler was found, which simulations need. Install one: 'pip install rigsight[compiler]' (without root), or on "
+    f"Debian 'apt-get install gcc', or name one in the environment variable {VARIABLE}."
 )
 
 
@@ -53,7 +53,7 @@ class Compiler:
 
     @property
     def name(self) -> str:
-        """The command as people write it."""
+        """The command as text."""
         return shlex.join(self.command)
 
 
@@ -99,7 +99,7 @@ def _identity(program: str) -> str:
 
 
 def library_suffix() -> str:
-    """Return how the name of a shared library ends on this system.
+    """Return the suffix of a shared library on this system.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]
             for file, text in sources.items():
                 Path(place, file).write_text(text, encoding="utf-8")
             target = Path(place, f"library{suffix}")
-            # Without being asked zig writes where it compiled for debuggers: other bytes each time.
+            # By default zig writes the path of the build folder for debuggers, so that the bytes differ each time.
             options = ("-g0", *flags, *shared)
             command = [*compiler.command, *options, "-o", target.name, next(iter(sources)), "-lm"]
             code, said = _run(command, place)
@@ -188,7 +188,7 @@ def library(compiler: Compiler, sources: Mapping[str, str], flags: Sequence[str]
 
 
 def _run(command: Sequence[str], place: str) -> tuple[int, str]:
-    """Run a compiler in a folder that holds its own temporary files too; return its exit code and what it said.
+    """Run a compiler in a folder that holds its own temporary files too; return its exit code and output.
 
     It runs programs of its own, which end with it when we are interrupted.
     """
@@ -218,7 +218,7 @@ def _run(command: Sequence[str], place: str) -> tuple[int, str]:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a program and those that it runs."""
+    """End a program and its child processes."""
     if os.name == "nt":
         process.kill()
         return

@@ -22,14 +22,14 @@ from rigsight.libraries.compiler import Compiler, c_compilers, first_library, li
 CACHE_VARIABLE = "RIGSIGHT_CACHE_DIR"
 FLAGS_VARIABLE = "RIGSIGHT_CFLAGS"
 """Options that follow those of the engine and so replace them, to see whether a result depends on them: ``-O1``."""
-# Vectors are written out where they pay; those that a compiler finds by itself in the few states of one set cost a third.
-# No options that let a compiler take numbers for finite or reorder sums: motions beyond the range of numbers are detected, and
-# results are to differ from compiler to compiler by rounding alone.
+# The source vectorizes explicitly; automatic vectorization of the few states of one parameter set costs a third of the speed.
+# No options that assume finite values or reorder sums: overflow must be detected, and results may differ between compilers by
+# rounding only.
 OPTIONS = (
     "-std=gnu11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
     "-fno-tree-slp-vectorize", "-w",
 )  # fmt: skip
-"""What every compiled model is compiled with; kernels, which stay on this machine, add what its processor can."""
+"""Options of every compiled model; kernels, which stay on this machine, add the features of its processor."""
 _OWN_PROCESSOR = {
     "x86_64": "-march=native",
     "AMD64": "-march=native",
@@ -40,7 +40,7 @@ _CHECKSUM_SIZE = 64
 
 
 def cache_folder() -> Path:
-    """Return where compiled kernels live: $RIGSIGHT_CACHE_DIR, else the platform's place for a user's caches.
+    """Return the folder of compiled kernels: $RIGSIGHT_CACHE_DIR, else the platform's cache folder of the user.
 
     Raises
     ------
@@ -60,14 +60,14 @@ def _caches_at_home() -> Path:
     try:
         return Path.home() / inside
     except RuntimeError:
-        # A container that runs under a number without a name.
+        # A container with a numeric user without a name.
         raise InputError(
             f"There is no home folder for the cache of compiled kernels. Set {CACHE_VARIABLE} to a writable folder."
         ) from None
 
 
 def library_file(text: str, included: Sequence[str] = ()) -> Path:
-    """Return a sound library of a C text, with the first compiler that has or can make one.
+    """Return an intact library of a C text, of the first compiler for which one is cached or can be compiled.
 
     Parameters
     ----------
@@ -96,12 +96,12 @@ def library_file(text: str, included: Sequence[str] = ()) -> Path:
 
 
 def is_kept(text: str) -> bool:
-    """Return True if this machine holds a sound library of a C text already."""
+    """Return True if an intact library of a C text is already cached."""
     return any(_sound(_path(text, compiler)) for compiler in c_compilers())
 
 
 def kernel_options() -> tuple[str, ...]:
-    """Return what kernels of this machine are compiled with."""
+    """Return the compiler options of kernels on this machine."""
     own = _OWN_PROCESSOR.get(platform.machine())
     return (*OPTIONS, *((own,) if own else ()), *os.environ.get(FLAGS_VARIABLE, "").split())
 
@@ -114,7 +114,7 @@ def _path(text: str, compiler: Compiler) -> Path:
 
 @cache
 def _processor() -> str:
-    """Return what tells this processor from others that cannot run its code."""
+    """Return an identifier that distinguishes this processor from others that cannot run its code."""
     told = f"{platform.machine()} {platform.processor()}"
     with contextlib.suppress(OSError):
         first = Path("/proc/cpuinfo").read_text("utf-8", errors="replace").partition("\n\n")[0]
@@ -134,7 +134,7 @@ def _processor() -> str:
 
 
 def _sound(path: Path) -> bool:
-    """Return True for a library that is whole: loading a part of one would end the process."""
+    """Return True for a complete library: loading an incomplete one would crash the process."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -144,7 +144,7 @@ def _sound(path: Path) -> bool:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a library whole or not at all; its checksum stands behind it, where loaders do not look."""
+    """Write a library completely or not at all; its checksum is appended, where loaders ignore it."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
@@ -157,7 +157,7 @@ def _write(path: Path, content: bytes) -> None:
             Path(part).unlink(missing_ok=True)
             raise
     except OSError as error:
-        # Another process was quicker and has it loaded; some systems then let nobody replace it.
+        # Another process was faster and has loaded it; on some systems it then cannot be replaced.
         if _sound(path):
             return
         raise MachineError(

@@ -41,7 +41,7 @@ from rigsight.plot.rig_picture import PlaceMark as PlaceMark
 from rigsight.plot.rig_picture import rig_picture as rig_picture
 
 if TYPE_CHECKING:
-    # For rooms that hand figures on and must not know matplotlib.
+    # For packages that pass figures on and must not import matplotlib.
     from matplotlib.figure import Figure as Figure
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Which figure shows how identified parameters depend on the amplitude?"""
+"""Figure of identified parameters over the amplitude."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MARKERS = {"sweep": "o", "multisine": "D", "step": "s", "operation": "^"}
 
 @dataclass(frozen=True)
 class AmplitudePoint:
-    """A parameter as one record shows it; `std` is NaN where it is not known."""
+    """A parameter estimated from one record; `std` is NaN if it is not known."""
 
     amplitude: float
     kind: str
@@ -103,7 +103,7 @@ def _draw(ax: Axes, panel: AmplitudePanel) -> None:
     ax.set_title(f"{panel.name}{unit}")
     ax.margins(x=0.12, y=0.15)
     ax.yaxis.set_major_locator(MaxNLocator(5))
-    # An offset would stand on the title.
+    # The offset text would overlap the title.
     ax.ticklabel_format(axis="y", useOffset=False)
     ax.grid()
     ax.set_axisbelow(True)

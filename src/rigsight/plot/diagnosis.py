@@ -1,4 +1,4 @@
-"""Which figures show a diagnosis?"""
+"""Figures of a diagnosis."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ _DETAIL_PERIODS = 5.0
 _DETAIL_SHARE = 1.0 / 12.0
 _DETAIL_MIN_SAMPLES = 60
 _SETTLED = 0.05
-"""Share of the way that is left when a step counts as settled."""
+"""Remaining share of the change at which a step counts as settled."""
 _RINGING = 5.0
-"""Times the measured settling that a simulation is shown to ring."""
+"""Multiple of the measured settling time up to which the ringing of a simulation is shown."""
 _NOISE_REACHES = 5.0
-"""Standard deviations that not one of some thousand samples of noise exceeds."""
+"""Standard deviations that noise does not exceed in some thousand samples."""
 _BINS = 250
 """Bins of a line in print, where the axis of a whole record is some 110 mm wide."""
 
@@ -66,7 +66,7 @@ def step_window(trace: Trace, output: str) -> slice | None:
     later = np.flatnonzero(jumps[start:] > 0.5 * largest)
     stop = start + int(later[0]) + 1 if later.size else trace.t.size
     settled = _settling(trace.measured[output][start:stop])
-    # A simulation that rings on is worth seeing too, but not until it has pressed the step itself together.
+    # A simulation that keeps ringing is shown too, but not so long that the step itself becomes too narrow.
     slowest = max(_settling(source[output][start:stop]) for source in (trace.before, trace.after))
     length = max(_DETAIL_MIN_SAMPLES, round(1.25 * min(max(settled, slowest), _RINGING * settled)))
     return slice(max(0, start - length // 8), min(stop, start + length))
@@ -77,17 +77,17 @@ def _settling(after: NDArray[np.float64]) -> int:
     known = np.nan_to_num(after)
     rest = known[-max(1, known.size // 10) :]
     away = np.abs(known - np.mean(rest))
-    # Differences of neighbors are noise, however slowly the rest swings.
+    # Differences of neighboring samples are noise even if the rest oscillates slowly.
     noise = float(np.std(np.diff(rest))) / np.sqrt(2.0) if rest.size > 1 else 0.0
     moving = np.flatnonzero(away > max(_SETTLED * float(np.max(away)), _NOISE_REACHES * noise))
     return int(moving[-1]) + 1 if moving.size else 1
 
 
 def detail_window(trace: Trace, output: str) -> slice:
-    """Return the samples worth a look of their own.
+    """Return the samples for an enlarged view.
 
-    Of a step, the step; of other records those around the place where the given simulation errs most: about five periods, or
-    less of a short record.
+    Of a step, the step; of other records those around the largest error of the given simulation: about five periods, or less of a
+    short record.
     """
     step = step_window(trace, output)
     if step is not None:
@@ -115,7 +115,7 @@ def _largest(residual: NDArray[np.float64], length: int) -> slice:
 def gap_budget(
     diagnosis: Diagnosis, after_label: str, labels: dict[str, str] | None = None, is_given: bool = True
 ) -> Figure:
-    """Draw the gap of each output as a waterfall: given, taken away by better numbers and by the effect, left over, floor.
+    """Draw the gap of each output as a waterfall: given, explained by parameters and by the effect, remaining, noise floor.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def ranking(diagnosis: Diagnosis, names: Sequence[str], limit: int = 16) -> Figu
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")
     ax.set_axisbelow(True)
-    ax.set_xlabel("RMS left over / noise floor (dashed: 1, perfect)")
+    ax.set_xlabel("residual RMS / noise floor (dashed: 1, perfect)")
     lines = [line for name in shown for line in name.split("\n")]
     set_margins(figure, 0.14 + text_width(lines, _NAMES), 0.1, 0.48, 0.08)
     return figure

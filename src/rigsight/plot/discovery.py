@@ -53,7 +53,7 @@ def discovery_figure(found: Discovery) -> Figure:
 
 
 def _draw_joint(axes: Sequence[Axes], joint: JointForce) -> None:
-    """Draw the missing force of a joint over its displacement and its velocity, and what its law says there."""
+    """Draw the missing force of a joint over its displacement and its velocity, with the identified law."""
     x, v, force, law = (
         np.concatenate([getattr(trace, name) for trace in joint.traces])
         for name in ("displacement", "velocity", "force", "law")
@@ -110,14 +110,14 @@ def _numbers(found: Discovery) -> list[tuple[str, float]]:
 
 
 def _draw_coefficients(ax: Axes, numbers: list[tuple[str, float]]) -> None:
-    """Draw 95 % intervals relative to the values; of one that holds zero only that is said."""
+    """Draw 95 % intervals relative to the values; an interval that contains zero is replaced by a note."""
     places = list(range(len(numbers)))
     known = [1.96 * error for _, error in numbers if 1.96 * error < 1.0]
     reach = max([*known, 1e-4]) * 1.2
     for place, (_, error) in zip(places, numbers, strict=True):
         width = 1.96 * error
         if not width < 1.0:
-            words = "cannot be told from zero" if math.isfinite(width) else "not determined"
+            words = "not distinguishable from zero" if math.isfinite(width) else "not determined"
             ax.text(0.02 * reach * 100, place, words, va="center", fontsize=8, color=MEASURED)
             continue
         ax.plot([-100 * width, 100 * width], [place, place], color=WITH_EFFECT, linewidth=2.0)

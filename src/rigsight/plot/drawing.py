@@ -47,7 +47,7 @@ STYLE: dict[Any, Any] = {
     "axes.edgecolor": "#8a939c",
     "axes.labelcolor": "#1d2126",
     "axes.titlelocation": "left",
-    # No tick label stands above an axis here; looking for one costs a tenth of the drawing.
+    # No tick label is above an axis here; looking for one takes a tenth of the drawing time.
     "axes.titley": 1.0,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
@@ -59,7 +59,7 @@ STYLE: dict[Any, Any] = {
     "savefig.facecolor": "white",
     "lines.solid_joinstyle": "round",
     "svg.fonttype": "none",
-    # A dollar sign in somebody's signal or effect name is no formula.
+    # A dollar sign in the name of a signal or effect does not start a formula.
     "text.parse_math": False,
 }
 

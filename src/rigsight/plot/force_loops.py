@@ -1,4 +1,4 @@
-"""Which figure shows a force element: its force over the motion that a bench prescribes, measured and simulated?"""
+"""Figure of a force element: its force over the prescribed motion, measured and simulated."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def force_loops(loop: ForceLoop, stages: Mapping[Stage, str]) -> Figure:
     axes = figure.subplots(1, 2, sharey=True)
     set_margins(figure, 0.75, 0.15, 0.46, 0.36, between=(0.18, 0.0))
     factor, unit = shown_in(loop.force_unit, loop.measured)
-    # A simulation that left the numbers leaves the picture rather than press the others flat.
+    # A diverging simulation leaves the axes, so that the other curves stay readable.
     low, high = factor * float(np.nanmin(loop.measured)), factor * float(np.nanmax(loop.measured))
     reach = 0.3 * (high - low) or 1.0
     simulated = [factor * force[np.isfinite(force)] for force in loop.simulated.values()]

@@ -1,4 +1,4 @@
-"""Which figures show frequency responses: measured against fitted, and of several amplitudes over each other?"""
+"""Figures of frequency responses: measured and fitted, and several amplitudes in one plot."""
 
 from __future__ import annotations
 
@@ -241,7 +241,7 @@ def limit(ax: Axes, values: NDArray[np.float64]) -> None:
 
 
 def seen(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Return limits at which a few wild lines, or a band that reaches zero, do not press the rest of the curve flat."""
+    """Return axis limits that are not determined by a few outliers or by a band that reaches zero."""
     low, high = np.percentile(values[np.isfinite(values)], [0.5, 100.0])
     margin = 0.08 * max(high - low, 3.0)
     return float(low - margin), float(high + margin)

@@ -1,4 +1,4 @@
-"""Which figures show where the gap lies: over frequency, amplitude, records, time and the plane of states?"""
+"""Figures of the gap over frequency, amplitude, records, time and the plane of states."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _LEFT, _RIGHT, _LEGEND = 0.78, 0.1, 0.35
 """Room for labels and ticks, and for a line of a legend [inch]."""
 _STATES_HEIGHT = 3.0
 _BAR_ROOM = 0.84
-"""Room beside a map for the bar that tells its colors, with numbers and label [inch]."""
+"""Room beside a map for its color bar with ticks and label [inch]."""
 _DASHES = (0, (4, 2))
 _PERCENT = 100.0
 _SHADES = 15
@@ -51,7 +51,7 @@ def _bars(ax: Axes, parts: Sequence[GapPart], stages: Mapping[Stage, str]) -> No
     ]
     finite = [_PERCENT * v for v in values if np.isfinite(v) and v > 0.0]
     top = max(finite, default=1.0)
-    # Three and a half decades: what lies lower is of no consequence, and would press the rest together.
+    # Three and a half decades: smaller values do not matter, and would compress the rest.
     bottom = max(0.6 * min(finite, default=0.1), top / 3e3)
     index = np.arange(len(parts))
     for i, (stage, label) in enumerate(stages.items()):
@@ -256,7 +256,7 @@ def gap_states(parts: Sequence[StatePart], output: str, motion: str) -> Figure:
             True,
             f"mean force [{shown}]" if shown != "1" else "mean force",
         )
-        axes[1].set_title("what the equations lack")
+        axes[1].set_title("force missing in the equations")
     x_unit, v_unit = parts[0].units["x_low"], parts[0].units["v_low"]
     factor, shown = _axis_scale(parts, x_unit)
     for ax in axes:

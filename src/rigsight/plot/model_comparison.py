@@ -1,4 +1,4 @@
-"""Which figures compare many models: their responses and steps over the measured ones, and their errors side by side?"""
+"""Figures that compare several models: responses and steps with the measured ones, and errors as bars."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def model_steps(panels: Sequence[StepPanel], styles: Mapping[str, Mapping[str, A
         for name, samples in panel.simulated.items():
             ax.plot(panel.t, factor * samples, label=name, linewidth=1.2, **styles[name])
         low, high = factor * float(panel.measured.min()), factor * float(panel.measured.max())
-        # A model that is far off leaves the picture rather than press the others flat.
+        # A model with large errors leaves the axes, so that the other curves stay readable.
         ax.set_ylim(low - 0.7 * (high - low), high + 0.7 * (high - low))
         ax.set_xlim(float(panel.t[0]), float(panel.t[-1]))
         ax.set_title(panel.title)

@@ -1,4 +1,4 @@
-"""Which figure shows whether a parameter is the same in every record?"""
+"""Figure of a parameter estimated from groups of records, against the common estimate."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _draw(ax: Axes, panel: GroupPanel) -> None:
     ax.set_title(f"{panel.name}{unit} by {panel.by}")
     ax.margins(x=0.08)
     ax.xaxis.set_major_locator(MaxNLocator(4))
-    # An offset would stand beside the axis, away from the number it belongs to.
+    # The offset text would be away from the values it belongs to.
     ax.ticklabel_format(axis="x", useOffset=False)
     ax.tick_params(axis="y", length=0)
     ax.grid(axis="x")

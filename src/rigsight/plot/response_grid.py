@@ -1,4 +1,4 @@
-"""How do the responses of every sensor to every input look, measured against a model? A grid: inputs across, sensors down."""
+"""Grid of the responses of every sensor to every input, measured and of a model: inputs across, sensors down."""
 
 from __future__ import annotations
 

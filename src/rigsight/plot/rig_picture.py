@@ -1,4 +1,4 @@
-"""How does a rig look? Signals on the left, bodies in the middle, joints to the ground on the right."""
+"""Schematic of a rig: signals on the left, bodies in the middle, joints to the ground on the right."""
 
 from __future__ import annotations
 
@@ -357,5 +357,5 @@ class _Sheet:
 
 
 def _slots(middle: float, count: int) -> Sequence[float]:
-    """Return heights at which lines arrive at a block, side by side about its middle."""
+    """Return the heights at which lines arrive at a block, spaced evenly about its middle."""
     return [middle + 0.14 * ((count - 1) / 2.0 - index) for index in range(count)]

@@ -1,4 +1,4 @@
-"""How are springs, dampers, walls and blocks of a rig drawn? Lengths in inch."""
+"""Symbols of springs, dampers, walls and blocks. Lengths in inch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How does a frequency response change with a parameter? One curve per value, magnitude above phase."""
+"""Figure of a frequency response for several values of a parameter: one curve per value, magnitude above phase."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class FreeRun:
     differences
         Coordinate -> largest difference, relative to how far the coordinate moves.
     left_out
-        In words, what was switched off in both.
+        Descriptions of what was switched off in both.
     allowed
         Largest difference of equations that are the same.
     """
@@ -63,8 +63,8 @@ class FreeRun:
 def free_run(model: mujoco.MjModel, draft: RigDraft) -> FreeRun:
     """Let a rig and the model that it comes from run freely from one state, under constant controls.
 
-    MuJoCo steps with the Runge-Kutta method of fourth order at a small step. What a rig file does not say is switched off in it:
-    contacts, ranges and equalities; and so is dry friction, in both, as MuJoCo's creeps where it should stick.
+    MuJoCo uses the Runge-Kutta method of fourth order with a small step. What is not in a rig file is switched off in it:
+    contacts, ranges and equality constraints. Dry friction is off in both, because MuJoCo's creeps where it should stick.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _ours(
 
 
 def watched(draft: RigDraft) -> Rig:
-    """Return a rig with a sensor at every coordinate in the place of its own."""
+    """Return a rig with a sensor at every coordinate instead of its own sensors."""
     sensors = {
         f"{_WATCHED}{name}": {"reads": name, "unit": table["unit"]}
         for name, table in draft.tables["coordinates"].items()

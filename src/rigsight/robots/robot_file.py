@@ -1,4 +1,4 @@
-"""A file of a robot's model -> the model, in a form that can be changed and compiled, and the rig that it gives."""
+"""Read the model file of a robot: the model, in a form that can be changed and compiled, and its rig."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def read_robot(path: Path, gears: Mapping[str, float] | None = None, *, as_it_is
     Raises
     ------
     InputError
-        Naming the file, if MuJoCo is not installed or cannot read it, or a rig file cannot say what moves in it.
+        Naming the file, if MuJoCo is not installed or cannot read it, or its motion cannot be represented in a rig file.
     """
     spec = load_spec(path)
     model = spec.compile()

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 STEP = 1e-6
 """Step of a difference, relative to what is moved or in its SI unit: rounding and curvature both leave 1e-6 or less."""
 KINDS = ("mujoco", "fmu", "python")
-"""Programs that can be asked."""
+"""Supported programs."""
 
 
 class Program(Protocol):
@@ -45,10 +45,10 @@ class Program(Protocol):
         """Folders of the headers that `c_text` includes."""
 
     def connect(self, library: ctypes.CDLL) -> None:
-        """Give a library that holds `c_text` what it asks the program with."""
+        """Connect a library that contains `c_text` with the program."""
 
     def check(self) -> None:
-        """Raise what went wrong while it was asked from C.
+        """Raise an error of the program that occurred during calls from C.
 
         Raises
         ------
@@ -59,20 +59,20 @@ class Program(Protocol):
 
 @dataclass(frozen=True)
 class Bodies:
-    """What another program simulates of a rig.
+    """The bodies of a rig that another program simulates.
 
     Attributes
     ----------
     kind
         One of `KINDS`.
     file
-        Absolute path of its model; of Python, how messages call the object.
+        Absolute path of its model; for Python, the name of the function in messages.
     digest
         Hash of the file: another file is another rig.
     coordinates
-        What the rig's degrees of freedom are called there, in their order.
+        Names of the rig's degrees of freedom in the program, in their order.
     parameters
-        What parameters and constants of the rig are called there, in the order of the rig's.
+        Names of parameters and constants of the rig in the program, in the order of the rig.
     rates, forces
         Of an FMU, the names of the states that are rates of the coordinates, and of the inputs that are forces along them.
     without_armature
@@ -123,7 +123,7 @@ class Bodies:
 
     @cached_property
     def answers(self) -> Answers:
-        """The program, asked for numbers."""
+        """The program as a function of numbers."""
         return Answers(self)
 
     @cached_property
@@ -145,7 +145,7 @@ class Bodies:
 
 
 class Answers:
-    """Numbers of bodies at many places, by a library of their own.
+    """Evaluates bodies at many points, with a compiled library.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ _WHY = {
     "belong to their coordinates, and forces must enter linearly",
     -2: "a state in [simulator.rates] is not the rate of its coordinate",
 }
-"""What the C text finds wrong."""
+"""Errors that the C text reports."""
 
 
 class _Told(ctypes.Structure):
@@ -104,7 +104,7 @@ class FmuProgram:
         found = sorted(Path(folder).glob(f"binaries/*/{identifier}{sharedLibraryExtension}"))
         own = [path for path in found if path.parent.name in (platform, _platform_of_3())]
         if not own:
-            raise InputError(f"{bodies.file} holds no binary for this machine ({platform}).")
+            raise InputError(f"{bodies.file} contains no binary for this machine ({platform}).")
         self._binary = own[0]
         resources = Path(folder) / "resources"
         where = resources.as_uri() if self._version == "2" else f"{resources}/"
@@ -150,7 +150,7 @@ class FmuProgram:
     def connect(self, library: ctypes.CDLL) -> None:
         """See `Program.connect`."""
         names = [f"fmi{self._version}{name}" for name in _FUNCTIONS[self._version]]
-        # Only what simulates runs the FMU: a rig file that is looked at runs nothing.
+        # The FMU is executed only in simulations; reading a rig file executes nothing.
         try:
             binary = ctypes.CDLL(str(self._binary))
         except OSError as error:
@@ -182,7 +182,7 @@ class FmuProgram:
 
 
 def _platform_of_3() -> str:
-    """Return how FMI 3 calls this machine: ``x86_64-linux``."""
+    """Return the name of this platform in FMI 3: ``x86_64-linux``."""
     import platform
 
     machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())

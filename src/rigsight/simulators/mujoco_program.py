@@ -54,7 +54,7 @@ class MujocoProgram:
             )
         self._fields = [self._field(name) for name in bodies.parameters]
         self.reads_forces = has_constraints(self._model)
-        """Whether bodies can touch, or joints, tendons and equalities are bound."""
+        """Whether there are contacts, joint or tendon limits, or equality constraints."""
         self._kept: list[Any] = []
         model = self._model
         self._is_plain = not (self.reads_forces or model.ntendon or model.nflex or model.nplugin)
@@ -112,7 +112,7 @@ class MujocoProgram:
         return field, place
 
     def _is_kept(self, field: NDArray[np.float64], place: tuple[int, ...]) -> bool:
-        """Return True for a number that stays what it is set to, and that the bodies are asked with."""
+        """Return True for a number that can be set and affects the bodies."""
         import mujoco
 
         if np.shares_memory(field, self._model.dof_frictionloss):
@@ -156,7 +156,7 @@ class MujocoProgram:
         self._kept.append((table, places, moved, mujoco_library))
 
     def check(self) -> None:
-        """Nothing can go wrong: MuJoCo warns, and goes on."""
+        """No errors are possible: MuJoCo only warns."""
 
 
 def opened(path: Path) -> mujoco.MjModel:
@@ -194,7 +194,7 @@ def compiled_model(path: Path) -> bytes:
 
 
 def bodies_alone(model: mujoco.MjModel, *, without_armature: bool) -> mujoco.MjModel:
-    """Return a model without what the rig says itself: dampers, springs and dry friction of joints, and actuators.
+    """Return a model without what the rig declares itself: dampers, springs and dry friction of joints, and actuators.
 
     Parameters
     ----------

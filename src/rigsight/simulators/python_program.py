@@ -1,4 +1,4 @@
-"""Bodies of a function of Python that gives accelerations: named on the command line or in code, never by a campaign alone."""
+"""Bodies simulated by a Python function of accelerations; only the command line or code can name it, never a campaign alone."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _CALL = ctypes.CFUNCTYPE(None, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES)
 
 
 def give_function(name: str, accelerations: Accelerations) -> None:
-    """Let rigs whose simulator is called so be simulated by a function.
+    """Register a function as the simulator of this name.
 
     Parameters
     ----------
     name
-        What a rig file calls it: ``file = "arm"`` beside ``kind = "python"``.
+        Its name in rig files: ``file = "arm"`` beside ``kind = "python"``.
     accelerations
         See `Accelerations`.
     """

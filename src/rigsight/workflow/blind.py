@@ -1,4 +1,4 @@
-"""What `rigsight blind` does: rigs whose effect is withheld are diagnosed, and scored by keys no diagnosis has seen."""
+"""The work of `rigsight blind`: trials whose true effect is withheld are diagnosed and scored with sealed keys."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rigsight.workflow.run.progress import Listener, Stage, silent
 from rigsight.workflow.run.results import check_writable
 
 RUNNING = "Blind trials"
-SCORING = "Scoring trials anew"
+SCORING = "Scoring trials again"
 
 
 def run_blind(
@@ -37,7 +37,7 @@ def run_blind(
     listener: Listener = silent,
     command: str = "rigsight blind",
 ) -> dict[str, Any]:
-    """Draw, diagnose and score blind trials; what an earlier run of the same bench has finished is kept.
+    """Draw, diagnose and score blind trials; trials that an earlier run of the same bench has finished are kept.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def run_external(
     listener: Listener = silent,
     command: str = "rigsight blind",
 ) -> dict[str, Any]:
-    """Diagnose and score campaigns that somebody else wrote; one that has changed since it was scored is done again.
+    """Diagnose and score existing campaigns; one that has changed since it was scored is diagnosed again.
 
     Parameters
     ----------
@@ -176,12 +176,12 @@ def rescore(
     listener: Listener = silent,
     command: str = "rigsight blind --rescore",
 ) -> dict[str, Any]:
-    """Score every trial of a bench that has been diagnosed anew; nothing is drawn or diagnosed.
+    """Score every diagnosed trial of a bench again; nothing is drawn or diagnosed.
 
     Parameters
     ----------
     out
-        Folder of the bench, drawn or of campaigns that somebody else wrote.
+        Folder of the bench, drawn or of existing campaigns.
     n_jobs, cluster, listener, command
         As for `run_blind`.
 
@@ -192,12 +192,12 @@ def rescore(
     Raises
     ------
     InputError
-        If the folder holds no bench, or key or results of a trial cannot be read.
+        If the folder contains no bench, or key or results of a trial cannot be read.
     """
     jobs = checked_jobs(n_jobs)
     folder = BenchFolder(Path(out).resolve())
     if not folder.settings.is_file():
-        raise InputError(f"{out} holds no blind bench to score anew. Name its folder with --out.")
+        raise InputError(f"{out} does not contain a blind bench. Name the folder of the bench with --out.")
     settings = read_json(folder.settings)
     if settings.get("design") == EXTERNAL:
         folder = ExternalBench(folder.path, Path(settings["campaigns"]), Path(settings["keys"]))
@@ -223,7 +223,7 @@ def _run(folder: BenchFolder, start: Sequence[str], name: str) -> Outcome:
 
 
 def _say(listener: Listener) -> Callable[[str], None]:
-    """Return what tells a listener that something waits: a stage of its own."""
+    """Return a function that reports to a listener that trials are waiting, as a stage of its own."""
 
     def say(words: str) -> None:
         Stage(words, 1, listener)

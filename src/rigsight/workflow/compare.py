@@ -1,4 +1,4 @@
-"""What `rigsight compare` does: models and a campaign -> `comparison.json`, `.csv`, `.html` and figures, together."""
+"""The work of `rigsight compare`: models and a campaign -> `comparison.json`, `.csv`, `.html` and figures."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def run_compare(
     campaign
         The toml file or its folder.
     models
-        Each a ``model.json``, the folder that holds one, or the name of a published set; ``NAME=MODEL`` gives it a name.
+        Each a ``model.json``, the folder that contains one, or the name of a published set; ``NAME=MODEL`` gives it a name.
     out
         Folder for the results; None writes nothing.
     method
@@ -111,14 +111,14 @@ def compare_campaign(
     _check_wishes(competitors, method, step_seconds)
     if method == "thesis" and not campaign.rig.has_one_motion:
         raise InputError(
-            f"The thesis's method was written for one motion, and the rig '{campaign.rig.name}' has several, several inputs or "
-            "feedback; use --method local_rational."
+            "The method 'thesis' supports only rigs of one motion with one input and no feedback, unlike the rig "
+            f"'{campaign.rig.name}'; use --method local_rational."
         )
     chosen = cast("Method", method)
     rig = campaign.rig
     structures = {c.model.structure.effect_names: c.model.structure for c in competitors}
     prepare_kernels(list(structures.values()), n_jobs, listener)
-    # One model without a spring, and all are run in windows: the same yardstick for everyone.
+    # If one model has no spring, all models are simulated in windows, so that the errors are comparable.
     drifts = any(can_drift(rig, c.model.values) for c in competitors)
     floors = tuple(
         Floor(floor.output, floor.unit, floor.std, floor.method, floor.lower_bound, floor.stretches)
@@ -128,7 +128,7 @@ def compare_campaign(
     length = window_length(rig, campaign.records) if drifts else None
     stage = Stage(COMPARING, len(campaign.records), listener)
     found = []
-    # Threads: kernels and linear algebra let others run.
+    # Threads suffice: kernels and linear algebra release the GIL.
     parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
     for record in parallel(
         delayed(compare_on_record)(competitors, record, cut([record], length), yardstick)
@@ -159,7 +159,7 @@ def _check_wishes(models: Sequence[object], method: str, step_seconds: float) ->
         raise InputError(f"The step window must last a positive number of seconds, got {step_seconds!r}.")
     if not models:
         raise InputError(
-            f"Name at least one model: a {MODEL_FILE}, a folder that holds one, or a published set."
+            f"Name at least one model: a {MODEL_FILE}, a folder that contains one, or a published set."
         )
 
 
@@ -217,8 +217,8 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
     own, rig = model.structure.rig, campaign.rig
     if own.name == rig.name and own.mechanism != rig.mechanism:
         raise InputError(
-            f"Model '{name}' is of a rig '{own.name}' with other equations than that of {campaign.called}: only models of that "
-            "rig can be compared. Leave it out, or make it anew with this rig file."
+            f"Model '{name}' is of a rig '{own.name}' with other equations than the rig of {campaign.called}: only models of the "
+            "same rig can be compared. Leave it out, or make it again with this rig file."
         )
     if own.name != rig.name:
         raise InputError(
@@ -233,7 +233,7 @@ def of_this_rig(name: str, model: Model, campaign: Campaign) -> Model:
 
 
 def _name_and_source(text: str) -> tuple[str, str]:
-    """Return how a model is called and where it is: of ``NAME=MODEL`` both, else the folder of a ``model.json``."""
+    """Return name and path of a model: both from ``NAME=MODEL``, else the name is that of the folder of ``model.json``."""
     if "=" in text and not Path(text).exists():
         name, _, source = text.partition("=")
         if not name.strip() or not source:
@@ -260,7 +260,7 @@ def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
     ]
     if all(record.kind == "step" for record in campaign.records):
         notes.append(
-            "No record is a sweep or a multisine, so no frequency responses are compared; steps and free runs are."
+            "No record is a sweep or a multisine, so no frequency responses are compared, only steps and free runs."
         )
     if all(record.kind != "step" for record in campaign.records):
         notes.append("No record is a step, so no step is compared.")
@@ -272,6 +272,7 @@ def _notes(campaign: Campaign, competitors: Sequence[Competitor]) -> list[str]:
         ]
         if other:
             notes.append(
-                f"Model '{competitor.name}' has other constants than the campaign: {', '.join(other)}. It is compared as it is."
+                f"Model '{competitor.name}' has other constants than the campaign: {', '.join(other)}. It is compared with "
+                "its own constants."
             )
     return notes

@@ -1,4 +1,4 @@
-"""What `rigsight demo` does: the virtual rig with a hidden effect makes a campaign, which is then diagnosed like any other."""
+"""The work of `rigsight demo`: a campaign is simulated on the virtual rig with a hidden effect, then diagnosed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MEASURING = "Measuring on the virtual rig"
 
 _GIVEN_SET = "identified"
 _GIVEN_EFFECTS = {"cubic_stiffness": {"k_3": 4000.0}, "actuator_lag": {"T_a": 0.04}}
-"""What the given simulation has beside the published linear numbers: rounded, as from a data sheet."""
+"""What the given simulation has beside the published linear parameter values: rounded, as from a data sheet."""
 _SWEEP_TIME = 60.0
 _SWEEP_OMEGA = (2.0 * math.pi * 0.1, 2.0 * math.pi * 10.0)
 _STEP_TIME = 20.0
@@ -105,9 +105,9 @@ def run_demo(
     with tempfile.TemporaryDirectory(prefix="rigsight-") as place:
         for name, text in files.items():
             Path(place, name).write_text(text, encoding="utf-8")
-        # The path names the fits from which an interrupted demo goes on.
+        # The finished fits of an interrupted demo are found by this path.
         campaign = replace(read_campaign(place), path=folder / "campaign.toml")
-    # A campaign beside results of another one would be worse than none.
+    # Remove results first, so that they never lie beside the campaign of another run.
     inside = {f"{CAMPAIGN_FOLDER}/{name}": text for name, text in files.items()}
 
     def keep(diagnosis: Diagnosis) -> None:
@@ -123,7 +123,7 @@ def _structures() -> list[Structure]:
 
 
 def _campaign(rng: np.random.Generator, listener: Listener) -> dict[str, str]:
-    """Return the files of the campaign; nothing in them tells the hidden effect or its numbers."""
+    """Return the files of the campaign; they contain neither the hidden effect nor its parameter values."""
     rig = VirtualRig()
     stage = Stage(MEASURING, len(_RUNS), listener)
     files = {"campaign.toml": _campaign_toml(published_sets()[_GIVEN_SET])}

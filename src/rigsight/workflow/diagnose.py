@@ -1,4 +1,4 @@
-"""What `rigsight diagnose` does: a campaign -> `diagnosis.json`, `model.json` and `report.html`, together."""
+"""The work of `rigsight diagnose`: a campaign -> `diagnosis.json`, `model.json` and `report.html`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def run_diagnose(
 ) -> Diagnosis:
     """Diagnose the gap between the simulation that a campaign gives and its records.
 
-    What an interrupted diagnosis of the same campaign has fitted is not fitted again; the listener is told so.
+    Fits of an interrupted diagnosis of the same campaign are reused; the listener gets a step that says so.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def run_diagnose(
     effects
         Candidates.
     own_effects
-        Effects beside those of the catalogue that the simulation in question may have already.
+        Effects beside those of the catalogue that the given simulation may have already.
     own_rigs
         Rigs that the campaign may name beside the built-in ones.
     seed
@@ -105,13 +105,13 @@ def diagnose_campaign(
     Parameters
     ----------
     campaign
-        A campaign that was read or made of records; only one with a file is taken up again after an interruption.
+        A campaign that was read or made from records; only one with a file is continued after an interruption.
     effects
-        Candidates; those that the rig does not offer or the simulation has already are passed over.
+        Candidates; those that do not apply to the rig, or that the simulation already has, are skipped.
     seed, n_jobs, listener
         As in `run_diagnose`.
     keep
-        Given the result before its fits are forgotten: where it fails, for want of room on a disk, they need not be done again.
+        Called with the result before the stored fits are deleted, so that they are kept if it fails (as on a full disk).
 
     Raises
     ------
@@ -121,7 +121,7 @@ def diagnose_campaign(
         If the given simulation cannot be run.
     """
     tell(campaign.notes, listener)
-    # What nobody put anywhere is passed over where it makes no sense; a place that was named must be there.
+    # An effect without a place is skipped if it does not apply; a place that was named must exist.
     named = [effect for effect in effects if effect.at is None] + [
         *effects_on(campaign.rig, [effect for effect in effects if effect.at is not None], "The candidates")
     ]
@@ -134,7 +134,7 @@ def diagnose_campaign(
         if campaign.path is None
         else FitJournal(campaign.path, lambda count: _tell_going_on(count, listener))
     )
-    # Candidates are fitted side by side; matrix products spread over the same processors would only wait for each other.
+    # Candidates are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"), journal as memory:
         diagnosis = diagnose(
             campaign,
@@ -151,8 +151,8 @@ def diagnose_campaign(
 
 
 def _tell_going_on(count: int, listener: Listener) -> None:
-    """Say that an interrupted diagnosis is taken up again; in its results, which are the same, nothing tells."""
-    stage = f"Going on: {count} fit{'' if count == 1 else 's'} done before the interruption"
+    """Report that an interrupted diagnosis is continued; its results are the same and do not mention it."""
+    stage = f"Continuing: {count} fit{'' if count == 1 else 's'} done before the interruption"
     listener(Step(stage, "", 0, count))
     listener(Step(stage, "", count, count))
 

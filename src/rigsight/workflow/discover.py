@@ -1,4 +1,4 @@
-"""What `rigsight discover` does: a campaign -> `discovery.json`, `model.json` and a picture, together."""
+"""The work of `rigsight discover`: a campaign -> `discovery.json`, `model.json` and a figure."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DISCOVERY_FILE = "discovery.json"
 FIGURE_FILE = "discovery.svg"
 DISCOVERING = "Discovering"
 _STEPS = 18
-"""About as many as a discovery takes; more raise the total."""
+"""Approximate number of steps of a discovery; the total grows if there are more."""
 
 
 def run_discover(
@@ -55,11 +55,11 @@ def run_discover(
     out
         Folder for ``discovery.json``, ``model.json`` and ``discovery.svg``; None writes nothing.
     method
-        ``"discrepancy"``: the rig's own terms stand, what they leave is regressed. ``"full"``: the whole acceleration is.
+        ``"discrepancy"``: the rig's own terms are kept and their residual is regressed; ``"full"``: the whole acceleration is.
     pointwise
         Regress sample by sample instead of in the weak form.
     one_by_one
-        Discover on each estimation record alone as well.
+        Also discover on each estimation record alone.
     seed
         Seed of the ensembles.
     n_jobs
@@ -122,7 +122,7 @@ def discover_campaign(
     data = regression_data(campaign)
     tell(campaign.notes, listener)
     stage = Stage(DISCOVERING, _STEPS, listener)
-    # Supports are fitted side by side; matrix products spread over the same processors would only wait for each other.
+    # Supports are fitted in parallel; multithreaded matrix products would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):
         found = discover(data, chosen, pointwise, seed, stage.finished, n_jobs)
         notes = (*campaign.notes, *(note for record in campaign.records for note in record.notes))
@@ -137,7 +137,7 @@ def discover_campaign(
 
 
 def regression_data(campaign: Campaign) -> RegressionData:
-    """Return what of a campaign is regressed; records of a rig that drifts are cut into windows.
+    """Return the data of a campaign for the regression; records of a rig that drifts are cut into windows.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def regression_data(campaign: Campaign) -> RegressionData:
     Raises
     ------
     InputError
-        If its rig of one motion is told in other words than the built-in ones, or records have constants of their own.
+        If its rig of one motion has other symbols than the built-in rigs, or records have constants of their own.
     """
     _check_can_be_discovered(campaign)
     drifts = not has_stiffness(campaign)
@@ -177,19 +177,19 @@ def write_discovery(found: Discovery, out: Path) -> tuple[Path, ...]:
 
 
 def _check_can_be_discovered(campaign: Campaign) -> None:
-    """Refuse what a discovery would ignore: other words for one motion than the built-in rigs', constants of single records."""
+    """Refuse what a discovery does not support: rigs of one motion with other symbols than the built-in ones, own constants."""
     rig = campaign.rig
     if rig.has_one_motion and not is_built_in_motion(rig):
         listed = ", ".join(name for name, built_in in RIGS.items() if built_in.has_one_motion)
         raise InputError(
-            f"'rigsight discover' cannot take the rig '{rig.name}' of your own yet: of rigs of one motion it takes {listed}. "
-            "If the equation is the same, write it in their words."
+            f"'rigsight discover' does not support your rig '{rig.name}': for rigs of one motion it supports only {listed}. "
+            "If yours has the same equation, use one of these."
         )
     for record in campaign.records:
         if record.constants:
             listed = ", ".join(record.constants)
             raise InputError(
-                "'rigsight discover' cannot take constants that differ from record to record yet, and record "
+                "'rigsight discover' does not support constants that differ between records, and record "
                 f"'{record.name}' gives {listed}. Give them under [rig.constants], or leave the record out."
             )
 
@@ -203,7 +203,7 @@ def _one_by_one(
     n_jobs: int,
     finished: Callable[[str], None],
 ) -> tuple[tuple[str, Discovery | str], ...]:
-    """Discover on each estimation record alone; where that fails, the reason stands in its place."""
+    """Discover on each estimation record alone; if that fails, the result is the reason."""
 
     def alone(record: Record) -> tuple[str, Discovery | str]:
         own = [r for r in data.records if r.role == "validation" or r.name.startswith(record.name)]
@@ -213,7 +213,7 @@ def _one_by_one(
             return record.name, str(error)
 
     found = []
-    # Threads: the kernels let others run.
+    # Threads suffice: the kernels release the GIL.
     parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
     for name, result in parallel(delayed(alone)(record) for record in campaign.estimation):
         found.append((name, result))

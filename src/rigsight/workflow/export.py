@@ -1,4 +1,4 @@
-"""What `rigsight export` does: a model -> one file for another tool."""
+"""The work of `rigsight export`: a model -> one file for another tool."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from rigsight.workflow.run.results import check_target, write_together
 
 @dataclass(frozen=True)
 class WrittenFile:
-    """A file as it was written.
+    """A written file.
 
     Attributes
     ----------
     path
         The file.
     written
-        In words, fields of a robot's model that changed.
+        Descriptions of the changed fields of a robot model.
     without_field
-        In words, what it has no field for.
+        Descriptions of what the file has no field for.
     """
 
     path: Path
@@ -36,7 +36,7 @@ class WrittenFile:
 
 
 ROBOT_TARGETS = {"mjcf": ".xml", "isaac": ".yaml"}
-"""Models of robots that numbers and effects are written back to, and how their files end."""
+"""Formats of robot models into which parameter values and effects are written back, with their file suffixes."""
 
 
 def run_export(
@@ -56,7 +56,7 @@ def run_export(
     Parameters
     ----------
     model
-        A ``model.json`` or the folder that holds one.
+        A ``model.json`` or the folder that contains one.
     target
         A key of `rigsight.export.TARGETS` or `ROBOT_TARGETS`.
     out
@@ -78,16 +78,16 @@ def run_export(
     Raises
     ------
     InputError
-        If the model cannot be read, the target cannot say it, or the file cannot be written.
+        If the model cannot be read or expressed in the target, or the file cannot be written.
     """
     check_option("Target", target, (*TARGETS, *ROBOT_TARGETS))
     read = read_model(model, own_effects, own_rigs)
     if target in ROBOT_TARGETS:
         if hold is not None or source_only or (step is not None and target != "isaac"):
-            raise InputError(f"--hold, --step and --source-only say nothing of {target}. Leave them out.")
+            raise InputError(f"--hold, --step and --source-only do not apply to {target}. Leave them out.")
         return _robot(read, target, robot, out, step)
     if robot is not None:
-        raise InputError(f"--mjcf is of {' and '.join(ROBOT_TARGETS)}; leave it out for {target}.")
+        raise InputError(f"--mjcf applies only to {' and '.join(ROBOT_TARGETS)}; leave it out for {target}.")
     chosen = TARGETS[target]
     file = _target_file(read, out, chosen.name, chosen.suffix)
     content = export_model(
@@ -110,13 +110,13 @@ def _robot(
 
     if robot is None:
         raise InputError(
-            f"{target} is written from the robot's model: name the MJCF or URDF file from which rigsight init made the rig with "
-            "--mjcf."
+            f"{target} is written from the model of the robot: name the MJCF or URDF file from which rigsight init made the rig "
+            "with --mjcf."
         )
     file = _target_file(model, out, target, ROBOT_TARGETS[target])
     if file.resolve() == robot.resolve():
         raise InputError(
-            f"{file} is the robot's model itself and is not overwritten; name another file with --out."
+            f"{file} is the model of the robot itself and is not overwritten; name another file with --out."
         )
     written = write_back(model, robot) if target == "mjcf" else isaac_settings(model, robot, step)
     write_together(file.parent, {file.name: written.text})
@@ -127,11 +127,11 @@ def _target_file(model: Model, out: str | Path | None, target: str, suffix: str)
     file = Path(f"{model.structure.rig.name}{suffix}" if out is None else out)
     check_target(file)
     if file.suffix != suffix:
-        raise InputError(f"{file} cannot hold {target}: name a file that ends in {suffix}.")
+        raise InputError(f"{file} has the wrong suffix for {target}: name a file that ends in {suffix}.")
     return file
 
 
 def _source(model: Path) -> str:
-    """Return how the files call the model: without the folders of whoever wrote it."""
+    """Return the name of the model for exported files, without the parent folders."""
     folder = model.absolute() if model.is_dir() else model.absolute().parent
     return f"{folder.name}/{'model.json' if model.is_dir() else model.name}"

@@ -1,4 +1,4 @@
-"""What `rigsight identify` does: a campaign -> `identification.json`, `model.json` and Bode plots, together."""
+"""The work of `rigsight identify`: a campaign -> `identification.json`, `model.json` and Bode plots."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def identify_campaign(
     prepare_kernels([compose(campaign.rig)], n_jobs, listener)
     stage = Stage(IDENTIFYING, len(campaign.estimation) + _STEPS_AFTER_RECORDS, listener)
     found = []
-    # Threads: the work is linear algebra, which lets others run; spread over the same processors it would only wait for itself.
+    # Threads suffice: linear algebra releases the GIL. Multithreaded linear algebra would only compete for the same processors.
     with threadpool_limits(limits=1, user_api="blas"):
         parallel = Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
         for record in parallel(
@@ -213,7 +213,7 @@ def _units(campaign: Campaign) -> dict[str, str]:
 
 
 def _over_time(found: RecordIdentification, joint: JointIdentification) -> RecordIdentification:
-    """Give an element's record the parameters of the fit of this record alone, over time."""
+    """Give a record of an element the parameters of the time-domain fit of this record alone."""
     own: Sequence[PhysicalEstimates] = [
         PhysicalEstimates(
             kind.fit.free,

@@ -1,4 +1,4 @@
-"""What `rigsight init` does: a folder of measured files -> a commented `campaign.toml`; a robot's model -> its rig file too."""
+"""The work of `rigsight init`: measured files -> a commented `campaign.toml`; the model of a robot -> also its rig file."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ CAMPAIGN_FILE = "campaign.toml"
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A campaign as it was written.
+    """A written campaign.
 
     Attributes
     ----------
     path
         The file.
     model
-        The rig that the channels fit best.
+        The rig that matches the channels best.
     records
         Files taken as records.
     left_out
@@ -53,18 +53,18 @@ class Draft:
 
 @dataclass(frozen=True, eq=False)
 class ModelDraft:
-    """A rig file as it was written.
+    """A written rig file.
 
     Attributes
     ----------
     path
         The rig file.
     draft
-        What it says, and what it leaves out.
+        Its contents, and what it leaves out.
     run
-        How it moves beside MuJoCo.
+        Its free run compared with MuJoCo.
     campaign
-        The campaign beside it; None where the folder holds no records yet.
+        The campaign in the same folder; None if the folder contains no records yet.
     """
 
     path: Path
@@ -87,11 +87,11 @@ def run_init(
     folder
         Folder with the files; those in folders below it are not looked at.
     model
-        The rig; None for the one that the channels fit best.
+        The rig; None for the one that matches the channels best.
     rig_files
         Rigs of the user's own, beside the built-in ones.
     values
-        Parameters of the simulation in question, where they are known; constants then keep what the rig file says.
+        Known parameter values of the given simulation; constants then keep the values of the rig file.
 
     Raises
     ------
@@ -100,24 +100,24 @@ def run_init(
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(f"{folder} is no folder; name the folder that holds the measured files.")
+        raise InputError(f"{folder} is not a folder; name the folder of the measured files.")
     path = folder / CAMPAIGN_FILE
     if path.exists() or path.is_symlink():
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
     own = own_rigs(rig_files)
-    # A user's own come first: they win where a built-in one fits as well.
+    # A user's own rigs come first: they are preferred to built-in ones that match equally well.
     known = {rig.name: rig for rig in (*own.values(), *RIGS.values())}
     rigs = tuple(known.values()) if model is None else (known[check_option("--model", model, known)],)
     files = measured_files(folder)
     if len(files) > MOST_RECORDS:
         raise InputError(
-            f"{folder} holds {len(files)} measured files; a campaign has at most {MOST_RECORDS}."
+            f"{folder} contains {len(files)} measured files; a campaign can have at most {MOST_RECORDS}."
         )
     proposals, left_out = proposed_records(files, rigs)
     if not proposals:
         reasons = "".join(f"\n{name}: {reason}" for name, reason in left_out[:5])
         raise InputError(
-            f"{folder} holds no measured file that can be used ({', '.join(MEASURED_SUFFIXES)}).{reasons}"
+            f"{folder} contains no usable measured file ({', '.join(MEASURED_SUFFIXES)}).{reasons}"
         )
     rig = proposals[0].guess.rig
     others = () if model is not None else tuple(name for name in known if name != rig.name)
@@ -125,7 +125,7 @@ def run_init(
     beside = {} if source is None else _copied(folder, source)
     inside = source and (folder / source.name if beside else source)
     text, n_blanks = campaign_text(folder, rig, inside, others, values, proposals, left_out)
-    write_together(folder, {**beside, CAMPAIGN_FILE: text}, "Make room or ask for the right to write there.")
+    write_together(folder, {**beside, CAMPAIGN_FILE: text}, "Free disk space there, or get write permission.")
     return Draft(
         path, rig.name, tuple(proposal.file for proposal in proposals), tuple(left_out), n_blanks, others
     )
@@ -150,9 +150,9 @@ def run_init_from_mjcf(
     gears
         Name of a joint -> stiffness of its gear [N m/rad or N/m].
     as_it_is
-        Leave the bodies to MuJoCo: contacts, ranges, equalities and tendons too.
+        Simulate the bodies in MuJoCo, with contacts, joint ranges, equality constraints and tendons.
     listener
-        Told what is being done: equations of many joints take their time.
+        Called at every step of the work: the equations of many joints take a while.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def run_init_from_mjcf(
     stage.finished("derived")
     path = folder / f"{rig.name}.toml"
     text = rig_text(draft, source.name, folder)
-    # Once records are there, the same command goes on with the campaign.
+    # When records have been added, the same command writes the campaign.
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
         raise InputError(f"{path} exists already and is not overwritten; remove it, or edit it by hand.")
     campaign_file = folder / CAMPAIGN_FILE
@@ -177,7 +177,7 @@ def run_init_from_mjcf(
         )
     run = free_run(with_gears(robot.spec, draft), draft)
     stage.finished("compared with MuJoCo")
-    write_together(folder, {path.name: text}, "Make room or ask for the right to write there.")
+    write_together(folder, {path.name: text}, "Free disk space there, or get write permission.")
     campaign = None
     if measured_files(folder):
         campaign = run_init(folder, model=rig.name, rig_files=[path], values=draft.values)
@@ -185,12 +185,12 @@ def run_init_from_mjcf(
 
 
 def _copied(folder: Path, file: Path) -> dict[str, str]:
-    """Return what to write beside a campaign so that it holds its rig file; nothing where that is inside already."""
+    """Return the copy of the rig file for the folder of the campaign; empty if the rig file is already there."""
     if file.resolve().is_relative_to(folder.resolve()):
         return {}
     text, copy = file.read_text(encoding="utf-8"), folder / file.name
     if copy.exists() and copy.read_text(encoding="utf-8", errors="replace") != text:
         raise InputError(
-            f"{copy} differs from {file}, which would be copied there. Name the file in the folder with --rigs, or remove it."
+            f"{copy} differs from {file}, which would be copied there. Give {copy.name} of that folder with --rigs, or remove it."
         )
     return {file.name: text}

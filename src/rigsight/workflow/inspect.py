@@ -1,4 +1,4 @@
-"""What `rigsight inspect` does: a measured file -> its channels at a glance, and an entry for a campaign."""
+"""The work of `rigsight inspect`: a measured file -> an overview of its channels, and an entry for a campaign."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NAMED = 2.0
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a file holds.
+    """The contents of a file.
 
     Attributes
     ----------
@@ -31,11 +31,11 @@ class Inspection:
     channels
         In the order of the file.
     times
-        Channel that looks like time -> median step in its unit and number of gaps, None where it does not rise.
+        Channel that looks like time -> median step in its unit and number of gaps; None if it does not increase.
     refused
-        What else is in the file, and why it is no signal over time.
+        What else is in the file, and why it cannot be a signal.
     model
-        The rig that the channels fit best.
+        The rig that matches the channels best.
     proposal
         ``[[records]]`` entry, with what must be checked as comments.
     n_blanks
@@ -52,7 +52,7 @@ class Inspection:
     n_blanks: int
 
     def to_json(self) -> dict[str, Any]:
-        """Return the same for machines."""
+        """Return the contents for JSON."""
         return {
             "schema_version": SCHEMA_VERSION,
             "file": self.file,
@@ -65,7 +65,7 @@ class Inspection:
 
 
 def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
-    """Look into a measured file of any format that is read.
+    """Return the channels of a measured file of any supported format.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def run_inspect(path: str | Path, own_rigs: Iterable[Rig] = ()) -> Inspection:
         }
         if not channels:
             reasons = "; ".join(f"'{one.name}' {one.reason}" for one in file.refused[:5]) or "it is empty"
-            raise InputError(f"{path.name} ({file.format}) holds no signal over time: {reasons}.")
+            raise InputError(f"{path.name} ({file.format}) contains no signal over time: {reasons}.")
         proposal = propose(path, file, (*own_rigs, *RIGS.values()))
     return Inspection(
         path.name,

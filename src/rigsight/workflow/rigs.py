@@ -1,4 +1,4 @@
-"""What `rigsight rigs --picture` does: a rig -> its picture in a file."""
+"""The work of `rigsight rigs --picture`: a rig -> its picture in a file."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def write_rig_picture(rig: Rig, file: Path) -> Path:
     Raises
     ------
     InputError
-        If the file's ending is another, or it cannot be written.
+        If the file has another suffix, or cannot be written.
     """
-    ending = check_option("The ending of a picture", file.suffix.lower(), (".png", ".svg"))
+    ending = check_option("The suffix of a picture", file.suffix.lower(), (".png", ".svg"))
     check_target(file)
     figure = rig_picture(rig)
     content: str | bytes

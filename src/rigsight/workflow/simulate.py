@@ -1,4 +1,4 @@
-"""What `rigsight simulate` does: a model and the input of a record -> the outputs that the model predicts."""
+"""The work of `rigsight simulate`: a model and the input of a record -> the outputs that the model predicts."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def run_simulate(
     Parameters
     ----------
     model
-        A ``model.json`` or the folder that holds one.
+        A ``model.json`` or the folder that contains one.
     record
         Measured file with time and inputs; the outputs are read only where initial states are estimated.
     out
         CSV file for time, inputs and simulated outputs; None writes nothing.
     columns
-        Where time ``t`` and the inputs stand; by default in columns of their own names.
+        Columns of time ``t`` and the inputs; by default the columns with their names.
     initial_state
         States by name (an output's name stands for its state) that do not start at the static equilibrium at the first
         input sample; "estimated" fits all of them to the outputs measured in the record, and nothing else.
@@ -76,8 +76,8 @@ def run_simulate(
     for name in columns:
         if name not in known:
             raise InputError(
-                f"Column mapping '{name}': a simulation of {rig.name} does not read it.{nearest(name, known)} "
-                f"It reads: {', '.join(known)}."
+                f"Column mapping '{name}': a simulation of {rig.name} does not use it.{nearest(name, known)} "
+                f"It uses: {', '.join(known)}."
             )
     own = checked_numbers(Where(MODEL_FILE), ("constants",), rig, rig.constants, constants or {})
     if out is not None:
@@ -154,7 +154,7 @@ def simulate_model(
 def _initial_state(model: Model, record: Record, given: Mapping[str, float]) -> NDArray[np.float64]:
     structure = model.structure
     names = list(structure.state_names)
-    # Where a sensor shows a state as it is, its name is the one that a user has seen.
+    # If an output equals a state, users know the state by the name of the output.
     sensors = structure.rig.mechanism.sensors
     aliases = {s.name: s.reads.name for s in sensors if s.reads in structure.states}
     vector = parameter_vector(structure, record_values(structure, model.values, record))

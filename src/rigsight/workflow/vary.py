@@ -1,4 +1,4 @@
-"""What `rigsight vary` does: a model and a parameter -> how its frequency response changes with the parameter's value."""
+"""The work of `rigsight vary`: a model and a parameter -> how its frequency response changes with the parameter's value."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Variant:
         ``static_gain``, ``peak_omega``, ``peak_magnitude``, ``break_frequency``, ``fitted_break_frequency``; None where the
         band does not show one.
     note
-        What to know about it; empty where all is well.
+        A remark; empty if there is none.
     """
 
     value: float
@@ -76,12 +76,12 @@ def run_vary(
     response: str | None = None,
     listener: Listener = silent,
 ) -> tuple[Variation, ...]:
-    """Sweep a model with several values of each parameter, all others as they are.
+    """Simulate a sweep with several values of each parameter, all others unchanged.
 
     Parameters
     ----------
     model
-        A ``model.json``, the folder that holds one, or the name of a published set.
+        A ``model.json``, the folder that contains one, or the name of a published set.
     parameters
         Names of parameters of the model.
     out
@@ -96,7 +96,7 @@ def run_vary(
         Angular frequencies [rad/s]; default is about the natural frequency at this amplitude, on a rig of several motions about
         all of its natural frequencies.
     source, response
-        Names of the input that is swept, the others at rest, and of the sensor that answers; default is the first of each.
+        Names of the swept input (the others are at rest) and of the output; default is the first of each.
     listener
         Told of every finished sweep.
 
@@ -124,7 +124,9 @@ def run_vary(
     if not chosen:
         raise InputError(f"Name a parameter to vary. The model has: {', '.join(read.structure.names)}.")
     if len(chosen) > 1 and (low is not None or high is not None):
-        raise InputError("--from and --to belong to one parameter: name one, or leave them out.")
+        raise InputError(
+            "--from and --to can be used with one parameter only: name one parameter, or leave them out."
+        )
     tries = [_values(p, read.values[p.name], low, high, steps) for p in chosen]
     excitation, ratio = variation_sweep(read, pair, amplitude, band)
     prepare_kernels([read.structure], 1, listener)
@@ -166,7 +168,7 @@ def table_text(variation: Variation) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return four digits as people write them."""
+    """Return a value with four digits, without an exponent where possible."""
     if 1e-3 <= abs(value) < 1e6:
         return np.format_float_positional(value, precision=4, fractional=False, trim="-")
     return f"{value:.4g}"
@@ -188,7 +190,7 @@ def _values(
     """Return the values to sweep, increasing: evenly spaced, or by equal factors where nothing was given."""
     name = parameter.name
     if base == 0.0 and (low is None or high is None):
-        raise InputError(f"'{name}' is 0 in this model, so half and twice are 0 too: give --from and --to.")
+        raise InputError(f"'{name}' is 0 in this model, so there is no default range: give --from and --to.")
     first, last = (0.5 * base if low is None else low), (2.0 * base if high is None else high)
     for option, value in (("--from", low), ("--to", high)):
         if value is not None:
@@ -202,7 +204,7 @@ def _values(
         values = np.geomspace(abs(first), abs(last), steps) * math.copysign(1.0, first)
     else:
         values = np.linspace(first, last, steps)
-    # The ends exactly: rounding must not push a value over its bound.
+    # Exact ends, because rounding must not move a value over its bound.
     values[0], values[-1] = first, last
     return [float(value) for value in values]
 
@@ -215,7 +217,7 @@ def _variant(
     except SimulationError as error:
         return Variant(value, None, {}, str(error))
     output = simulated[ratio.response]
-    # Where a rig rests is no answer to the sweep.
+    # The static equilibrium is not part of the response to the sweep.
     response = ratio(simulated.with_signals(**{ratio.response: output - output[0]}))
     top = peak(response)
     notes = [] if top.is_resonance else ["The magnitude has no peak inside the band."]

@@ -125,7 +125,7 @@ def test_a_killed_process_of_this_machine_is_told_as_what_it_is() -> None:
         os.kill(os.getpid(), signal.SIGKILL)
         return trial
 
-    with pytest.raises(RigsightError, match="takes the bench up again"):
+    with pytest.raises(RigsightError, match="continues the bench"):
         list(finished(run, range(2), n_jobs=2))
 
 
@@ -193,7 +193,7 @@ def test_a_bench_waits_for_workers_and_what_is_left_early_begins_no_more(
         assert len(begun(files)) == left
     assert "No worker" in said[0]
     assert address in said[0]
-    assert "Going on" in said[1]
+    assert "Continuing" in said[1]
     assert trials.most < 100
 
 
@@ -237,7 +237,7 @@ def test_a_worker_with_another_rigsight_is_named(address: str, tmp_path: Path, f
     (other / "rigsight" / "units.py").open("a").write("# another state\n")
     with (
         worker(address, tmp_path, PYTHONPATH=str(other)),
-        pytest.raises(InputError, match="install the same on both"),
+        pytest.raises(InputError, match="install the same version on both"),
     ):
         list(finished(trial_in(files), range(3), 1, address))
     assert not begun(files)
@@ -261,7 +261,7 @@ def test_a_scheduler_that_dies_is_told_in_one_message(
         next(results)
         process.kill()
         time.sleep(away)
-        with pytest.raises(RigsightError, match="takes the bench up again"):
+        with pytest.raises(RigsightError, match="continues the bench"):
             list(results)
     assert not [record for record in caplog.records if record.name.startswith("distributed")]
 

@@ -181,7 +181,7 @@ def test_a_campaign_is_done_once_and_again_when_it_has_changed(
         ({"where": ["dynamic"]}, ["where", "Did you mean 'dynamics'"]),
         ({"gap": -1.0}, ["gap", "-1.0"]),
         ({"withheld": [{"file": "gone.csv"}]}, ["record 1", "gone.csv", "does not exist"]),
-        ({"withheld": [{"file": "../campaigns/x.csv"}]}, ["record 1", "leaves"]),
+        ({"withheld": [{"file": "../campaigns/x.csv"}]}, ["record 1", "lies outside"]),
         ({"withheld": [{"file": "withheld.csv", "kind": "wobble"}]}, ["record 1 (withheld.csv)", "kind", "'wobble'"]),
         ({"withheld": [{"name": "a"}]}, ["record 1", "file", "is missing"]),
     ],
@@ -200,10 +200,10 @@ def test_a_key_that_cannot_be_used_is_told_before_any_work(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('{"kind": "single",\n "effects": [backlash]}', [", line 2, column 14", "The least"]),
-        ('["backlash"]', ["must hold one object", '"kind": "single"']),
+        ('{"kind": "single",\n "effects": [backlash]}', [", line 2, column 14", "The smallest key"]),
+        ('["backlash"]', ["must contain one object", '"kind": "single"']),
         ('{"effects": []}', ["kind", "is missing"]),
-        ('{"kind": "none", "kind": "single", "effects": []}', ["'kind' stands twice"]),
+        ('{"kind": "none", "kind": "single", "effects": []}', ["'kind' occurs twice"]),
     ],
 )
 def test_a_key_that_is_no_key_is_told(lab: ExternalBench, text: str, words: list[str]) -> None:
@@ -241,7 +241,7 @@ def test_on_a_rig_with_several_places_a_key_says_that_of_each_effect(lab: Extern
         ({"where": ["shaft", "motor_bearing"]}, ["where", "several places"]),
         (
             {"effects": ["backlash"], "where": ["motor_bearing"]},
-            ["backlash@motor_bearing", "makes no sense"],
+            ["backlash@motor_bearing", "does not apply"],
         ),
         ({"kind": "pair", "effects": ["backlash"] * 2, "where": ["shaft"] * 2}, ["exactly two"]),
     ],
@@ -257,14 +257,14 @@ def test_a_place_at_which_an_effect_cannot_be_is_told(
 
 
 def test_folders_that_cannot_be_a_bench_are_told(lab: ExternalBench) -> None:
-    with pytest.raises(InputError, match=r"no folder.*--campaigns"):
+    with pytest.raises(InputError, match=r"not a folder.*--campaigns"):
         replace(lab, campaigns=lab.path / "gone").names()
-    with pytest.raises(InputError, match=r"No folder in .* holds a campaign\.toml"):
+    with pytest.raises(InputError, match=r"No folder in .* contains a campaign\.toml"):
         replace(lab, campaigns=lab.sealed).names()
     with pytest.raises(InputError, match="no campaign 'spring'"):
         run(lab, only=["spring"])
     lab.key(NAME).unlink()
-    with pytest.raises(InputError, match=f"lacks the key of 1 of 1 campaigns: {NAME}.json"):
+    with pytest.raises(InputError, match=rf"Keys of 1 of 1 campaigns are missing in .*: {NAME}\.json"):
         lab.names()
 
 
@@ -278,7 +278,7 @@ def test_keys_inside_a_campaign_are_refused(lab: ExternalBench) -> None:
 def test_a_drawn_bench_and_one_of_a_lab_do_not_share_a_folder(lab: ExternalBench) -> None:
     lab.settle_here()
     lab.settle_here()
-    with pytest.raises(InputError, match="campaigns of somebody else"):
+    with pytest.raises(InputError, match="existing campaigns"):
         run_blind(lab.path, start=START, design="small", trials=1)
     other = replace(lab, path=lab.path.parent / "drawn")
     (other.path / "keys").mkdir(parents=True)

@@ -82,7 +82,7 @@ def test_a_bench_without_rows_says_how_it_gets_them(tmp_path: Path, outcome_like
     with pytest.raises(InputError, match=r"trials\.sqlite.*--rescore --out"):
         merge([tmp_path], tmp_path / "all")
     part = bench(tmp_path / "a", outcome_like())
-    with pytest.raises(InputError, match="would replace"):
+    with pytest.raises(InputError, match="would overwrite"):
         merge([part], tmp_path / "b" / ".." / "a")
 
 

@@ -72,7 +72,7 @@ def test_without_validation_records_that_is_noted() -> None:
     assert "validation" in made.notes[0]
     other = record("other", role="validation")
     (same,) = make_campaign("axis", [record(), other]).notes
-    assert "very samples" in same
+    assert "exactly the samples" in same
     assert make_campaign("axis", [record(), other.with_signals(x=2.0 * other["x"])]).notes == ()
 
 
@@ -91,7 +91,7 @@ def test_without_validation_records_that_is_noted() -> None:
         ),
         ({"records": []}, r'none has role = "estimation"'),
         ({"records": [record(role="validation")]}, r'none has role = "estimation"'),
-        ({"records": [record(), record()]}, r"several are called 'sweep'"),
+        ({"records": [record(), record()]}, r"several have the name 'sweep'"),
         ({"records": [record(signals={"v": np.ones(9)})]}, r"has no signal 'u'.*It has: v"),
         (
             {"records": [record(signals={"u": np.ones(9), "x": np.arange(9.0)}, kind="sweep")]},

@@ -34,7 +34,7 @@ def test_a_damper_beside_the_damper_passes_all_checks_but_one():
 def test_a_damper_is_not_conservative():
     failed = effect_checks.gives_no_energy(replace(SECOND_DAMPER, energy=Energy.CONSERVATIVE))
     assert failed is not None
-    assert "declared conservative, but takes" in failed
+    assert "declared conservative, but dissipates" in failed
 
 
 def test_a_damper_turned_round_gives_energy():
@@ -42,7 +42,7 @@ def test_a_damper_turned_round_gives_energy():
         replace(SECOND_DAMPER, parameters=(replace(DAMPING, lower=-1.0, starts=(-0.1,), search=(-1.0, 1.0)),))
     )
     assert failed is not None
-    assert "but gives" in failed
+    assert "but generates" in failed
 
 
 def test_the_effect_has_to_fade_towards_its_null_value():
@@ -51,7 +51,7 @@ def test_the_effect_has_to_fade_towards_its_null_value():
         replace(SECOND_DAMPER, parameters=(replace(DAMPING, null=30.0, starts=(4.0,)),))
     )
     assert failed is not None
-    assert "not close to the rig's" in failed
+    assert "not close to that of the rig without the effect" in failed
 
 
 def test_a_search_range_in_which_the_motion_escapes_is_told():

@@ -120,11 +120,11 @@ def test_the_given_simulation_may_have_the_effect_already(campaign: Path, quinti
         (lambda _: "from rigsight.effects.catalogue import CUBIC_STIFFNESS\n", "declares no effect"),
         (
             lambda text: text.replace("quintic_stiffness", "cubic_stiffness"),
-            r"^mine\.py, line 9: the effect name 'cubic_stiffness' is taken by the catalogue",
+            r"^mine\.py, line 9: the effect name 'cubic_stiffness' is used by the catalogue",
         ),
         (
             lambda text: text + "import dataclasses\nTWIN = dataclasses.replace(QUINTIC_STIFFNESS)\n",
-            r"^mine\.py, line 21: the effect name 'quintic_stiffness' is taken by mine\.py, line 9",
+            r"^mine\.py, line 21: the effect name 'quintic_stiffness' is used by mine\.py, line 9",
         ),
         (
             lambda text: text.replace("starts=(0.3,)", "starts=()"),
@@ -134,7 +134,7 @@ def test_the_given_simulation_may_have_the_effect_already(campaign: Path, quinti
             lambda text: text.replace("    energy=", '    starts=(Start({}, parent="nobody"),),\n    energy=').replace(
                 "Signature\n", "Signature, Start\n"
             ),
-            "starts from 'nobody', which is no known effect",
+            "starts from 'nobody', which is not a known effect",
         ),
     ],
 )  # fmt: skip
@@ -144,7 +144,7 @@ def test_a_file_that_cannot_be_used_is_told_with_its_line(tmp_path: Path, change
 
 
 def test_files_that_are_none_are_told(tmp_path: Path):
-    with pytest.raises(InputError, match="does not exist; --effects names a Python file"):
+    with pytest.raises(InputError, match="does not exist; --effects expects a Python file"):
         own_effects([tmp_path / "nowhere.py"])
     with pytest.raises(InputError, match="is a folder"):
         own_effects([tmp_path])
@@ -181,7 +181,7 @@ def test_an_installed_package_offers_its_effects(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("value", "told"),
     [
-        ("offered:NUMBER", r"offers-effects \(entry point mine\): gives a int, not an Effect"),
+        ("offered:NUMBER", r"offers-effects \(entry point mine\): is a int, not an Effect"),
         ("nowhere:EFFECT", r"offers-effects \(entry point mine\): cannot be loaded: ModuleNotFoundError"),
     ],
 )

@@ -69,12 +69,12 @@ def test_it_is_said_once_that_a_diagnosis_goes_on(axis_campaign: Path, journals:
     count = len({json.loads(line)["key"] for line in journal.read_text().splitlines()})
     again: list[Step] = []
     diagnosed(axis_campaign, said=again)
-    told = [step for step in again if step.stage.startswith("Going on")]
+    told = [step for step in again if step.stage.startswith("Continuing")]
     assert [(step.done, step.total) for step in told] == [(0, count), (count, count)]
-    assert told[0].stage == f"Going on: {count} fits done before the interruption"
+    assert told[0].stage == f"Continuing: {count} fits done before the interruption"
     fresh: list[Step] = []
     diagnosed(axis_campaign, said=fresh)
-    assert not [step for step in fresh if step.stage.startswith("Going on")]
+    assert not [step for step in fresh if step.stage.startswith("Continuing")]
 
 
 def test_fits_of_a_campaign_that_was_changed_since_are_not_told_of(
@@ -87,7 +87,7 @@ def test_fits_of_a_campaign_that_was_changed_since_are_not_told_of(
         record.write_text("\n".join([head, *rows[: len(rows) - 50]]) + "\n")
     said: list[Step] = []
     diagnosed(axis_campaign, said=said)
-    assert not [step for step in said if step.stage.startswith("Going on")]
+    assert not [step for step in said if step.stage.startswith("Continuing")]
 
 
 def test_a_torn_or_foreign_line_is_not_read(axis_campaign: Path, journals: Path, counted: list[int]) -> None:

@@ -24,7 +24,7 @@ from rigsight.simulate import compose
 
 _EVALUATIONS = 25
 _LEAST_OF_WISHED = 0.5
-"""Share of the wished gap that an effect must leave; one that cannot is drawn again."""
+"""Share of the requested gap that an effect must cause; otherwise it is drawn again."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class HandwrittenBench:
         strength = strength_for(gap, math.sqrt(wished**2 - 1.0))
         most = reached.get(strength, 0.0)
         if most < _LEAST_OF_WISHED * wished:
-            raise SimulationError(f"{self.cell.effect} leaves {most:.2g} noise floors at most.")
+            raise SimulationError(f"{self.cell.effect} causes a gap of at most {most:.2g} noise floors.")
         return shape.at(strength), strength
 
     def refit(self, records: Sequence[Record]) -> FitResult:
@@ -183,7 +183,7 @@ class HandwrittenBench:
         Raises
         ------
         SimulationError
-            If they come nowhere near.
+            If the fit fails.
         """
         return self._fitted(records, self.values, self.free)
 
@@ -203,7 +203,9 @@ class HandwrittenBench:
         fit = GreyBoxFit(compose(self.rig), records, self.scales, self.noise)
         found = fit.fit(start, list(free), max_evaluations=_EVALUATIONS)
         if not found.residuals:
-            raise SimulationError(f"No equations of {self.rig.name} come near this motion: {found.message}")
+            raise SimulationError(
+                f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"
+            )
         return found
 
     def largest_left(self, found: FitResult) -> float:

@@ -95,7 +95,7 @@ class Recording:
 
     @property
     def inputs(self) -> list[Input]:
-        """What the plant gets between the samples: what the hold says, exactly."""
+        """The input of the plant between the samples, exactly according to the hold."""
         if self.hold == "band_limited":
             return [Generated(waveform) for waveform in self.waveforms.values()]
         return [Held(u.tolist(), self.dt, lines=self.hold == "foh") for u in self.sampled.values()]
@@ -140,7 +140,7 @@ def draw_plan(
     rng
         Source of randomness.
     prescribed
-        True for an element: no machine prescribes a motion that jumps or has corners.
+        True for an element: a prescribed motion cannot jump or have corners.
     """
     dt = 1.0 / float(rng.choice(_RATES))
     hold: Hold = "band_limited" if prescribed else _HOLDS[int(rng.integers(len(_HOLDS)))]
@@ -195,7 +195,7 @@ def _waveform(
     """Return what one of several inputs does for `duration` [s]."""
     low, high = (end * math.exp(rng.uniform(-0.2, 0.2)) for end in band)
     if kind == "sweep":
-        # Two sweeps at once go opposite ways, so that neither is the other's for long.
+        # Two simultaneous sweeps run in opposite directions, so that they have the same frequency only briefly.
         return Sweep(amplitude, *((low, high) if number % 2 == 0 else (high, low)), duration)
     if kind == "multisine":
         fundamental = 2.0 * math.pi / duration

@@ -112,7 +112,7 @@ def respond(
     Raises
     ------
     SimulationError
-        If the motion has no end, or events pile up.
+        If the motion diverges, or events accumulate.
     """
     own = own or {}
     if rig == PRESCRIBED:

@@ -50,9 +50,9 @@ class Shape:
     fixed
         Numbers that give the form.
     growing
-        Numbers that are zero without the effect, at strength 1.
+        Parameters that are zero without the effect, at strength 1.
     thresholds
-        Numbers that are endless without the effect, at strength 1.
+        Parameters that are infinite without the effect, at strength 1.
     elastic
         Shares that are 1 without the effect, at strength 1.
     """

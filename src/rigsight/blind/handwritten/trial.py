@@ -25,9 +25,9 @@ from rigsight.simulate import compose
 from rigsight.simulate.linearization import linearize
 
 GAPS = (5.0, 100.0)
-"""Gap that the re-identified equations leave, in units of the noise floor: what an eye sees in a plot, up to a wrong model."""
+"""Gap of the re-identified equations in noise floors: from just visible in a plot to a wrong model."""
 _MOST_OF_MOTION = 0.5
-"""Gap in units of the reading's size that is not exceeded: whoever asks knows the rig better than that."""
+"""Largest gap, relative to the reading: a user's simulation is better than that."""
 _NOISE = (2e-4, 5e-3)
 """Noise of a sensor in units of its reading's size: from an interferometer's (74 dB) to a cheap potentiometer's (46 dB)."""
 _APART = 0.5
@@ -35,7 +35,7 @@ _APART = 0.5
 _NOISY = 1e-3
 """Noise from which a trial is called noisy: the middle of what is drawn."""
 _OFF, _WRONG = (0.02, 0.1), (0.05, 0.2)
-"""How far the given numbers are off where an effect is hidden, as data sheets are, and where they are what is wrong."""
+"""Errors of the given parameters: as of data sheets if an effect is hidden, larger if wrong parameters are the cause."""
 _DIGITS = 5
 """Digits of the given simulation's parameters."""
 
@@ -53,7 +53,7 @@ def draw_handwritten_trial(seed: int, trial: int) -> Trial:
     Raises
     ------
     SimulationError
-        If no plant that was drawn can be integrated, or no effect leaves a gap of the wished size.
+        If no plant that was drawn can be integrated, or no effect causes a gap of the requested size.
     """
     cell = handwritten_cell_of(seed, trial)
     return first_that_succeeds(lambda attempt: _drawn(cell, seed, trial, attempt), seed, trial)
@@ -75,7 +75,7 @@ def _drawn(cell: Cell, seed: int, trial: int, attempt: int) -> Trial:
     refit = bench.refit([r for r in seen if r.role == "estimation"])
     gap = bench.largest_left(bench.scored(refit, [r for r in seen if r.role == "validation"]))
     if cell.effect and gap < GAPS[0]:
-        raise SimulationError(f"{cell.effect} leaves {gap:.2g} noise floors.")
+        raise SimulationError(f"{cell.effect} causes a gap of {gap:.2g} noise floors.")
     key = {
         "schema_version": 2,
         "design": "handwritten",
@@ -115,7 +115,7 @@ def draw_bench(cell: Cell, rng: np.random.Generator) -> HandwrittenBench:
     Raises
     ------
     SimulationError
-        If no numbers are found with which the rig vibrates as a rig does.
+        If no parameter values with plausible poles are found.
     """
     rig = RIGS[cell.rig]
     values = draw_numbers(rig, rng)
@@ -145,7 +145,7 @@ def _by_names_of_fit(cell: Cell, own: dict[str, float]) -> dict[str, float]:
 def _given(
     bench: HandwrittenBench, seen: Sequence[Record], refit: FitResult, rng: np.random.Generator
 ) -> dict[str, float]:
-    """Return the simulation in question: fitted to one record or from a data sheet, well fitted, or with numbers that are off."""
+    """Return the given simulation: fitted to one record or from a data sheet, well fitted, or with numbers that are off."""
     first = [r for r in seen if r.role == "estimation"][:2]
     one = first[int(rng.integers(len(first)))]
     ends = _WRONG if bench.cell.kind == "parameters" else _OFF

@@ -226,7 +226,7 @@ class LaboratoryBench:
             sizes.append(own)
             found |= {together.parameter_name(effect, name): value for name, value in own.values.items()}
         if max(sizes, key=lambda own: own.gap) is not sizes[0]:
-            raise SimulationError(f"{effects[0].name} is not the main one of the effects.")
+            raise SimulationError(f"{effects[0].name} is not the largest of the effects.")
         return found, sizes
 
     def _gap_of(self, effect: Effect, floor: Mapping[str, float], own: Mapping[str, float]) -> float:
@@ -243,7 +243,7 @@ class LaboratoryBench:
         Raises
         ------
         SimulationError
-            If they come nowhere near.
+            If the fit fails.
         """
         return self._fitted(compose(self.rig), records, self.values, self.free)
 
@@ -291,7 +291,9 @@ class LaboratoryBench:
         fit = GreyBoxFit(structure, pieces, self.scales, self.noise)
         found = fit.fit(start, list(free), max_evaluations=_EVALUATIONS)
         if not found.residuals:
-            raise SimulationError(f"No equations of {self.rig.name} come near this motion: {found.message}")
+            raise SimulationError(
+                f"The equations of {self.rig.name} cannot be fitted to this motion: {found.message}"
+            )
         return found
 
 

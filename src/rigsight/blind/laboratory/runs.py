@@ -70,7 +70,7 @@ def draw_laboratory_runs(
         band = _LOOP_BAND[0] * law.bandwidth, _LOOP_BAND[1] * law.bandwidth
     else:
         amplitudes, band = draw_amplitudes(rig, values, rng)
-    # Between samples a controller answers smoothly, whatever its goal does.
+    # Between samples the output of a controller is smooth, whatever its goal.
     smooth: Hold = "foh" if law is not None else "band_limited"
     duration = DURATION + before(subject)
 
@@ -104,7 +104,7 @@ def draw_laboratory_runs(
             multisine("record_4", "estimation", 0.8),
             *last,
         )
-    # No machine prescribes a motion that jumps.
+    # A prescribed motion cannot jump.
     third = step if rig.is_driven else multisine
     return (*first, third("record_3", "estimation", 0.6), multisine("record_4", "estimation", 0.8), *last)
 

@@ -74,7 +74,7 @@ class Stand:
         Raises
         ------
         SimulationError
-            If none of many draws vibrates as a rig does.
+            If no draw has plausible poles.
         """
         if not self.looped:
             return draw_numbers(self.rig, rng)
@@ -119,7 +119,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Softening:
-    """What the last joint of a rig has lost once it is warm: shares of its damping and of its stiffness."""
+    """Relative losses of damping and stiffness of the last joint when it is warm."""
 
     damping: float
     stiffness: float

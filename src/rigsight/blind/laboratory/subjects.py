@@ -152,7 +152,7 @@ def draw_laboratory_effects(subject: LaboratorySubject, rng: np.random.Generator
 
 
 def effects_shown(stand: Stand, family: Family) -> list[Effect]:
-    """Return the effects of a family that records of a stand tell from one another.
+    """Return the effects of a family that records of a stand can distinguish.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def effects_shown(stand: Stand, family: Family) -> list[Effect]:
 
 
 def _has_a_double(stand: Stand, effect: Effect) -> bool:
-    """Return True for an effect whose records are those of another one, or of other numbers."""
+    """Return True for an effect that gives the same records as another effect, or as other parameter values."""
     rig, kind = stand.rig, kind_of(effect.name)
     if kind == "directional_friction":
         # It is dry friction beside a constant force, and that is free there.

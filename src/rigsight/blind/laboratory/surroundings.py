@@ -11,7 +11,7 @@ from rigsight.blind.laboratory.stands import STANDS, Law, Softening, draw_law
 from rigsight.blind.laboratory.subjects import LaboratorySubject
 
 GAPS = (5.0, 100.0)
-"""Gap that the re-identified equations leave, in units of the true floor: what an eye sees in a plot, up to a wrong model."""
+"""Gap of the re-identified equations in true noise floors: from just visible in a plot to a wrong model."""
 LEAST_BESIDE = 1.5
 """Least gap of a further effect in addition to the main one, in units of the floor: less is not visible."""
 _NOISE = (3e-4, 3e-3)
@@ -42,7 +42,7 @@ _WARMS_UP = (60.0, 300.0)
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is around a rig in one trial.
+    """Imperfections of the measurement in one trial.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Surroundings:
 def draw_surroundings(
     subject: LaboratorySubject, values: dict[str, float], rng: np.random.Generator
 ) -> Surroundings:
-    """Draw what a condition does to a stand.
+    """Draw the imperfections of a stand under a condition.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def draw_surroundings(
     stand, condition = STANDS[subject.stand], subject.condition
     pushed = condition in ("feedback", "repeats", "stiction")
     noisy_input = condition in ("feedback", "repeats")
-    # Every number is drawn whatever is used: what one condition needs moves nothing in another.
+    # Every number is drawn even if unused, so that one condition does not change the draws of another.
     noise, push, corner, filtered = (
         _any(ends, rng) for ends in (_NOISE, _PUSH, _PUSH_CORNER, _FILTER_CORNER)
     )

@@ -55,7 +55,7 @@ def draw_laboratory_trial(seed: int, trial: int) -> Trial:
     Raises
     ------
     SimulationError
-        If no stand that was drawn can be simulated, or no effect leaves a gap of the wished size.
+        If no stand that was drawn can be simulated, or no effect causes a gap of the requested size.
     """
     subject = laboratory_subject_of(seed, trial)
     return first_that_succeeds(lambda attempt: _drawn(subject, seed, trial, attempt), seed, trial)
@@ -75,7 +75,7 @@ def _drawn(subject: LaboratorySubject, seed: int, trial: int, attempt: int) -> T
     refit = bench.refit([r for r in seen if r.role == "estimation"])
     gap = largest_left(bench.scored(refit, [r for r in seen if r.role == "validation"]), floor)
     if gap < GAPS[0]:
-        raise SimulationError(f"{', '.join(e.name for e in effects)} leave {gap:.2g} floors.")
+        raise SimulationError(f"{', '.join(e.name for e in effects)} cause a gap of {gap:.2g} floors.")
     key = {
         "schema_version": 2,
         "design": "laboratory",
@@ -137,7 +137,7 @@ def _wished_gaps(
     largest = max(_MOST_OF_MOTION * bench.sizes[name] / own for name, own in floor.items())
     most = min(GAPS[1], largest)
     if most <= GAPS[0]:
-        raise SimulationError(f"What is around {bench.rig.name} leaves half of what any effect could.")
+        raise SimulationError(f"Noise and disturbance of {bench.rig.name} are too large for a visible gap.")
     main = math.exp(rng.uniform(math.log(GAPS[0]), math.log(most)))
     beside = [max(rng.uniform(*_BESIDE) * main, LEAST_BESIDE) for _ in range(n_effects - 1)]
     return [main, *beside]
@@ -187,7 +187,7 @@ def handed(bench: LaboratoryBench, seen: Sequence[Record], rng: np.random.Genera
 
 
 def _given(bench: LaboratoryBench, rng: np.random.Generator) -> dict[str, float]:
-    """Return the simulation in question: numbers from drawings, without the offsets that no drawing has."""
+    """Return the given simulation: numbers from drawings, without the offsets that no drawing has."""
     off = {p.name: 1.0 + rng.uniform(*_OFF) * rng.choice([-1.0, 1.0]) for p in bench.rig.parameters}
     return {
         p.name: 0.0 if is_offset(p) else float(f"{bench.values[p.name] * off[p.name]:.{_DIGITS}g}")

@@ -48,7 +48,7 @@ SURE = 0.9
 
 
 def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Return the figures for which there are goals, and those that stand beside them.
+    """Return the figures for which there are goals, and the accompanying ones.
 
     An unknown gap counts as a large one, otherwise a failed diagnosis would not count at all. Trials of a laboratory count
     towards its own goals alone.
@@ -62,7 +62,7 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     controls = [o for o in outcomes if o.kind in ("none", "parameters")]
     known = [*singles, *pairs, *controls]
     log_scores = [log_score(o.probability) for o in known]
-    # A model that cannot be simulated on a withheld record is endlessly far from it.
+    # A model that cannot be simulated on a withheld record has an infinite error.
     errors = [math.inf if o.held_out is None else o.held_out for o in (*singles, *pairs) if o.withheld]
     return {
         "singles_right": share_of(singles, lambda o: o.right),
@@ -128,7 +128,7 @@ def targets(found: Mapping[str, Any]) -> list[dict[str, Any]]:
         value = figure["share"] if counted else figure
         total = figure["total"] if counted else found[f"{name}_total"]
         low, high = figure["interval"] if counted else found[f"{name}_interval"]
-        # Where an end is open the interval goes on without limit.
+        # If an end is open, the interval is unbounded.
         ends = [-math.inf if low is None else low, math.inf if high is None else high]
         rows.append(
             {

@@ -1,4 +1,4 @@
-"""How far are the numbers of a right diagnosis from the true ones? In standard errors, as the diagnosis states them."""
+"""Errors of the parameters of correct diagnoses, in units of their stated standard errors."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class WithheldError:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one trial.
+    """The outcome of one trial.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Outcome:
     fingerprint
         Of the files of an external campaign and of its key; empty if design, seed and number define it.
     version
-        The rigsight that scored it.
+        Version of rigsight that scored it.
     kind, effects, places, rig, noise
         From the key: kind of subject, hidden effects, the place of each (empty where the key does not say it effect by effect),
         rig, noise level.
@@ -76,7 +76,7 @@ class Outcome:
     effect_right
         The same, wherever the diagnosis puts the effects.
     right_within_set
-        Right, or the truth is among those that the diagnosis cannot tell from what it names.
+        Right, or the truth is among the effects that the diagnosis does not distinguish from the named one.
     place_right
         The places named are those of the hidden effects, of several that of the main one and no place of none; None where
         nothing is hidden or the key does not say where.
@@ -150,7 +150,7 @@ def outcome(
     version: str,
     message: str = "",
 ) -> Outcome:
-    """Hold a diagnosis against its key.
+    """Compare a diagnosis with its key.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def rig_of(key: Mapping[str, Any]) -> Rig:
     rig = declared_rig(str(key["rig"]), key.get("declaration") or {})
     if rig is None:
         raise InputError(
-            f"The key of trial {key['trial']} names the rig {key['rig']} and does not declare it."
+            f"The key of trial {key['trial']} names the rig {key['rig']}, which is not built in, and does not declare it."
         )
     return rig
 

@@ -1,4 +1,4 @@
-"""How sure is a figure that comes from so many trials? Shares, means and medians with intervals of 95 %."""
+"""Shares, means and medians over trials, with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TWO_SIDED = 1.96
 
 @dataclass(frozen=True)
 class Share:
-    """How many of how many, with the Wilson interval of 95 %."""
+    """A count out of a total, with the Wilson interval of 95 %."""
 
     count: int
     total: int
@@ -43,7 +43,7 @@ def share_of(items: Sequence[Item], counts: Callable[[Item], bool]) -> dict[str,
 
 
 def mean(values: Sequence[float]) -> float | None:
-    """Return the mean; None of nothing."""
+    """Return the mean; None if there are no values."""
     return float(np.mean(values)) if len(values) else None
 
 
@@ -57,7 +57,7 @@ def mean_interval(values: Sequence[float]) -> tuple[float | None, float | None]:
 
 
 def quantile(values: Sequence[float], share: float) -> float | None:
-    """Return the value that this share of all does not exceed; None of nothing, or where it is endless."""
+    """Return the value that this share of all does not exceed; None if there are no values, or it is infinite."""
     if not len(values):
         return None
     found = float(np.quantile(values, share, method="inverted_cdf"))
@@ -65,10 +65,10 @@ def quantile(values: Sequence[float], share: float) -> float | None:
 
 
 def median(values: Sequence[float]) -> float | None:
-    """Return the median; None of nothing, or where half of all values are endless."""
+    """Return the median; None if there are no values, or half of them are infinite."""
     if not len(values):
         return None
-    # Sorted, because the mean of two endless values is no number.
+    # Sorted, because the mean of two infinite values may be NaN.
     ordered = np.sort(values)
     low, high = float(ordered[(ordered.size - 1) // 2]), float(ordered[ordered.size // 2])
     return 0.5 * (low + high) if math.isfinite(high) else None

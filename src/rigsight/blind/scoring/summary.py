@@ -1,4 +1,4 @@
-"""What do the outcomes of many trials add up to?"""
+"""Summary of the outcomes of many trials."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _WITHIN = 2.0
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Return what many outcomes add up to, ready for ``blind.json``."""
+    """Return the summary of many outcomes, ready for ``blind.json``."""
     goals = figures(outcomes)
     return {
         "goals": goals,
@@ -55,17 +55,17 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def truth_label(found: Outcome) -> str:
-    """Return what a trial hid, in words."""
+    """Return the hidden effect of a trial as text."""
     prefix = "outside: " if found.kind == "outside" else ""
     return prefix + (" + ".join(found.effects) or found.kind)
 
 
 def verdict_label(found: Outcome) -> str:
-    """Return what a diagnosis said, in words."""
+    """Return the verdict of a diagnosis as text."""
     if found.named and found.effect_right and not found.right:
         return WRONG_PLACE
     if found.kind == SEVERAL and found.right:
-        # The main one of several is as right as all of them.
+        # Naming only the main one of several effects counts as right.
         return truth_label(found)
     return " + ".join(found.named) or found.verdict
 
@@ -80,7 +80,7 @@ _GROUPINGS: dict[str, Callable[[Outcome], str]] = {
 
 
 def conditions(outcomes: Sequence[Outcome]) -> dict[str, dict[str, Any]]:
-    """Return what a laboratory's trials add up to under each condition and under all; nothing where there are no such trials."""
+    """Return the summary of the laboratory trials for each condition and for all; empty if there are no such trials."""
     taken = [o for o in outcomes if o.condition]
     groups: dict[str, list[Outcome]] = {
         name: [o for o in taken if o.condition == name] for name in CONDITIONS
@@ -132,7 +132,7 @@ def _of_pair(found: Outcome) -> str:
 def reliability(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Return, for bins of the stated probability, its mean and the share of verdicts that were true.
 
-    A diagnosis that failed states nothing.
+    Failed diagnoses are left out.
     """
     rows, stating = [], [o for o in outcomes if o.verdict != FAILED]
     for lower, upper in pairwise(_BINS):
@@ -151,7 +151,7 @@ def reliability(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
 def held_out(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Return how far the models are from withheld records: of all trials whose truth the catalogue holds.
 
-    A model that cannot be simulated there is endlessly far.
+    A model that cannot be simulated there has an infinite error.
     """
     known = [o for o in outcomes if o.kind != "outside" and o.withheld]
     errors = [_endless(o.held_out) for o in known]

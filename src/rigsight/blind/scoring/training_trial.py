@@ -1,4 +1,4 @@
-"""What does a diagnosed trial whose truth is known teach the calibration of probabilities?"""
+"""A diagnosed trial with known truth, as input of the calibration of probabilities."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class TrainingTrial:
     left_out
         True where the hidden effect was not among the candidates.
     situation
-        What the probability is told from.
+        Features from which the probability is computed.
     cause
-        Where the true cause stands among the models tried.
+        Place of the true cause among the tried models.
     share_of_cause
         Its part of the ranking among the models behind the first; 0 where it is none of them.
     """
@@ -47,7 +47,7 @@ class TrainingTrial:
 def training_trial(
     key: Mapping[str, Any], diagnosis: Mapping[str, Any], left_out: bool = False
 ) -> TrainingTrial:
-    """Hold a diagnosis against its key.
+    """Compare a diagnosis with its key.
 
     Parameters
     ----------
@@ -104,6 +104,6 @@ def _share(candidate: Mapping[str, Any]) -> float:
 
 
 def _left(candidate: Mapping[str, Any]) -> float:
-    """Return the error over noise; endless where a model could not be scored."""
+    """Return the error over noise; infinite if a model could not be scored."""
     left = candidate["error_over_noise"]
     return math.inf if left is None else float(left)

@@ -147,7 +147,7 @@ class FitContext:
         return GreyBoxFit(structure, records, self.scales, self.noise, accuracy, self.memory, self.threads)
 
     def composed(self, effects: Iterable[Effect] = (), fixed: Mapping[str, float] | None = None) -> Structure:
-        """Return the equations of the simulation in question with effects added."""
+        """Return the equations of the given simulation with effects added."""
         return compose(self.rig, (*self.modelled, *effects), fixed)
 
     def simplest(self, effects: Sequence[Effect]) -> Structure:

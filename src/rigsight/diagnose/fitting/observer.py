@@ -55,7 +55,7 @@ def followed_sensors(campaign: Campaign) -> tuple[str, ...]:
     Parameters
     ----------
     campaign
-        Records and the simulation in question.
+        Records and the given simulation.
     """
     shown = {name for record in campaign.records for name in record.signals}
     return tuple(name for name in sensors_of_motion(campaign.rig) if name in shown)

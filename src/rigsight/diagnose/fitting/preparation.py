@@ -32,7 +32,7 @@ def fit_context_of(
     Parameters
     ----------
     campaign
-        Records and the simulation in question.
+        Records and the given simulation.
     noise
         Noise floor of each output.
     windowing

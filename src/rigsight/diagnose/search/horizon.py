@@ -42,7 +42,7 @@ def windowing_of(
     Parameters
     ----------
     campaign
-        Records and the simulation in question.
+        Records and the given simulation.
     noise
         Noise floor of each output.
     n_jobs

@@ -1,1 +1,1 @@
-"""How do the bodies, joints, actuators and sensors of a MuJoCo model become the tables of a rig file?"""
+"""Bodies, joints, actuators and sensors of a MuJoCo model as tables of a rig file."""

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gear:
-    """What lies between the rotor of a joint and what it moves.
+    """The gear between the rotor of a joint and the moved body.
 
     Attributes
     ----------
     joint
         Number of the joint in the model.
     coordinate
-        How far the gear gives way.
+        Deflection of the gear.
     """
 
     joint: int
@@ -57,15 +57,15 @@ class RigDraft:
     gears
         Place between a rotor and what it moves -> its joint.
     controls
-        Input that a drive is told -> number of the control in the model; -1 for what was added.
+        Input of a drive -> index of the control in the model; -1 for what was added.
     fields
-        Parameter or constant of the rig -> the numbers of the model that it stands for.
+        Parameter or constant of the rig -> the fields of the model that it represents.
     values
         Parameters as the model has them.
     left_out
-        In words, what of the model the rig file does not say.
+        Descriptions of the parts of the model that are not in the rig file.
     notes
-        In words, what was added.
+        Descriptions of what was added.
     """
 
     tables: Mapping[str, Any]
@@ -105,14 +105,14 @@ def draft_rig(
     """Return the rig file of a MuJoCo model.
 
     Damping, dry friction, stiffness and armature of joints are parameters, masses, lengths and gains constants. Bodies that are
-    left to MuJoCo have no masses and lengths in the rig file, and nothing that binds them is left out.
+    simulated in MuJoCo have no masses and lengths in the rig file, and all their constraints are kept.
 
     Parameters
     ----------
     model
         Compiled.
     name
-        What the rig is called.
+        Name of the rig.
     with_drives
         Give a model without actuators a force or torque at every joint: a URDF has none.
     gears
@@ -231,7 +231,7 @@ def _sensor_tables(
         q, unit = coordinates[sensor.joint], way_unit(joints[sensor.joint])
         what = ("position", "velocity") if joints[sensor.joint].slides else ("angle", "speed")
         name = names.free(sensor.name or f"{q}_{what[sensor.is_rate]}", "sensor")
-        factor = numbers.factor(f"{name}_factor", sensor.factor, f"what {name} reads, by the joint")
+        factor = numbers.factor(f"{name}_factor", sensor.factor, f"reading of {name} per motion of the joint")
         reads, own = (f"d({q})", f"{unit}/s") if sensor.is_rate else (q, unit)
         found.append((name, sensor, {"reads": f"{factor}{reads}", "unit": own}))
     return found

@@ -22,7 +22,7 @@ class DriveTables:
     name, table
         ``[drives.NAME]``.
     told, control
-        ``[inputs.NAME]``, what it is told.
+        ``[inputs.NAME]``, its command.
     index, control_index
         Numbers of the actuator and of its control; -1 for a drive that was added.
     states

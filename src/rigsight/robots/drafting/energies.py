@@ -185,7 +185,10 @@ def _moved(
         *(
             coordinate
             - known.numbers.constant(
-                f"{coordinate.name}_ref", joint.reference, unit, f"{coordinate.name} where the model is drawn"
+                f"{coordinate.name}_ref",
+                joint.reference,
+                unit,
+                f"{coordinate.name} in the reference pose of the model",
             )
             for joint, coordinate in zip(joints, coordinates, strict=True)
         )
@@ -193,7 +196,7 @@ def _moved(
     if first.slides:
         frame = frame.shifted(axis * way)
         return replace(frame, moving=frame.moving + axis * rate)
-    anchor = known.length(called, first.anchor, "where its joint is")
+    anchor = known.length(called, first.anchor, "position of its joint")
     turned = frame.shifted(anchor).turned(_rotation(axis, way))
     turned = replace(turned, turning=turned.turning + axis * rate)
     return turned.shifted(-anchor)

@@ -48,7 +48,7 @@ def split_joints(
                 f"--gear: there is no joint '{name}'.{nearest(name, joints)} Joints: {', '.join(joints)}."
             )
         if not (math.isfinite(stiffness) and stiffness > 0.0):
-            raise InputError(f"--gear: the stiffness of '{name}' is positive, got {stiffness:g}.")
+            raise InputError(f"--gear: the stiffness of '{name}' must be positive, got {stiffness:g}.")
         if model.dof_armature[joints[name].dof] == 0.0:
             raise InputError(
                 f"--gear: joint '{name}' has no armature. With a gear its rotor turns separately and needs an inertia: give the "
@@ -108,5 +108,5 @@ def gear_table(
             f"damping of the gear of {name}",
             Field("gear", joint.index, "damping"),
         ),
-        "about": f"between the rotor of {name} and what it moves",
+        "about": f"between the rotor of {name} and the moved body",
     }

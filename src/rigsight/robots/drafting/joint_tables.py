@@ -49,7 +49,7 @@ def joint_table(
         f"{name}_inertia",
         moved,
         "kg" if joint.slides else "kg m^2",
-        f"what moves with {name} where the model is drawn",
+        f"inertia moved by {name} in the reference pose of the model",
     )
     table["inertia"] = str(inertia)
     table["damping"] = numbers.parameter(

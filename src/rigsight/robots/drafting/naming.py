@@ -17,14 +17,14 @@ class Names:
         self._taken = {*FUNCTIONS, "t", "d", "force"}
 
     def free(self, wished: str, otherwise: str = "part") -> str:
-        """Return a name as it is wished if it can be, or the nearest one.
+        """Return the requested name if it is valid and free, or a similar one.
 
         Parameters
         ----------
         wished
             As MuJoCo calls it.
         otherwise
-            What to begin with where that holds no letter.
+            Beginning of the name if that contains no letter.
         """
         name = re.sub(r"\W+", "_", wished, flags=re.ASCII).strip("_")[:_LONGEST] or otherwise
         name = name if not name[0].isdigit() else f"{otherwise}_{name}"

@@ -1,4 +1,4 @@
-"""Which drives does a MuJoCo model have? Force of each as an expression of its control, with the numbers of its fields."""
+"""The actuators of a MuJoCo model: force of each as an expression of its control, with the values of its fields."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class TreeActuator:
 
 
 def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
-    """Return the actuators that a rig file can say, and in words those that it cannot, and why."""
+    """Return the actuators that a rig file can represent, and descriptions of the others with the reason."""
     import mujoco
 
     found, left_out = [], []
@@ -67,7 +67,7 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
         called = f"actuator '{name}'" if name else f"actuator number {index}"
         dynamics, bias_kind = int(model.actuator_dyntype[index]), int(model.actuator_biastype[index])
         if int(model.actuator_trntype[index]) not in joints:
-            left_out.append(f"{called}: it drives no joint (a tendon, site or body)")
+            left_out.append(f"{called}: it does not drive a joint but a tendon, site or body")
             continue
         if int(model.actuator_gaintype[index]) != fixed or bias_kind not in (none, affine):
             left_out.append(f"{called}: a muscle, motor model, plugin or gain that changes with the motion")
@@ -102,7 +102,7 @@ def actuators_of(model: mujoco.MjModel) -> tuple[list[TreeActuator], list[str]]:
 
 
 def _beside(model: mujoco.MjModel, index: int, called: str) -> list[str]:
-    """Return in words what is not taken over of an actuator that is."""
+    """Return descriptions of the properties of an accepted actuator that are not taken over."""
     found = []
     delay = float(model.actuator_delay[index])
     if delay > 0.0:

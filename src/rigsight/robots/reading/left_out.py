@@ -13,7 +13,7 @@ _LISTED = 3
 
 
 def left_out_of(model: mujoco.MjModel, *, as_it_is: bool = False) -> list[str]:
-    """Return in words what is not taken over of a model, apart from its actuators and sensors.
+    """Return descriptions of what is not taken over of a model, apart from its actuators and sensors.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def left_out_of(model: mujoco.MjModel, *, as_it_is: bool = False) -> list[str]:
     as_it_is
         True if its bodies stay in MuJoCo, and with them all that binds them.
     """
-    found = [f"the option that switches {what} off: the rig has it" for what in _switched_off(model)]
+    found = [f"the option that switches off {what}, which the rig has" for what in _switched_off(model)]
     if not as_it_is:
         found += _between_bodies(model)
     if any(model.jnt_springyield):
@@ -43,7 +43,7 @@ def _between_bodies(model: mujoco.MjModel) -> list[str]:
     limited = [model.joint(j).name or f"number {j}" for j in range(model.njnt) if model.jnt_limited[j]]
     if limited:
         found.append(
-            f"range of joints: {_listed(limited)}; the rig moves past it; use the effect end_stop for it"
+            f"range of joints: {_listed(limited)}; the rig has no end stops there; use the effect end_stop"
         )
     if model.neq:
         found.append(

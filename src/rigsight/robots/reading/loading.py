@@ -1,4 +1,4 @@
-"""A file of MuJoCo's -> a model that MuJoCo compiled, or one message why there is none."""
+"""Load an MJCF or URDF file as a compiled MuJoCo model; errors become one message."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def load_model(path: Path) -> mujoco.MjModel:
 
 
 def load_spec(path: Path) -> mujoco.MjSpec:
-    """Return what an MJCF or URDF file says, in a form that MuJoCo can compile and change.
+    """Return the content of an MJCF or URDF file as a specification that can be changed and compiled.
 
     Where a mesh is missing, shapes are left out of bodies that have an inertia of their own: only what moves is taken over.
 
@@ -43,7 +43,7 @@ def load_spec(path: Path) -> mujoco.MjSpec:
             "Reading MJCF and URDF needs MuJoCo, which is not installed: pip install 'rigsight[mujoco]'."
         ) from None
     if file_size(path, "the model file") > LARGEST_FILE:
-        raise InputError(f"{path}: a model file may have at most {LARGEST_FILE / 1e6:g} MB.")
+        raise InputError(f"{path}: is larger than {LARGEST_FILE / 1e6:g} MB, the limit for a model file.")
     try:
         spec = mujoco.MjSpec.from_file(os.fspath(path))
     except ValueError as error:

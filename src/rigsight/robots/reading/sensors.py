@@ -35,7 +35,7 @@ class TreeSensor:
 
 
 def sensors_of(model: mujoco.MjModel, actuators: list[TreeActuator]) -> tuple[list[TreeSensor], list[str]]:
-    """Return the sensors that a rig file can say, and in words those that it cannot.
+    """Return the sensors that a rig file can represent, and descriptions of the others.
 
     Parameters
     ----------

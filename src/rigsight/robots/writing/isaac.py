@@ -1,4 +1,4 @@
-"""Numbers and effects of a model -> the settings of Isaac Lab's actuators, a group for each joint.
+"""Parameter values and effects of a model -> the settings of Isaac Lab's actuators, a group for each joint.
 
 Written for Isaac Lab 3.0 (`isaaclab.actuators.ActuatorBaseCfg`, `DelayedPDActuatorCfg`). Friction of joints is there since Isaac
 Sim 5.0; 2.x calls ``actuator_effort_limit`` ``effort_limit``.

@@ -23,16 +23,16 @@ _SAME = 1e-12
 
 @dataclass(frozen=True)
 class WrittenBack:
-    """A MuJoCo model with the numbers and effects of another one.
+    """A MuJoCo model with the parameter values and effects of another model.
 
     Attributes
     ----------
     text
         MJCF.
     written
-        In words, each field that changed.
+        Descriptions of the changed fields.
     without_field
-        In words, what MuJoCo has no field for.
+        Descriptions of what MuJoCo has no field for.
     """
 
     text: str
@@ -208,10 +208,10 @@ class _Writer:
             self._spec.compile()
             text = self._spec.to_xml()
         except ValueError as error:
-            raise InputError(f"{source}: MuJoCo rejects it with the new numbers: {error}") from None
+            raise InputError(f"{source}: MuJoCo rejects it with the new values: {error}") from None
         lines = [f"Written by rigsight export from {source.name}."]
         lines += [f"{line}" for line in self._written]
         lines += [f"MuJoCo has no field for {line}" for line in self._without_field]
-        # A comment of XML may hold no two hyphens.
+        # An XML comment must not contain two hyphens in a row.
         comment = "\n".join(lines).replace("--", "- -")
         return WrittenBack(f"<!-- {comment} -->\n{text}", tuple(self._written), tuple(self._without_field))

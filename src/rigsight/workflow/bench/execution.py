@@ -1,7 +1,7 @@
-"""Where do blind trials run: in processes of this machine, or on the workers of a Dask cluster?
+"""Blind trials run in processes of this machine or on the workers of a Dask cluster.
 
 The cluster is started with Dask's own commands (``docs/blind_cluster.md``). A trial whose worker dies goes back into the queue; a
-bench without workers waits for some; workers that join later are used from then on.
+bench without workers waits for them; workers that join later are used as well.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ Result = TypeVar("Result")
 _REACHED_WITHIN = 5.0
 """Time [s] in which a scheduler must answer, at first and after a lost connection."""
 _LOOK_AGAIN = 2.0
-"""Time [s] after which workers are counted anew."""
+"""Time [s] after which workers are counted again."""
 _PER_THREAD = 4
-"""Trials handed to the scheduler per thread of its workers: none idles, and none of 100,000 waits in the scheduler's memory."""
+"""Trials queued at the scheduler per worker thread: enough to keep all busy, few enough to save the scheduler's memory."""
 _LEAST_HANDED_OVER = 16
 _RETRIES = 2
-"""Times that a trial is run again after an error: a machine that shuts down ends a diagnosis before its worker."""
+"""Times that a trial is repeated after an error: when a machine shuts down, the diagnosis ends before its worker does."""
 _ROUNDS = 3
-"""Times that a trial is handed over; in each the scheduler lets it outlive three workers. By then it may be what kills them."""
+"""Times that a trial is submitted; each time three of its workers may die. After that the trial itself may be the cause."""
 
 
 def finished(
@@ -55,8 +55,8 @@ def finished(
 ) -> Iterator[Result]:
     """Run every trial and yield its result as it ends, in any order; each result once.
 
-    What has not begun when the iteration is left early (Ctrl-C, an error) does not begin any more; a trial that a worker of a
-    cluster has begun runs to its end there.
+    When the iteration is left early (Ctrl-C, an error), no further trials are started; a trial that is already running on a
+    worker of a cluster runs to its end there.
 
     Parameters
     ----------
@@ -65,21 +65,21 @@ def finished(
     trials
         Number or name of each.
     n_jobs
-        Processes on this machine; without meaning on a cluster, whose workers say how many trials they run.
+        Processes on this machine; ignored on a cluster, where the workers determine how many trials run in parallel.
     cluster
         Address of a Dask scheduler such as ``tcp://10.0.0.1:8786``; None for this machine.
     folder
         Folder that every worker must see as this process does; None if trials need none.
     say
-        Told what a person who waits should know: that no worker is there, and that one has come.
+        Called with messages for the user: that there is no worker, and that one has joined.
 
     Raises
     ------
     InputError
         If no scheduler answers, or a worker does not see the folder or runs another rigsight.
     RigsightError
-        If worker processes of this machine or the scheduler die, or a trial kills its workers. What `run_one` raises is raised,
-        on a cluster after the trial has been tried again.
+        If worker processes of this machine or the scheduler die, or a trial kills its workers. Errors of `run_one` are raised, on
+        a cluster after the trial has been repeated.
     """
     if cluster is None:
         return _on_this_machine(run_one, trials, n_jobs)
@@ -90,7 +90,7 @@ def _on_this_machine(
     run_one: Callable[[Name], Result], trials: Sequence[Name], n_jobs: int
 ) -> Iterator[Result]:
     processes = min(n_jobs, max(1, len(trials)))
-    # Interrupted, joblib kills the other processes, which then remove nothing themselves.
+    # On an interruption joblib kills the other processes, which then do not remove their temporary files.
     with tempfile.TemporaryDirectory(prefix="rigsight-", ignore_cleanup_errors=True) as place:
         own: dict[str, Any] = {}
         if processes > 1:
@@ -101,12 +101,12 @@ def _on_this_machine(
         except BrokenProcessPool:
             raise RigsightError(
                 "A process that ran a blind trial was killed from outside, most often because memory ran out. "
-                "The same command takes the bench up again; --jobs says how many trials run side by side."
+                "The same command continues the bench; a lower --jobs runs fewer trials in parallel."
             ) from None
 
 
 def _begin(place: str) -> None:
-    """Let a process of this machine end with the one that started it, and keep its temporary files where that removes them."""
+    """End this process when its parent has ended, and put its temporary files where the parent removes them."""
     end_with_parent()
     tempfile.tempdir = place
 
@@ -126,7 +126,7 @@ def _on_cluster(
                 task = functools.partial(_run_on_worker, run_one, mark, source_version())
                 yield from _Queue(client, address, task, say).results(trials)
         finally:
-            # With its client the scheduler forgets what waits.
+            # When the client is closed, the scheduler drops the trials that are waiting.
             client.close(timeout=_REACHED_WITHIN)
 
 
@@ -141,9 +141,9 @@ def _check_installed() -> None:
 
 @contextmanager
 def _only_fatal_messages() -> Iterator[None]:
-    """Keep Dask from logging tracebacks of lost connections, which are told as errors of our own.
+    """Keep Dask from logging tracebacks of lost connections, which are reported as errors of our own.
 
-    Dask sets its levels as it is imported, so this comes after.
+    Dask sets its levels when it is imported, so this must be called after the import.
     """
     logger = logging.getLogger("distributed.client")
     before = logger.level
@@ -158,27 +158,27 @@ def _connected(address: str) -> Any:
     from distributed import Client
 
     try:
-        # In a thread, because a notebook's own has a loop that runs.
+        # In a thread, because an event loop is already running in the main thread of a notebook.
         with ThreadPoolExecutor(1) as thread:
             kind = thread.submit(asyncio.run, _kind_of_server(address)).result()
         if kind != "Scheduler":
             raise InputError(f"what answers is a {kind}")
         return Client(address, timeout=_REACHED_WITHIN, set_as_default=False, name="rigsight")
     except Exception as error:
-        # A server of another kind makes Dask fail in any way, a page of HTML read as a length by lack of memory.
+        # With a server of another kind Dask may fail in any way, for instance by taking HTML for a message length.
         reason = (
-            f"nothing within {_REACHED_WITHIN:g} s"
+            f"no answer within {_REACHED_WITHIN:g} s"
             if isinstance(error, TimeoutError)
             else str(error).splitlines()[0]
         )
         raise InputError(
-            f"No Dask scheduler answers at '{address}' ({reason}). Start one with 'dask scheduler', which says its address, "
-            "such as tcp://10.0.0.1:8786, and give that."
+            f"No Dask scheduler answers at '{address}' ({reason}). Start one with 'dask scheduler', which prints its address, "
+            "such as tcp://10.0.0.1:8786, and give that address with --cluster."
         ) from None
 
 
 async def _kind_of_server(address: str) -> str:
-    """Return what answers at an address; a client that fails to connect would leave threads and messages behind."""
+    """Return the kind of server at an address; a client that fails to connect would leave threads and messages behind."""
     from distributed.core import rpc
     from distributed.security import Security
 
@@ -191,7 +191,7 @@ async def _kind_of_server(address: str) -> str:
 
 
 class _Queue:
-    """Trials on their way through a scheduler."""
+    """Trials that are submitted to a scheduler."""
 
     def __init__(
         self, client: Any, address: str, task: Callable[[Any], Any], say: Callable[[str], None]
@@ -203,7 +203,7 @@ class _Queue:
         self._run = secrets.token_hex(8)
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[Any, tuple[Any, int]] = {}
-        """Trial and round of each future; a future lives as long as it stands here."""
+        """Trial and round of each future; a future is kept alive by its entry here."""
         self._threads = 0
         self._looked = -_LOOK_AGAIN
         self._deserted = False
@@ -240,17 +240,17 @@ class _Queue:
             return []
 
     def _look(self) -> None:
-        """Count the threads of all workers now and then, and say so where there are none."""
+        """Count the threads of all workers at intervals, and report if there are none."""
         if time.monotonic() - self._looked < _LOOK_AGAIN:
             return
         try:
             self._threads = self._client.scheduler_info(n_workers=0)["total_threads"]
         except (OSError, ValueError, KeyError):
-            # Whether the connection is lost for good is told by the futures.
+            # Whether the connection is lost for good is reported by the futures.
             return
         self._looked = time.monotonic()
         if self._deserted and self._threads:
-            self._say(f"Going on: {self._threads} trials at a time")
+            self._say(f"Continuing with {self._threads} trials at a time")
         if not self._deserted and not self._threads:
             self._say(
                 f"No worker at {self._address}: trials wait for one (dask worker {self._address} --nthreads 1)"
@@ -266,8 +266,8 @@ class _Queue:
         if turn < _ROUNDS:
             return True
         raise RigsightError(
-            f"Every worker that was given trial {trial} died. If they were not ended on purpose, they ran out of memory: "
-            "see their logs; the same command takes the bench up again."
+            f"Every worker that ran trial {trial} died. If they were not ended on purpose, they probably ran out of memory: "
+            "see their logs. The same command continues the bench."
         )
 
     def _result(self, future: Any) -> Any:
@@ -278,24 +278,24 @@ class _Queue:
                 raise
             raise self._gone() from None
         except (ModuleNotFoundError, AttributeError) as error:
-            # Raised where a task is unpacked, so that it cannot check anything itself.
+            # Raised while a task is unpickled, before the task can check anything itself.
             if "rigsight" not in str(error):
                 raise
             raise InputError(
-                f"A worker at {self._address} has no rigsight of the same version ({error}). Install {source_version()} "
-                "where workers run."
+                f"A worker at {self._address} does not have the same version of rigsight ({error}). Install "
+                f"{source_version()} on the workers."
             ) from None
 
     def _gone(self) -> RigsightError:
         return RigsightError(
-            f"The Dask scheduler at {self._address} is gone. Start it and its workers again; the same command takes the bench up "
-            "again."
+            f"The connection to the Dask scheduler at {self._address} is lost. Start it and its workers again; the same command "
+            "continues the bench."
         )
 
 
 @contextmanager
 def _marked(folder: Path | None) -> Iterator[Path | None]:
-    """Leave a mark in a folder by which a worker knows that it sees the same."""
+    """Put a marker file into a folder, by which a worker checks that it sees the same folder."""
     if folder is None:
         yield None
         return
@@ -309,11 +309,11 @@ def _marked(folder: Path | None) -> Iterator[Path | None]:
 
 
 def _run_on_worker(run_one: Callable[[Name], Result], mark: Path | None, wanted: str, trial: Name) -> Result:
-    """Run a trial where the same code and the same folder are; workers that join late are checked like the first."""
+    """Run a trial after checking that the worker has the same code and folder; this also covers workers that join later."""
     if source_version() != wanted:
         raise InputError(
             f"The worker on {socket.gethostname()} runs rigsight {source_version()}, the bench {wanted}: install the same "
-            "on both and start the worker again."
+            "version on both and start the worker again."
         )
     if mark is not None and not mark.exists():
         raise InputError(
@@ -325,7 +325,7 @@ def _run_on_worker(run_one: Callable[[Name], Result], mark: Path | None, wanted:
 
 @functools.cache
 def source_version() -> str:
-    """Return rigsight's version with a short hash of its source, which tells two states of development apart."""
+    """Return rigsight's version with a short hash of its source, which distinguishes two states of development."""
     package = Path(__file__).parents[2]
     found = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):

@@ -1,4 +1,4 @@
-"""What must a key hold so that campaigns written by anybody else are scored by the rules of the drawn ones?
+"""Benches of existing campaigns: their keys, and how they are checked so that they are scored like drawn trials.
 
 ``--campaigns DIR`` holds a folder with a ``campaign.toml`` for each trial, ``--keys DIR`` a ``NAME.json`` for each of these
 folders, and beside it the records that are withheld from the diagnosis::
@@ -100,7 +100,7 @@ class ExternalBench(BenchFolder):
         return self.sealed
 
     def fingerprint(self, trial: str) -> str:
-        """Return a hash of the campaign, its key and what is withheld: who changes one of them has another trial."""
+        """Return a hash of the campaign, its key and the withheld records: a change of any of them makes another trial."""
         key = self.key(trial)
         listed = [key.parent / record.file for record in _key_table(key).withheld]
         return _hash([*sorted(p for p in self.campaign(trial).rglob("*") if p.is_file()), key, *listed])
@@ -114,27 +114,27 @@ class ExternalBench(BenchFolder):
         )
 
     def names(self) -> list[str]:
-        """Return the names of all campaigns, after a look at every key: what cannot be scored is told before any work.
+        """Return the names of all campaigns, after a check of every key, so that errors in keys are reported before any work.
 
         Raises
         ------
         InputError
-            If a folder is missing or holds no campaign, or a key is missing, cannot be used, or lies where a diagnosis sees it.
+            If a folder is missing or contains no campaign, or a key is missing, cannot be used, or lies inside a campaign.
         """
         for folder, option in ((self.campaigns, "--campaigns"), (self.sealed, "--keys")):
             if not folder.is_dir():
-                raise InputError(f"{folder} is no folder. Name one with {option}.")
+                raise InputError(f"{folder} is not a folder. Name a folder with {option}.")
         found = sorted(f.name for f in self.campaigns.iterdir() if (f / _CAMPAIGN).is_file())
         if not found:
             raise InputError(
-                f"No folder in {self.campaigns} holds a {_CAMPAIGN}. Put each campaign into a folder of its own there."
+                f"No folder in {self.campaigns} contains a {_CAMPAIGN}. Put each campaign into its own subfolder there."
             )
         without = [name for name in found if not self.key(name).is_file()]
         if without:
             listed = ", ".join(f"{name}.json" for name in without[:10])
             raise InputError(
-                f"{self.sealed} lacks the key of {len(without)} of {len(found)} campaigns: {listed}. "
-                f"The least that one holds is {_LEAST}."
+                f"Keys of {len(without)} of {len(found)} campaigns are missing in {self.sealed}: {listed}. "
+                f"The smallest key is {_LEAST}."
             )
         for name in found:
             if self.sealed.resolve().is_relative_to(self.campaign(name).resolve()):
@@ -182,7 +182,7 @@ class ExternalBench(BenchFolder):
         return listed_rig(path, table.rig, where)
 
     def settle_here(self) -> None:
-        """Write down whose campaigns these are, or check that the folder holds no drawn bench.
+        """Record in the folder which campaigns these are, or check that it does not contain a drawn bench.
 
         Raises
         ------
@@ -198,13 +198,13 @@ class ExternalBench(BenchFolder):
         }
         if self.settings.exists() and (found := read_json(self.settings)).get("design") != EXTERNAL:
             raise InputError(
-                f"{self.path} holds a blind bench with {described(found)}. Name another folder with --out."
+                f"{self.path} already contains a blind bench with {described(found)}. Name another folder with --out."
             )
         write_together(self.settings.parent, {SETTINGS_FILE: json_text(wanted)})
 
 
 def _key_table(path: Path) -> KeyTable:
-    data = json_object(path, "key", f"The least that a key holds is {_LEAST}.")
+    data = json_object(path, "key", f"The smallest key is {_LEAST}.")
     return checked_file(Where(path.name, data), data, KeyTable)
 
 
@@ -219,7 +219,7 @@ def _check_effects(path: Path, table: KeyTable, rig: Rig) -> None:
     distinct = len(set(table.effects if rig.has_one_motion else named))
     wrong_count = not least <= len(table.effects) <= most or distinct < len(table.effects)
     if wrong_count or (table.kind == "outside" and not foreign):
-        raise InputError(f'{path.name}: effects: got {got}; kind "{table.kind}" asks for {words}.')
+        raise InputError(f'{path.name}: effects: got {got}; kind "{table.kind}" requires {words}.')
     if table.kind != "outside" and foreign:
         raise InputError(
             f"{path.name}: effects: '{foreign[0]}' is not in the catalogue.{nearest(foreign[0], known)} "
@@ -239,7 +239,7 @@ def _check_effects(path: Path, table: KeyTable, rig: Rig) -> None:
             raise InputError(f"{path.name}: where: is '{place}'.{nearest(place, places)} Allowed: {listed}.")
     for effect in of_catalogue:
         if not rig.offers(effect):
-            raise InputError(f"{path.name}: effects: {effect.name} makes no sense on the rig {rig.name}.")
+            raise InputError(f"{path.name}: effects: {effect.name} does not apply to the rig {rig.name}.")
     _check_names(path, "parameters", table.parameters, compose(rig, of_catalogue).names, bool(foreign))
     outputs = [signal.name for signal in rig.outputs]
     _check_names(path, "noise_floor", table.noise_floor, outputs, False)
@@ -255,7 +255,7 @@ def _allowed_places(
     if len(table.where or ()) != len(table.effects):
         raise InputError(
             f"{path.name}: where: got {', '.join(table.where or ()) or 'nothing'}; {rig.name} has several places, so the key "
-            f"says that of each effect in their order: {len(table.effects)} of {', '.join(anywhere)}."
+            f"must give the place of each effect, in the same order: {len(table.effects)} of {', '.join(anywhere)}."
         )
     return [rig.places(known[name].place) for name in table.effects]
 
@@ -267,12 +267,12 @@ def _check_names(
     for name in given:
         if name not in names and not others_too:
             raise InputError(
-                f"{path.name}: {key}.{name}: unknown here.{nearest(name, names)} Known: {', '.join(names)}."
+                f"{path.name}: {key}.{name}: unknown name.{nearest(name, names)} Known: {', '.join(names)}."
             )
 
 
 def _places(table: KeyTable, rig: Rig) -> list[str] | None:
-    """Return the places of the effects; None for one from outside, of which only the key could say it."""
+    """Return the places of the effects; None for an effect outside the catalogue, whose place only the key can give."""
     if table.kind == "outside":
         return None
     return sorted({rig.place_name(effect_named(name).place) for name in table.effects})

@@ -1,4 +1,4 @@
-"""Where does a blind bench keep campaigns, keys and results, so that a diagnosis sees the first alone?
+"""The folders of a blind bench: campaigns, keys and results; a diagnosis gets only the campaign.
 
 =====================  ==========================================================================
 ``campaigns/NNN/``     ``campaign.toml`` and records: all that a diagnosis gets
@@ -8,7 +8,7 @@
 ``blind.json``         the score, and ``blind.html`` the same as a page
 =====================  ==========================================================================
 
-A bench of campaigns that somebody else wrote has the last three alone; `NNN` is the campaign's name there.
+A bench of existing campaigns has only the last three entries; there `NNN` is the name of the campaign.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class BenchFolder:
         return self.keys / f"{trial}.json"
 
     def result(self, trial: str) -> Path:
-        """Return the folder of what a diagnosis left."""
+        """Return the folder of the results of a diagnosis."""
         return self.path / "results" / trial
 
     @property
@@ -65,7 +65,7 @@ class BenchFolder:
         return self.path / "keys" / SETTINGS_FILE
 
     def fingerprint(self, trial: str) -> str:  # noqa: ARG002
-        """Return what tells a campaign and its key from others of the same name; nothing where they are drawn."""
+        """Return the hash that distinguishes a campaign and its key from others of the same name; empty for drawn trials."""
         return ""
 
     def drawn(self, trial: str) -> bool:
@@ -94,7 +94,7 @@ class BenchFolder:
         key = read_json(self.key(trial))
         withheld = key["withheld"]
         if isinstance(withheld, dict):
-            # Keys of benches before trials.sqlite say the hold alone: a step was held, a multisine was not.
+            # Keys of older benches (before trials.sqlite) give only the hold: zoh for a step, otherwise a multisine.
             withheld = [
                 {
                     "file": f"{trial}_{name}.csv",
@@ -135,7 +135,7 @@ class BenchFolder:
             found = read_json(self.settings)
             if found != wanted:
                 raise InputError(
-                    f"{self.path} holds a blind bench with {described(found)}, asked for is one with "
+                    f"{self.path} already contains a blind bench with {described(found)}; the command asks for one with "
                     f"{described(wanted)}. Name another folder with --out."
                 )
             return
@@ -143,7 +143,7 @@ class BenchFolder:
         self.keys.chmod(_OWNER_ONLY)
 
     def write_trial(self, name: str, trial: Trial) -> None:
-        """Write campaign and withheld records, and the key behind them.
+        """Write the campaign and the withheld records, and the key last.
 
         Raises
         ------
@@ -176,7 +176,7 @@ def trial_name(number: int) -> str:
 def described(settings: dict[str, Any]) -> str:
     """Return which bench it is, in words."""
     if settings.get("design") == EXTERNAL:
-        return "campaigns of somebody else"
+        return "existing campaigns"
     return f"design {settings.get('design')} and seed {settings.get('seed')}"
 
 
@@ -191,9 +191,11 @@ def read_json(file: Path) -> dict[str, Any]:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{file} cannot be read: {error}. Remove it, and the bench makes it anew.") from None
+        raise InputError(
+            f"{file} cannot be read: {error}. Remove it; the bench then writes it again."
+        ) from None
     if not isinstance(content, dict):
-        raise InputError(f"{file} holds no JSON object. Remove it, and the bench makes it anew.")
+        raise InputError(f"{file} does not contain a JSON object. Remove it; the bench then writes it again.")
     return content
 
 
@@ -206,12 +208,12 @@ def _csv_text(trial: Trial, record: Record) -> str:
 
 
 def _amplitude_line(record: Record) -> str:
-    """Return nothing for a record that no input drives."""
+    """Return the line of the amplitude; empty for a record without input."""
     return "" if record.amplitude is None else f"\namplitude = {record.amplitude!r}"
 
 
 def _campaign_toml(trial: Trial) -> str:
-    """Return the same lines for every trial on one rig: only numbers differ."""
+    """Return the text of campaign.toml; for trials on one rig only the values differ."""
     rig = trial.linear.rig
     constants = "\n".join(f"{p.name} = {trial.linear.values[p.name]!r}" for p in rig.constants)
     parameters = "\n".join(f"{p.name} = {trial.given[p.name]!r}" for p in rig.parameters)

@@ -1,4 +1,4 @@
-"""How does a process end when the one that started it is gone, killed before it could say so?"""
+"""End a process when its parent has ended, also if the parent was killed."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _LOOK_AGAIN = 1.0
 
 
 def end_with_parent(place: str | None = None) -> None:
-    """Ask this process to end as soon as another one has become its parent; where that cannot be seen, do nothing.
+    """End this process as soon as its parent process has changed; do nothing on systems where this cannot be observed.
 
     Parameters
     ----------
     place
-        Folder to remove then: a temporary one that only the parent would have removed.
+        Temporary folder to remove then, which otherwise only the parent would have removed.
     """
     if os.name != "nt":
         threading.Thread(target=_watch, args=(os.getppid(), place), daemon=True).start()

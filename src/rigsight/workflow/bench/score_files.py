@@ -1,4 +1,4 @@
-"""How do the outcomes of one bench or of several become `blind.json` and `blind.html`?"""
+"""Write the outcomes of one or several benches as `blind.json` and `blind.html`."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from rigsight.workflow.run.versions import versions
 BLIND_FILE = "blind.json"
 PAGE_FILE = "blind.html"
 MOST_LISTED = 2_000
-"""Trials up to which ``blind.json`` holds every outcome; beyond, the rows of ``trials.sqlite`` do."""
+"""Largest number of trials for which ``blind.json`` contains every outcome; beyond, only ``trials.sqlite`` does."""
 _DETAILS = ("withheld", "parameters", "version", "fingerprint", "right")
-"""What a wrong trial is listed without."""
+"""Fields that are left out in the list of wrong trials."""
 
 
 @dataclass(frozen=True)
 class Scored:
-    """An outcome and the bench it is of."""
+    """An outcome and its bench."""
 
     outcome: Outcome
     folder: Path
@@ -99,7 +99,7 @@ def score_bench(folder: Path, store: TrialStore, command: str) -> dict[str, Any]
 
 @collector_paused()
 def merge(benches: Sequence[str | Path], out: str | Path, command: str = "rigsight blind") -> dict[str, Any]:
-    """Score several benches as one; a trial that more than one of them holds counts once, as the first has it.
+    """Score several benches as one; a trial that is in more than one of them counts once, with the outcome of the first.
 
     Parameters
     ----------
@@ -122,12 +122,12 @@ def merge(benches: Sequence[str | Path], out: str | Path, command: str = "rigsig
         file = bench / STORE_FILE
         if not file.is_file():
             raise InputError(
-                f"{bench} holds no scored trials ({STORE_FILE}). Score what is diagnosed there with "
+                f"{bench} contains no scored trials ({STORE_FILE}). Score its diagnosed trials with "
                 f"'rigsight blind --rescore --out {shlex.quote(str(bench))}'."
             )
         if bench.resolve() == target.resolve():
             raise InputError(
-                f"The score of all would replace that of {bench}. Name another folder with --out."
+                f"The combined score would overwrite the score of {bench}. Name another folder with --out."
             )
         with TrialStore(file) as store:
             for outcome in store.outcomes():
@@ -142,7 +142,7 @@ def _settings(bench: Path) -> dict[str, Any]:
 
 
 def _wrong(one: Scored, out: Path, settings: dict[str, Any]) -> dict[str, Any]:
-    """Return a wrong trial with the place of its report, seen from the score, and the command that runs it alone."""
+    """Return a wrong trial with the path of its report, relative to the score, and the command that runs this trial alone."""
     report = BenchFolder(one.folder).result(one.outcome.trial) / REPORT_FILE
     shown = [field.name for field in fields(Outcome) if field.name not in _DETAILS]
     return {

@@ -1,4 +1,4 @@
-"""How is one diagnosed trial scored? Its key is opened, and its model is simulated on the withheld records."""
+"""Scoring of one diagnosed trial: its key is opened, and its model is simulated on the withheld records."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from rigsight.workflow.run.results import DIAGNOSIS_FILE
 
 
 def score_trial(folder: BenchFolder, name: str) -> Outcome:
-    """Open the key of a diagnosed trial and hold the diagnosis against it.
+    """Open the key of a diagnosed trial and compare the diagnosis with it.
 
-    Where the key says neither noise floor nor gap, those that the diagnosis found take their place.
+    If the key gives no noise floor or gap, those of the diagnosis are used.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def score_trial(folder: BenchFolder, name: str) -> Outcome:
 
 
 def _reidentified_gap(diagnosis: Mapping[str, Any]) -> float | None:
-    """Return what the re-identified equations leave on the scored records, in units of the diagnosis' noise floor."""
+    """Return the error of the re-identified equations on the scored records, in units of the diagnosis' noise floor."""
     ratios = [
         gap["reidentified"] / gap["noise_floor"]
         for gap in diagnosis["gap"].values()
@@ -92,7 +92,7 @@ def _error(model: Model, record: Record, floor: Mapping[str, float]) -> float | 
 def _residuals(model: Model, record: Record, noise: Mapping[str, float]) -> dict[str, NDArray[np.float64]]:
     """Return measured minus predicted by output, from the input alone.
 
-    The phase of a disturbance from outside is in no input: where the model has one, the initial state is estimated.
+    The phase of an external disturbance follows from no input: if the model has one, the initial state is estimated.
     """
     names = [signal.name for signal in model.structure.rig.outputs if signal.name in record.signals]
     if not any(effect.place is Place.DISTURBANCE for effect in model.effects):

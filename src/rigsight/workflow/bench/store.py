@@ -1,4 +1,4 @@
-"""How are the outcomes of 100,000 trials kept, so that a process killed at any moment loses none and doubles none?
+"""The outcomes of up to 100,000 trials on disk; a process that is killed at any moment loses none and duplicates none.
 
 One row per trial in one SQLite file; a row is written in a transaction of its own. Numbers, texts and answers are columns,
 lists are JSON text.
@@ -51,7 +51,7 @@ PRIMARY KEY (design, seed, trial))"""
 
 @contextlib.contextmanager
 def collector_paused() -> Iterator[None]:
-    """Keep the collector from looking through millions of new objects again and again while many rows are read and counted."""
+    """Pause garbage collection, which would repeatedly scan millions of new objects, while many rows are read and counted."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -99,7 +99,7 @@ class TrialStore:
             self._connection.close()
             raise InputError(
                 f"{self._path} was written by another version of rigsight (format {version}, this one writes {SCHEMA_VERSION}). "
-                "Remove it, and 'rigsight blind --rescore' scores the trials anew from their results."
+                "Remove it; 'rigsight blind --rescore' then scores the trials again from their results."
             )
 
     def __enter__(self) -> TrialStore:
@@ -157,11 +157,11 @@ class TrialStore:
     def _told(self, error: sqlite3.Error) -> InputError:
         if getattr(error, "sqlite_errorname", "").startswith(_OF_THE_DISK):
             return MachineError(
-                f"{self._path} cannot be written: {error}. Make room there; the same command goes on from here."
+                f"{self._path} cannot be written: {error}. Free disk space there; the same command continues from here."
             )
         return InputError(
-            f"{self._path} cannot be used: {error}. If it is damaged, remove it: 'rigsight blind --rescore' scores the trials "
-            "anew from their results."
+            f"{self._path} cannot be used: {error}. If it is damaged, remove it; 'rigsight blind --rescore' then scores the "
+            "trials again from their results."
         )
 
 

@@ -1,4 +1,4 @@
-"""How is one blind trial drawn, and diagnosed in a process that gets its campaign and nothing else?"""
+"""Draw one blind trial, and diagnose it in a process that gets only its campaign."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _KEPT_VARIABLES = (
     "XDG_CACHE_HOME",
     "RIGSIGHT_CACHE_DIR",
 )
-"""What a diagnosing process needs of its surroundings; nothing else of them reaches it."""
+"""Environment variables that the process of a diagnosis gets; it gets no others."""
 _FAILURES = (1, 2)
-"""Exit codes of a diagnosis that ended by itself; any other end says nothing about the trial."""
+"""Exit codes of a diagnosis that ended by itself; other exit codes say nothing about the trial."""
 MACHINE = 75
-"""Exit code of one that this machine did not let work: a full disk, too little memory."""
+"""Exit code of a diagnosis that failed because of this machine: a full disk, too little memory."""
 
 
 def make_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> None:
@@ -53,7 +53,7 @@ def make_trial(folder: BenchFolder, design: Design, seed: int, number: int) -> N
 def diagnose_trial(folder: BenchFolder, name: str, start: Sequence[str]) -> None:
     """Diagnose a trial in a process of its own, unless that has been done.
 
-    The process works on a copy in a temporary folder, so that not even a path tells which trial it is or where keys are.
+    The process works on a copy in a temporary folder, so that not even its path reveals which trial it is or where the keys are.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def diagnose_trial(folder: BenchFolder, name: str, start: Sequence[str]) -> None
         if run.returncode not in (0, *_FAILURES):
             raise RigsightError(
                 f"The diagnosis of trial {name} was ended from outside (exit code {run.returncode}); "
-                "the same command takes the bench up again."
+                "the same command continues the bench."
             )
         seconds = time.perf_counter() - begin
         about = {
@@ -132,9 +132,9 @@ def _keep(found: Path, target: Path, about: dict[str, Any]) -> None:
 
 
 def _copy(folder: Path, target: Path) -> None:
-    """Copy a folder; unlike shutil.copytree, end with the first file that the disk does not take, and with its error.
+    """Copy a folder; unlike shutil.copytree, stop at the first file that cannot be written and raise its error.
 
-    Times of files stay behind: those of a campaign tell how long its parts were simulated.
+    File times are not copied: those of a campaign would reveal how long its parts were simulated.
     """
     target.mkdir()
     for path in sorted(folder.iterdir()):

@@ -1,1 +1,1 @@
-"""Campaigns and models: from files or memory to checked records and the simulation in question; and how a campaign is begun."""
+"""Campaigns and models: from files or memory to checked records and the given simulation; and drafts of new campaigns."""

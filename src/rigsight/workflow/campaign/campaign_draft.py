@@ -1,4 +1,4 @@
-"""How is a `campaign.toml` written from the measured files of a folder, and which of them become its records?"""
+"""Draft a `campaign.toml` from the measured files of a folder."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def measured_files(folder: Path) -> list[Path]:
 def proposed_records(
     files: Sequence[Path], rigs: Sequence[Rig]
 ) -> tuple[list[Proposal], list[tuple[str, str]]]:
-    """Return every file as a record of one rig, and the files that are none with the reason.
+    """Return every file as a record of one rig, and the files that cannot be records with the reason.
 
     Parameters
     ----------
     files
         Measured files.
     rigs
-        Rigs that they may be of; the one that most of them fit is taken.
+        Possible rigs; the one that matches most of the files is taken.
     """
     found: dict[Path, Proposal] = {}
     left_out = []
@@ -45,7 +45,7 @@ def proposed_records(
         try:
             with open_measurement(file) as opened:
                 if not opened.channels:
-                    raise InputError(f"{file.name} holds no signal over time.")
+                    raise InputError(f"{file.name} contains no signal over time.")
                 found[file] = propose(file, opened, rigs)
         except InputError as error:
             left_out.append((file.name, str(error).removeprefix(file.name).lstrip(":, ")))
@@ -91,7 +91,7 @@ def campaign_text(
     others
         Rigs that it was chosen from, where it is a guess.
     values
-        Parameters of the simulation in question, where they are known.
+        Parameters of the given simulation, where they are known.
     proposals
         Its records.
     left_out
@@ -100,10 +100,10 @@ def campaign_text(
     open_constants = [constant for constant in rig.constants if constant.default is None]
     n_blanks = len(open_constants) + sum(proposal.n_blanks for proposal in proposals)
     lines = [
-        "# Written by rigsight init from the files of this folder. What stands behind a # was guessed: check it.",
+        "# Written by rigsight init from the files of this folder. Comments (#) mark guessed values: check them.",
     ]
     if n_blanks:
-        lines.append(f"# What could not be guessed reads {BLANK} ({_times(n_blanks)}): fill it in.")
+        lines.append(f"# Replace each {BLANK} ({_times(n_blanks)}): these values could not be guessed.")
     lines += ["", f"title = {quoted(folder.resolve().name)}", "", *_rig_lines(folder, rig, file, others)]
     if rig.constants and (values is None or open_constants):
         lines += ["", "[rig.constants]"]
@@ -114,7 +114,7 @@ def campaign_text(
             )
     lines += [
         "",
-        "[rig.parameters]  # the simulation in question; what stays a comment is identified from the records",
+        "[rig.parameters]  # values of the given simulation; parameters left as comments are identified from the records",
     ]
     known = values or {}
     lines += [
@@ -126,7 +126,7 @@ def campaign_text(
     for proposal, (role, remark) in zip(proposals, _roles(proposals), strict=True):
         lines += ["", proposal.toml(role, remark).rstrip("\n")]
         if values is not None and rig.inputs:
-            lines.append('hold = "zoh"  # a controller holds its command until the next one')
+            lines.append('hold = "zoh"  # the controller holds each command until the next one')
     if left_out:
         lines += ["", "# Not used:"]
         lines += [f"# {name}: {' '.join(_printable(reason).split())}" for name, reason in left_out]
@@ -137,14 +137,17 @@ def _roles(proposals: Sequence[Proposal]) -> list[tuple[Role, str]]:
     """Return the role of every record with a remark: validation by name, or else the last."""
     if len(proposals) == 1:
         return [
-            ("estimation", "measure a second one for validation: only what was not fitted can be trusted")
+            ("estimation", "measure a second record for validation: errors of fitted records are too small")
         ]
     scored = [bool(_SCORED.search(Path(proposal.file).stem)) for proposal in proposals]
     if any(scored) and not all(scored):
-        return [("validation", "by its name; check") if named else ("estimation", "") for named in scored]
+        return [
+            ("validation", "guessed from the file name; check") if named else ("estimation", "")
+            for named in scored
+        ]
     last = len(proposals) - 1
     return [
-        ("validation", "never fitted, only scored; guessed, choose which")
+        ("validation", "not fitted, only scored; guessed, choose any of the records")
         if i == last
         else ("estimation", "")
         for i in range(len(proposals))
@@ -152,15 +155,15 @@ def _roles(proposals: Sequence[Proposal]) -> list[tuple[Role, str]]:
 
 
 def _rig_lines(folder: Path, rig: Rig, file: Path | None, others: Sequence[str]) -> list[str]:
-    """Return the lines that say which rig it is; `others` are the ones it was chosen from, if it is a guess."""
+    """Return the lines that name the rig; `others` are the other possible rigs if it was guessed."""
     remark = f"# {rig.summary}"
     if others:
         remark = (
             f"# guessed from the channels: {rig.summary} Others: {', '.join(others)} (init --model); or a rig file of your own: "
-            'file = "..." instead (rigsight rigs NAME prints one to begin with)'
+            'file = "..." instead (rigsight rigs NAME prints one to start from)'
         )
     bodies = rig.mechanism.bodies
-    simulator = [] if bodies is None else [f'simulator = "{bodies.kind}"  # it moves the bodies']
+    simulator = [] if bodies is None else [f'simulator = "{bodies.kind}"  # simulates the bodies']
     if file is None:
         return ["[rig]", f'model = "{rig.name}"  {remark}', *simulator]
     inside = file.resolve().relative_to(folder.resolve()).as_posix()
@@ -172,5 +175,5 @@ def _times(count: int) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a line without the signs that TOML forbids in comments."""
+    """Return a line without the characters that TOML forbids in comments."""
     return "".join(sign if sign == "\t" or sign.isprintable() else " " for sign in text)

@@ -1,4 +1,4 @@
-"""What may stand in a `campaign.toml`, and how is a user told what does not belong there?"""
+"""The allowed contents of a `campaign.toml`, and the messages for what is not allowed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Seconds = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
 
 
 class FileTable(BaseModel):
-    """A table of a file that somebody wrote: unknown keys and numbers in quotes are mistakes."""
+    """A table of a file written by hand: unknown keys and numbers in quotes are errors."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -42,7 +42,7 @@ class ColumnTable(FileTable):
 
 
 class RigTable(FileTable):
-    """``[rig]``: which rig, what simulates it, the effects of the simulation in question, its constants and parameters."""
+    """``[rig]``: the rig, its simulator, and effects, constants and parameters of the given simulation."""
 
     model: str | None = None
     file: Annotated[str, Field(min_length=1)] | None = None
@@ -53,7 +53,7 @@ class RigTable(FileTable):
 
 
 class RecordTable(FileTable):
-    """``[[records]]``: one measured file, what it is for, how it is written, and what is known of the rig in it."""
+    """``[[records]]``: one measured file, its role and format, and constants of the rig in it."""
 
     file: Annotated[str, Field(min_length=1)]
     name: Annotated[str, Field(min_length=1)] | None = None
@@ -90,7 +90,7 @@ def locate(campaign: Path) -> Path:
         If there is none; a folder's other toml files are listed.
     """
     if not campaign.exists():
-        raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that holds one.")
+        raise InputError(f"{campaign} does not exist; name a campaign.toml or the folder that contains it.")
     if not campaign.is_dir():
         return campaign
     path = campaign / "campaign.toml"
@@ -100,9 +100,9 @@ def locate(campaign: Path) -> Path:
     mend = (
         f"Name one of its files: {others}."
         if others
-        else f"Write one beside the records; rigsight init {campaign} proposes it."
+        else f"Write one beside the records; 'rigsight init {campaign}' makes a draft."
     )
-    raise InputError(f"Folder {campaign} holds no campaign.toml. {mend}")
+    raise InputError(f"Folder {campaign} contains no campaign.toml. {mend}")
 
 
 def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
@@ -115,7 +115,9 @@ def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
     """
     try:
         if file_size(path, "the campaign.toml") > LARGEST_FILE:
-            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no campaign.toml.")
+            raise InputError(
+                f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB, so it is not a campaign.toml."
+            )
         text = path.read_text(encoding="utf-8-sig")
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -127,10 +129,10 @@ def read_campaign_table(path: Path) -> tuple[CampaignTable, Where]:
     except InputError:
         raise
     except RecursionError:
-        raise InputError(f"{path.name} is nested deeper than a campaign ever is.") from None
+        raise InputError(f"{path.name} is nested too deeply for a campaign.toml.") from None
     except ValueError:
-        # The only thing that is valid TOML and yet fails is a whole number of thousands of digits.
-        raise InputError(f"{path.name} holds a whole number with more digits than are read.") from None
+        # The only valid TOML that fails here is an integer with thousands of digits.
+        raise InputError(f"{path.name} contains an integer with too many digits to be read.") from None
     where = Where.of_toml(path.name, text, data)
     return checked_file(where, data, CampaignTable), where
 
@@ -154,7 +156,7 @@ def checked_file(where: Where, data: dict[str, Any], table: type[Checked]) -> Ch
 def _messages(
     where: Where, data: dict[str, Any], table: type[FileTable], problems: list[dict[str, Any]]
 ) -> list[str]:
-    """Return one line per mistake; an alternative that fails as a whole only repeats what another says in detail."""
+    """Return one line per error; if one alternative fails in detail, the errors of the other alternatives are left out."""
     keys = [_without_union_members(problem["loc"], data) for problem in problems]
     told = [
         _tell(where, data, table, problem)
@@ -167,8 +169,8 @@ def _messages(
 def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: dict[str, Any]) -> str:
     location = _without_union_members(problem["loc"], data)
     if not location:
-        # Only a key with half a sign in it belongs to no place.
-        return f"{where.name}: a key is no text: {shown(problem['input'])}. Use plain letters."
+        # Only a key with an unpaired surrogate has no location.
+        return f"{where.name}: a key is not valid text: {shown(problem['input'])}. Use plain letters."
     key = where.at(*location)
     kind, context, got = problem["type"], problem.get("ctx", {}), problem["input"]
     if kind == "extra_forbidden":
@@ -190,18 +192,18 @@ def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: d
         return f"{key}: must be a number, got {shown(got)}. Write numbers without quotes and units."
     if location == ("records",) and kind in ("too_short", "too_long"):
         count = len(got)
-        return f"{key}: {count} given, 1 to {MOST_RECORDS} allowed.{_how_to_write(location)}"
+        return f"{key}: {count} given, 1 to {MOST_RECORDS} are allowed.{_how_to_write(location)}"
     if location[-1] == "decimal":
         return f'{key}: must be "." or ",", got {shown(got)}.'
     if location[-1] == "header":
         return (
-            f"{key}: must be true, false, or the number of the line that holds the names, got {shown(got)}."
+            f"{key}: must be true, false, or the number of the line with the column names, got {shown(got)}."
         )
     if location[-1] == "separator":
-        return f"{key}: must be one character, got {shown(got)}; a blank stands for any white space."
+        return f"{key}: must be one character, got {shown(got)}; a blank means any white space."
     if "columns" in location[:-1]:
         return (
-            f"{key}: got {shown(got)}. Write the column's name, its number counted from 1, "
+            f"{key}: got {shown(got)}. Write the name of the column, its number counted from 1, "
             'or { name = "...", scale = 1.0, offset = 0.0 }, or { name = "...", unit = "mm" }.'
         )
     return (
@@ -210,7 +212,7 @@ def _tell(where: Where, data: dict[str, Any], table: type[FileTable], problem: d
 
 
 def _without_union_members(location: tuple[str | int, ...], data: dict[str, Any]) -> tuple[str | int, ...]:
-    """Drop the names of alternatives that pydantic puts into a location: no key of the file."""
+    """Drop the names of alternatives that pydantic puts into a location; they are not keys of the file."""
     kept: list[str | int] = []
     here: Any = data
     for i, part in enumerate(location):
@@ -244,12 +246,12 @@ def _how_to_write(location: tuple[str | int, ...]) -> str:
 
 
 def _mend(error: str) -> str:
-    """Return what to write, for the mistakes of TOML that campaigns see most."""
+    """Return a hint for the most frequent TOML errors in campaigns."""
     if "Cannot declare" in error or "Cannot overwrite" in error or "Cannot mutate" in error:
         return (
             "Every record begins with [[records]], in double brackets; its columns follow it under [records.columns]. "
-            "Other tables and keys stand once."
+            "Other tables and keys may occur only once."
         )
     if "Unescaped" in error and "\\" in error:
         return "Write paths with / instead of \\."
-    return "Texts stand in quotes, tables in [brackets]."
+    return "Texts are written in quotes, names of tables in [brackets]."

@@ -1,4 +1,4 @@
-"""Which simulation is in question: which rig, with which effects, constants and parameters, and are they ones it can have?"""
+"""The given simulation: its rig, effects, constants and parameters, checked for being complete and in range."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def rig_named(where: Where, name: str, known: Mapping[str, Rig]) -> Rig:
     """
     if name not in known:
         raise InputError(
-            f"{where.at('rig', 'model')}: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; a rig of your own is "
-            'named by its file: file = "my_rig.toml".'
+            f"{where.at('rig', 'model')}: is '{name}'.{nearest(name, known)} Allowed: {', '.join(known)}; for a rig of your own "
+            'give its file: file = "my_rig.toml".'
         )
     return known[name]
 
@@ -45,7 +45,7 @@ def checked_simulation(
     parameters: Mapping[str, float],
     of_records: Collection[str] = (),
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return constants and parameters of the simulation in question, all defaults filled in.
+    """Return constants and parameters of the given simulation, all defaults filled in.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def checked_simulation(
     constants, parameters
         Known numbers by name [SI].
     of_records
-        Constants that every record gives by itself, so that none is needed for all of them.
+        Constants that every record gives itself, so that no common value is needed.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _constants(
         gain = rig.motion.drive_gain
         if checked.get(str(gain)) == 0.0:
             raise InputError(
-                f"{where.at('rig', 'constants', str(gain))}: is 0, so that the input would drive nothing."
+                f"{where.at('rig', 'constants', str(gain))}: is 0, so the input would have no effect. Give a gain other than 0."
             )
     return {constant.name: checked[constant.name] for constant in rig.constants if constant.name in checked}
 
@@ -158,8 +158,8 @@ def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) 
         if parameter not in rig.parameters and parameter.name not in checked:
             if parameter.default is None:
                 raise InputError(
-                    f"{where.at('rig', 'parameters', parameter.name)}: is missing; the simulation is said to have an effect that "
-                    f"needs it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
+                    f"{where.at('rig', 'parameters', parameter.name)}: is missing; the effects of the given simulation "
+                    f"need it ({parameter.description} [{parameter.unit}]). Give its value, or remove the effect."
                 )
             checked[parameter.name] = parameter.default
     for effect in structure.effects:
@@ -173,7 +173,7 @@ def _parameters(where: Where, structure: Structure, given: Mapping[str, float]) 
     for alternative, determined in ((a.parameter.name, a.gives) for a in rig.alternatives):
         if alternative in checked and determined in checked:
             raise InputError(
-                f"{where.at('rig', 'parameters', alternative)}: stands beside {determined}, which it determines; "
-                "give one of the two."
+                f"{where.at('rig', 'parameters', alternative)}: cannot be given together with {determined}, which follows from "
+                "it; give one of the two."
             )
     return checked

@@ -1,4 +1,4 @@
-"""How do records and numbers that are in memory become a campaign or a model, without files?"""
+"""Make campaigns and models from records and values in memory, without files."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ def make_campaign(
     constants
         Known numbers of the rig by name [SI].
     parameters
-        The simulation whose gap is in question [SI]; what is missing is identified from the records.
+        Parameter values of the given simulation [SI]; missing ones are identified from the records.
     effects
         Effects that this simulation has already, by name or as declarations.
     title
         What a report calls the campaign; by default the name of the rig.
     offsets
-        ``"per_record"`` where each sensor has an offset of its own in each record: it is estimated and no part of a model.
+        ``"per_record"`` if each sensor has its own offset in each record: it is estimated and not part of the model.
 
     Raises
     ------
     InputError
-        Naming the number, effect, record or signal that cannot be used, and what is allowed.
+        Naming the value, effect, record or signal that cannot be used, and what is allowed.
 
     Examples
     --------
@@ -77,13 +77,13 @@ def make_campaign(
     )
     if all(record.role != "estimation" for record in records):
         raise InputError(
-            f'{called}: records: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
+            f'{called}: records: none has role = "estimation", so nothing can be fitted. Give at least one record this role.'
         )
     taken = [record.name for record in records]
     twice = sorted({name for name in taken if taken.count(name) > 1})
     if twice:
         raise InputError(
-            f"{called}: records: several are called '{twice[0]}'. Give every record a name of its own."
+            f"{called}: records: several have the name '{twice[0]}'. Give every record a different name."
         )
     check_option("offsets", offsets, get_args(Offsets))
     checked = tuple(_checked(called, record, found) for record in records)
@@ -106,7 +106,7 @@ def make_campaign(
 def make_model(
     rig: str | Rig, values: Mapping[str, float], effects: Sequence[str | Effect] = (), hold: Hold = "foh"
 ) -> Model:
-    """Make a model of numbers in memory.
+    """Make a model from values in memory.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def rig_of(rig: str | Rig) -> Rig:
     """
     if isinstance(rig, str):
         return RIGS[check_option("The rig", rig, RIGS)]
-    # The one of the same declaration that is known already, if there is one: its equations are made once.
+    # A rig with the same declaration is reused if there is one, so that its equations are derived only once.
     return rig_of_tables(rig.declaration, f"Rig '{rig.name}'") if rig.declaration else rig
 
 
@@ -170,7 +170,7 @@ def effects_of(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, 
     InputError
         Naming the nearest and all effects of the catalogue where a name is unknown.
     """
-    # A lone name is a sequence too, of letters.
+    # A single string is a sequence of letters too.
     given = (effects,) if isinstance(effects, str | Effect) else effects
     return tuple(effect if isinstance(effect, Effect) else effect_named(effect) for effect in given)
 
@@ -181,13 +181,12 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
     Raises
     ------
     InputError
-        If it lacks a signal that every record of the rig has, one of them never changes that must, or it has constants of another
-        rig.
+        If it lacks a required signal, a required signal never changes, or it has constants of another rig.
     """
     outputs = rig.required_outputs or tuple(s.name for s in rig.outputs if s.name in record)
     if not outputs:
         listed = ", ".join(signal.name for signal in rig.outputs)
-        raise InputError(f"Record '{record.name}' has none of the outputs {listed}; give one at least.")
+        raise InputError(f"Record '{record.name}' has none of the outputs {listed}; give at least one.")
     inputs = [signal.name for signal in rig.inputs]
     may_rest = record.kind == "operation" and record.amplitude is None
     must_move = {name: "input" for name in rig.moving_inputs if record.role == "estimation"}
@@ -199,8 +198,8 @@ def _checked(called: str, record: Record, rig: Rig) -> Record:
         if is_constant(record[name]) and name in must_move:
             raise InputError(
                 f"Record '{record.name}': the {must_move[name]} {name} never changes ({record[name][0]:g}), so nothing can "
-                "be learned from it. Check the signal, or leave the record out; a record of a rig that moves freely has the kind "
-                '"operation" and no amplitude.'
+                "be identified from it. Check the signal, or leave the record out. For a record of free motion, set kind = "
+                '"operation" and give no amplitude.'
             )
     checked_numbers(
         Where(f"{called}: record '{record.name}'"), ("constants",), rig, rig.constants, record.constants

@@ -1,4 +1,4 @@
-"""How does a record that a file lists become a checked `Record` of a rig's signals?"""
+"""Read a record that a file lists into a checked `Record` of the signals of a rig."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigsight.workflow.campaign.where import Location, Where
 
 
 def inside(path: Path, where: str, asked: str) -> Path:
-    """Return a file that another one names; a campaign that was sent to someone must not read what is none of its business.
+    """Return a file that another file names; it must lie in the same folder, so that a received campaign cannot read other files.
 
     Parameters
     ----------
@@ -37,12 +37,14 @@ def inside(path: Path, where: str, asked: str) -> Path:
     try:
         is_inside, exists = (folder / name).resolve().is_relative_to(folder), (folder / name).is_file()
     except (OSError, ValueError, RuntimeError):
-        # Longer than names may be, with a null or half a sign in it, or a link to itself.
-        raise InputError(f"{where}: is no file name that can be looked up: {shown(asked)}.") from None
+        # The name is too long, contains a null or an unpaired surrogate, or is a link to itself.
+        raise InputError(f"{where}: is not a valid file name: {shown(asked)}.") from None
     if name.is_absolute() or ".." in name.parts or not is_inside:
         is_link = not name.is_absolute() and ".." not in name.parts
-        how = "is a link that leaves" if is_link else "leaves"
-        raise InputError(f"{where}: '{asked}' {how} the campaign's folder; put the file beside {path.name}.")
+        how = "is a link to a file" if is_link else "lies"
+        raise InputError(
+            f"{where}: '{asked}' {how} outside the campaign's folder; put the file beside {path.name}."
+        )
     if not exists:
         files = [str(file.relative_to(folder)) for file in folder.iterdir() if file.is_file()]
         raise InputError(
@@ -78,7 +80,7 @@ def file_inside(path: Path, number: int, record: RecordTable, where: Where | Non
 def read_listed_record(
     path: Path, rig: Rig, number: int, record: RecordTable, file: Path, where: Where | None = None
 ) -> tuple[Record, ...]:
-    """Read a record as a file that lists it describes it, in stretches where its clock pauses.
+    """Read a record as described in the file that lists it; it is split where its clock pauses.
 
     Parameters
     ----------
@@ -128,7 +130,7 @@ def read_listed_record(
             beside=signals_beside(_own(rig)),
         )
     except InputError as error:
-        # What is wrong stands in the record's file, which the message names already.
+        # The error is in the record's file, which the message already names.
         raise InputError(f"{replace(where, data={}).at(*own)}: {error}") from None
 
 
@@ -143,7 +145,7 @@ def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict
         here = where.at(*own, "columns", signal)
         if signal not in known:
             raise InputError(
-                f"{here}: no signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
+                f"{here}: is not a signal of {rig.name}.{nearest(signal, known)} Signals: {', '.join(known)}."
             )
         try:
             if isinstance(column, str | int):
@@ -156,16 +158,18 @@ def _columns(where: Where, own: Location, rig: Rig, record: RecordTable) -> dict
 
 
 def _check_inputs(where: Where, own: Location, rig: Rig, record: RecordTable) -> None:
-    """Refuse constant values of what is no input, is recorded, or prescribes a motion."""
+    """Refuse constant values for signals that are not inputs, are recorded, or prescribe a motion."""
     names = [signal.name for signal in rig.inputs]
     for name in record.inputs:
         here = where.at(*own, "inputs", name)
         if name not in names:
             listed = ", ".join(names) or "none"
-            raise InputError(f"{here}: no input of {rig.name}.{nearest(name, names)} Inputs: {listed}.")
+            raise InputError(
+                f"{here}: is not an input of {rig.name}.{nearest(name, names)} Inputs: {listed}."
+            )
         if name in record.columns:
-            raise InputError(f"{here}: stands beside columns.{name}, which reads it; give one of the two.")
+            raise InputError(f"{here}: cannot be given together with columns.{name}; give one of the two.")
         if name not in rig.absent_inputs:
             raise InputError(
-                f"{here}: prescribes a motion of {rig.name}, which must be recorded. Map its column."
+                f"{here}: prescribes a motion of {rig.name} and must be recorded. Give its column under columns."
             )

@@ -1,4 +1,4 @@
-"""How does a `model.json` become a simulation, and what is a user told who wrote or edited one?"""
+"""Read a `model.json`, with messages for errors in files written or edited by hand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _GROUPS = ("constants", "parameters", "effect_parameters")
 
 
 class ModelTable(BaseModel):
-    """The whole file."""
+    """The contents of the file."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -49,37 +49,37 @@ def read_model(model: str | Path, own_effects: Iterable[Effect] = (), own_rigs: 
     Parameters
     ----------
     model
-        A ``model.json`` or the folder that holds one.
+        A ``model.json`` or the folder that contains one.
     own_effects
-        Effects that the model may name beside those known to everybody.
+        Effects that the model may name beside those of the catalogue and of installed packages.
     own_rigs
         Rigs that a model without a declaration of its own may name beside the built-in ones.
 
     Raises
     ------
     InputError
-        Naming file and key, or line and column, of what cannot be used, and the mend.
+        Naming file and key, or line and column, of what cannot be used, and how to correct it.
 
     Examples
     --------
     >>> import rigsight as rs
     >>> rs.read_model("diagnosis")
     Traceback (most recent call last):
-    rigsight.errors.InputError: diagnosis does not exist; name a model.json or the folder that holds one.
+    rigsight.errors.InputError: diagnosis does not exist; name a model.json or the folder that contains one.
     """
     path = _locate(Path(model))
     return _model(path, json_object(path, "model", _MEND), own_effects, own_rigs)
 
 
 def model_of(content: Mapping[str, Any], own_effects: Iterable[Effect] = ()) -> Model:
-    """Return the model that a result holds.
+    """Return the model in a result.
 
     Parameters
     ----------
     content
         What ``model.json`` would hold.
     own_effects
-        Effects that the model may name beside those known to everybody.
+        Effects that the model may name beside those of the catalogue and of installed packages.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def named_model(model: str | Path) -> Model:
     Parameters
     ----------
     model
-        A ``model.json``, the folder that holds one, or the name of a published set.
+        A ``model.json``, the folder that contains one, or the name of a published set.
 
     Raises
     ------
@@ -115,8 +115,8 @@ def named_model(model: str | Path) -> Model:
     sets = published_sets()
     if str(model) not in sets:
         raise InputError(
-            f"'{model}' is neither a {MODEL_FILE}, nor a folder that holds one, nor a published set.{nearest(str(model), sets)} "
-            f"Published sets: {', '.join(sets)}."
+            f"'{model}' is neither a {MODEL_FILE}, nor a folder that contains one, nor a published set."
+            f"{nearest(str(model), sets)} Published sets: {', '.join(sets)}."
         )
     found = sets[str(model)]
     structure = structure_named(found.rig, [effect_named(name) for name in found.effects])
@@ -125,13 +125,13 @@ def named_model(model: str | Path) -> Model:
 
 def _locate(model: Path) -> Path:
     if not model.exists():
-        raise InputError(f"{model} does not exist; name a {MODEL_FILE} or the folder that holds one.")
+        raise InputError(f"{model} does not exist; name a {MODEL_FILE} or the folder that contains one.")
     if not model.is_dir():
         return model
     path = model / MODEL_FILE
     if not path.is_file():
         raise InputError(
-            f"Folder {model} holds no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
+            f"Folder {model} contains no {MODEL_FILE}. 'rigsight diagnose' writes one into its --out folder."
         )
     return path
 
@@ -154,7 +154,7 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
     if kind == "missing":
         return f"{start}is missing."
     if key == "schema_version":
-        return f"{start}is {shown(got)}, this version reads {SCHEMA_VERSION}. Use the rigsight that wrote the model."
+        return f"{start}is {shown(got)}, this version reads {SCHEMA_VERSION}. Use the version of rigsight that wrote the model."
     if kind == "literal_error":
         options = str(problem["ctx"]["expected"]).replace(" or ", ", ")
         return f"{start}is {shown(got)}. Allowed: {options}."
@@ -167,7 +167,7 @@ def _tell(path: Path, problem: dict[str, Any]) -> str:
 
 
 def _rig(path: Path, table: ModelTable, own_rigs: Iterable[Rig]) -> Rig:
-    """Return the rig that a model declares, or names."""
+    """Return the rig that a model declares or names."""
     if table.declaration:
         rig = declared_rig(table.rig, table.declaration, f"{path.name}: declaration")
         assert rig is not None
@@ -180,7 +180,7 @@ def _rig(path: Path, table: ModelTable, own_rigs: Iterable[Rig]) -> Rig:
     if table.rig not in known:
         raise InputError(
             f"{path.name}: rig: is '{table.rig}'.{nearest(table.rig, known)} Allowed: {', '.join(known)}, or a rig of your "
-            "own whose tables stand under 'declaration'."
+            "own whose tables are given under 'declaration'."
         )
     return known[table.rig]
 
@@ -229,7 +229,7 @@ def _values(path: Path, structure: Structure, table: ModelTable) -> dict[str, fl
                 raise InputError(f"{path.name}: {group}.{name}: {error}") from None
     if missing:
         raise InputError(
-            f"{path.name}: {_described(structure)} needs {', '.join(missing)}; give a number for each."
+            f"{path.name}: {_described(structure)} needs {', '.join(missing)}; give a value for each."
         )
     _check_units(path, structure, table)
     return {name: values[name] for name in structure.names}
@@ -241,7 +241,7 @@ def _described(structure: Structure) -> str:
 
 
 def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
-    """Refuse another unit than the one the number is taken in: nothing is converted by it."""
+    """Refuse any unit other than the SI unit of the parameter, because values are not converted."""
     units = {p.name: p.unit for p in structure.parameters}
     for name, unit in table.units.items():
         if name not in units:
@@ -250,5 +250,5 @@ def _check_units(path: Path, structure: Structure, table: ModelTable) -> None:
             )
         if unit != units[name]:
             raise InputError(
-                f"{path.name}: units.{name}: is '{unit}', but numbers are taken in '{units[name]}'. Convert the value instead."
+                f"{path.name}: units.{name}: is '{unit}', but values must be in '{units[name]}'. Convert the value."
             )

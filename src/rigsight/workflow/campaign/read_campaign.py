@@ -1,4 +1,4 @@
-"""How is a `campaign.toml` read, with its rig and all its records, and what of it is worth a note?"""
+"""Read a `campaign.toml` with its rig and all its records, and collect notes on it."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ def read_campaign(
     campaign
         The toml file or its folder.
     own_effects
-        Effects that the simulation in question may have beside those of the catalogue.
+        Effects that the given simulation may have beside those of the catalogue.
     own_rigs
         Rigs that it may name beside the built-in ones.
 
     Raises
     ------
     InputError
-        Naming file and key, or file, line and column, of what cannot be used, and the mend.
+        Naming file and key, or file, line and column, of what cannot be used, and how to correct it.
 
     Examples
     --------
     >>> import rigsight as rs
     >>> rs.read_campaign("measurements/march")
     Traceback (most recent call last):
-    rigsight.errors.InputError: measurements/march does not exist; name a campaign.toml or the folder that holds one.
+    rigsight.errors.InputError: measurements/march does not exist; name a campaign.toml or the folder that contains it.
     """
     path = locate(Path(campaign))
     table, where = read_campaign_table(path)
@@ -63,7 +63,7 @@ def read_campaign(
     )
     if all(record.role != "estimation" for record in table.records):
         raise InputError(
-            f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one that role.'
+            f'{where.at("records")}: none has role = "estimation", so nothing can be fitted. Give at least one record this role.'
         )
     files = [file_inside(path, number, record, where) for number, record in enumerate(table.records, 1)]
     read = [
@@ -109,7 +109,9 @@ def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig
         If not exactly one of ``model`` and ``file`` is given, there is no such rig, or its file cannot be used.
     """
     if table.model is not None and table.file is not None:
-        raise InputError(f"{where.at('rig', 'file')}: stands beside rig.model; give one of the two.")
+        raise InputError(
+            f"{where.at('rig', 'file')}: cannot be given together with rig.model; give one of the two."
+        )
     if table.file is not None:
         rig = read_rig_file(inside(path, where.at("rig", "file"), table.file))
     elif table.model is not None:
@@ -121,27 +123,27 @@ def listed_rig(path: Path, table: RigTable, where: Where, own_rigs: Iterable[Rig
 
 
 def _check_simulator(rig: Rig, table: RigTable, where: Where) -> None:
-    """Refuse a campaign that says otherwise than its rig what simulates it: an FMU is a program that is run."""
+    """Refuse a campaign whose simulator is not that of its rig file: external simulators such as an FMU execute code."""
     bodies = rig.mechanism.bodies
     own = None if bodies is None else bodies.kind
     if table.simulator == own:
         return
     if own is None:
         raise InputError(
-            f"{where.at('rig', 'simulator')}: is '{table.simulator}', but the rig's own equations move it. Take the line out, or "
-            "give the rig file a [simulator]."
+            f"{where.at('rig', 'simulator')}: is '{table.simulator}', but the rig is simulated by its own equations. Remove the "
+            "line, or add a [simulator] to the rig file."
         )
     got = "is missing" if table.simulator is None else f"is '{table.simulator}'"
     key = where.at("rig", "simulator") if table.simulator is not None else where.at("rig")
     raise InputError(
-        f'{key}: simulator {got}; the rig file leaves its bodies to {own}: write simulator = "{own}".'
+        f'{key}: simulator {got}, but the rig file simulates its bodies with {own}: write simulator = "{own}".'
     )
 
 
 def of_first_record(
     rig: Rig, known: Mapping[str, float], records: Sequence[Record]
 ) -> tuple[dict[str, float], str]:
-    """Return all constants, those that only records give with the value of the first, and a note on these.
+    """Return all constants; one that only the records give has the value of the first record, which a note reports.
 
     Parameters
     ----------
@@ -160,12 +162,12 @@ def of_first_record(
     listed = ", ".join(f"{name} = {value:g}" for name, value in first.items())
     return (
         constants,
-        f"Each record has its own {', '.join(first)}; models are written with those of the first, {listed}.",
+        f"Each record has its own {', '.join(first)}; models are written with the values of the first record, {listed}.",
     )
 
 
 def _with_distinct_names(read: Sequence[tuple[RecordTable, Record]]) -> tuple[Record, ...]:
-    """Give every record a name of its own: results are keyed by it."""
+    """Give every record a unique name, which is its key in results."""
     taken = {asked.name for asked, _ in read if asked.name is not None}
     named: list[Record] = []
     used: set[str] = set()

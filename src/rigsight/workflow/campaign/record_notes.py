@@ -1,4 +1,4 @@
-"""What is noticed about the records of a campaign before any fit: do they belong together, and do they prove anything?"""
+"""Checks of the records of a campaign before any fit: consistent units and sample times, and independent validation records."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from rigsight.records.unit_mismatch import unit_mismatch
 from rigsight.rigs import Rig
 
 _SMALLEST_SHARE, _LARGEST_SHARE = 200.0, 4.0
-"""How far the amplitude of an input may lie below and above half its range: one line of many, and a step counted from rest."""
+"""Factors by which a stated amplitude may lie below and above half the input's range (one line of many; a step from rest)."""
 _RATES_APART = 100.0
-"""Ratio of sample times from which they are asked about."""
+"""Ratio of sample times from which a note asks about their units."""
 
 
 def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str, ...]:
-    """Return a sentence for everything that is noticed.
+    """Return a sentence for each finding.
 
     Parameters
     ----------
     called
-        How messages call the campaign: by its file, or by its title.
+        Name of the campaign in messages: its file or its title.
     rig
         The rig.
     records
@@ -36,7 +36,7 @@ def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str,
     ]
     if all(record.role != "validation" for record in records):
         found.append(
-            f'{called}: no record has role = "validation"; errors are those of the records that were fitted, and too good.'
+            f'{called}: no record has role = "validation"; all errors are of fitted records and therefore too small.'
         )
     return tuple(found)
 
@@ -46,8 +46,8 @@ def _fitted_again(file: str, records: Sequence[Record]) -> Iterator[str]:
         for fitted in (record for record in records if record.role == "estimation"):
             if _holds_same_samples(scored, fitted):
                 yield (
-                    f"{file}: '{scored.name}' is for validation and holds the very samples of '{fitted.name}', which is fitted: "
-                    "its error proves nothing. Name another file."
+                    f"{file}: the validation record '{scored.name}' has exactly the samples of '{fitted.name}', which is fitted: "
+                    "it validates nothing. Name another file."
                 )
 
 
@@ -58,7 +58,7 @@ def _holds_same_samples(record: Record, other: Record) -> bool:
 
 
 def _rates_apart(records: Sequence[Record]) -> Iterator[str]:
-    """Ask about sample times that are so far apart that the time of one record is probably in another unit."""
+    """Ask about sample times that differ so much that the time of one record is probably in another unit."""
     finest, coarsest = (choose(records, key=lambda record: record.dt) for choose in (min, max))
     if coarsest.dt >= _RATES_APART * finest.dt:
         yield (
@@ -76,19 +76,19 @@ def _other_units(rig: Rig, records: Sequence[Record]) -> Iterator[str]:
             if found is not None:
                 larger, smaller, ratio = found
                 yield (
-                    f"At the same frequencies '{output.name}' moves {ratio:.3g} times as far for the same '{source.name}' in "
-                    f"record '{larger.name}' as in '{smaller.name}'. Is one of the two signals in another unit there? Then say "
-                    f'which, for instance {output.name} = {{ name = "...", unit = "..." }}.'
+                    f"At the same frequencies '{output.name}' moves {ratio:.3g} times as far per unit of '{source.name}' in "
+                    f"record '{larger.name}' as in '{smaller.name}'. Is one of the two signals in another unit there? Then give "
+                    f'its unit, for instance {output.name} = {{ name = "...", unit = "..." }}.'
                 )
                 break
 
 
 def _other_amplitude(record: Record, rig: Rig) -> Iterator[str]:
-    """Ask about a stated amplitude that cannot be that of the input, as a peak, an RMS or that of a line."""
+    """Ask about a stated amplitude that fits neither the peak nor the RMS nor a line of the input."""
     stated, halves = record.amplitude, {s.name: 0.5 * float(np.ptp(record[s.name])) for s in rig.inputs}
     moving = {name: half for name, half in halves.items() if half > 0.0}
     if stated is None or not moving:
         return
     if not any(half / _SMALLEST_SHARE <= abs(stated) <= _LARGEST_SHARE * half for half in moving.values()):
-        listed = " and ".join(f"'{name}' moves by {half:.3g}" for name, half in moving.items())
-        yield f"Record '{record.name}': amplitude = {stated:g}, but {listed} to each side. Is one of them in another unit?"
+        listed = " and ".join(f"half the range of '{name}' is {half:.3g}" for name, half in moving.items())
+        yield f"Record '{record.name}': amplitude = {stated:g}, but {listed}. Is one of them in another unit?"

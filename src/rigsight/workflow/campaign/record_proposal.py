@@ -1,4 +1,4 @@
-"""How is a measured file written into a campaign, and what of it was guessed?"""
+"""Draft the entry of a measured file in a campaign, with comments on what was guessed."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from rigsight.rigs import Rig
 from rigsight.workflow.campaign.signal_guesses import FileGuess, Guess, guess_file, telling
 
 BLANK = '"FILL IN"'
-"""Stands where nothing could be guessed; a diagnosis refuses it by the key's name."""
+"""Written where nothing could be guessed; a diagnosis refuses it and names the key."""
 _LISTED = 12
 _COARSE = 0.5
-"""Sample time [s] from which the unit of time is asked about."""
+"""Sample time [s] from which a comment asks about the unit of time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Proposal:
     file
         Its name, as the campaign is to call it.
     guess
-        Which channels its signals probably are.
+        The probable channel of each signal.
     kind, amplitude
         What probably drove the rig.
     lines
@@ -84,7 +84,7 @@ def propose(path: Path, file: ChannelFile, rigs: Iterable[Rig], name: str | None
     """
     is_text = file.format == "delimited text"
     guess = guess_file(file.channels, is_text, rigs)
-    # Of several inputs none alone says what drove the rig.
+    # With several inputs, the kind cannot be guessed from one of them.
     driven = guess.signals[0] if len(guess.rig.inputs) == 1 else None
     kind: Kind = "operation"
     amplitude = None
@@ -125,12 +125,12 @@ def _in_si(samples: NDArray[np.float64], guess: Guess) -> NDArray[np.float64]:
 
 
 def _timing(guess: FileGuess) -> tuple[list[str], int]:
-    """Return the keys that say where time comes from beside columns, and the number of blanks."""
+    """Return the keys of timing other than the time column, and the number of blanks."""
     found = [one.channel for one in guess.signals if one.channel is not None]
     if guess.time.is_clear or guess.time.candidates:
         return [], 0
     if not found or any(channel.axis is None for channel in found):
-        return [f"dt = {BLANK}  # sample time [s]: no channel looks like time"], 1
+        return [f"dt = {BLANK}  # sample time [s]: no channel of time was found"], 1
     steps = []
     for channel in found:
         with suppress(InputError):
@@ -141,7 +141,9 @@ def _timing(guess: FileGuess) -> tuple[list[str], int]:
     finest = min((step for _, step in steps if step), default=None)
     if finest is None:
         return [], 0
-    return [f"resample = {finest:.9g}  # [s]: the signals have different rates; check that this is meant"], 0
+    return [
+        f"resample = {finest:.9g}  # [s]: the signals have different sample rates and are resampled; check"
+    ], 0
 
 
 def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], int]:
@@ -153,7 +155,7 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
         if one.channel is not None and one.is_alone:
             (line,) = _column(one)
             mark = "; " if "  # " in line else "  # "
-            lines.append(f"{line}{mark}the only channel left: check")
+            lines.append(f"{line}{mark}guessed: the only remaining channel; check")
         elif one.channel is not None:
             lines += _column(one)
         elif one.candidates:
@@ -161,25 +163,23 @@ def _columns(guess: FileGuess, channels: Sequence[Channel]) -> tuple[list[str], 
             lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}may be: {listed}")
             blanks += 1
         elif one.signal in guess.rig.absent_inputs and not left:
-            lines.append(
-                f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0, as nothing drives the rig"
-            )
+            lines.append(f"# {one.signal} =    # {_unit_of(one)}not recorded: taken as 0 (no excitation)")
         elif one.signal in needed:
             free = (
-                "; or remove this line: then nothing drove the rig"
+                "; or remove this line if nothing drove the rig"
                 if one.signal in guess.rig.absent_inputs
                 else ""
             )
-            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{left or 'no channel is left'}{free}")
+            lines.append(f"{one.signal} = {BLANK}  # {_unit_of(one)}{left or 'no channel remains'}{free}")
             blanks += 1
         elif one.signal in telling(guess.rig):
             lines.append(
-                f"# {one.signal} =    # {_unit_of(one)}{left or 'no channel is left'}; or not recorded here"
+                f"# {one.signal} =    # {_unit_of(one)}{left or 'no channel remains'}; or not recorded here"
             )
     reference = guess.reference.channel
     if reference is not None and reference.name != guess.reference.signal:
         lines.append(
-            f"{guess.reference.signal} = {quoted(reference.name)}  # of the controller, if it is one; else remove this line"
+            f"{guess.reference.signal} = {quoted(reference.name)}  # reference of the controller; remove this line if it is not"
         )
     return lines, blanks
 
@@ -195,7 +195,7 @@ def _needed(guess: FileGuess) -> set[str]:
 
 
 def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
-    """Return which channels are no signal yet; empty where all are."""
+    """Return the channels that belong to no signal yet; empty if there are none."""
     known = (guess.time, guess.reference, *guess.signals)
     taken = {one.channel.name for one in known if one.channel is not None}
     free = [quoted(channel.name) for channel in channels if channel.name not in taken]
@@ -203,7 +203,7 @@ def _left(guess: FileGuess, channels: Sequence[Channel]) -> str:
 
 
 def _coarse_step(time: Channel) -> float | None:
-    """Return the sample time that values taken in seconds make, if it is one that few rigs are measured with."""
+    """Return the sample time if it is implausibly large when the values are taken as seconds."""
     with suppress(InputError):
         stamps = as_floats(time.load())
         if stamps.size > 1 and np.isfinite(stamps).all():
@@ -217,33 +217,37 @@ def _unit_of(guess: Guess) -> str:
 
 
 def _column(guess: Guess) -> list[str]:
-    """Return the line that maps a signal, empty where its own name suffices."""
+    """Return the line that maps a signal; empty if its channel has the name of the signal."""
     assert guess.channel is not None
     name = quoted(guess.channel.short_name if guess.signal == "t" else guess.channel.name)
     if guess.unit is None:
         needed = guess.channel.name != guess.signal
         if guess.signal == TIME and (step := _coarse_step(guess.channel)):
-            return [f"t = {name}  # taken in s, which makes the sample time {step:.3g} s; is it in ms? check"]
+            return [
+                f"t = {name}  # assumed in s, which gives a sample time of {step:.3g} s; is it in ms? check"
+            ]
         remark = (
-            f"  # taken to be in {guess.si}; check" if has_si(guess.si) else "  # taken as it stands; check"
+            f"  # assumed in {guess.si}; check"
+            if has_si(guess.si)
+            else "  # unit unknown, used without conversion; check"
         )
         return [f"{guess.signal} = {name}{remark}"] if needed else []
     if not has_si(guess.si):
         found = in_drive_unit(guess.unit)
         if found is None or found[0] == 1.0:
-            return [f"{guess.signal} = {name}  # in {guess.unit}, taken as it stands"]
+            return [f"{guess.signal} = {name}  # in {guess.unit}, used without conversion"]
         return [
-            f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}  # becomes {found[1]}; check gain"
+            f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}  # converted to {found[1]}; check gain"
         ]
     if not is_a(guess.unit, guess.si):
         return [
-            f"{guess.signal} = {{ name = {name}, scale = 1.0 }}  # in {guess.unit}, taken as it stands; "
-            f"{guess.signal} is meant in {guess.si}: check"
+            f"{guess.signal} = {{ name = {name}, scale = 1.0 }}  # in {guess.unit}, used without conversion; "
+            f"{guess.signal} should be in {guess.si}: check"
         ]
     if guess.is_stated:
         if guess.channel.name == guess.signal:
             return []
-        return [f"{guess.signal} = {name}  # converted from {guess.unit}, as the file states it"]
+        return [f"{guess.signal} = {name}  # converted from {guess.unit}, as stated in the file"]
     if guess.unit == guess.si:
         return [f"{guess.signal} = {name}"] if guess.channel.name != guess.signal else []
     return [f"{guess.signal} = {{ name = {name}, unit = {quoted(guess.unit)} }}"]

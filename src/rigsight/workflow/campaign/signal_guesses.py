@@ -1,4 +1,4 @@
-"""Which channels of a file are probably a rig's signals, and which rig is it then?"""
+"""Guess which channels of a file are the signals of a rig, and which rig it is."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ _CLEAR = 2.0
 
 @dataclass(frozen=True)
 class Guess:
-    """Where a signal may stand.
+    """The guessed channel of a signal.
 
     Attributes
     ----------
     signal, si
         Signal of the rig and its unit.
     channel
-        The channel that fits best, None where none or several do.
+        The best matching channel; None if none or several match.
     unit
         Unit of the channel: stated by the file, or else in its name.
     is_stated
         Whether the file itself states the unit, in a place made for it.
     candidates
-        Names of the channels that fit equally well, where several do.
+        Names of the channels that match equally well, if there are several.
     is_alone
-        Whether nothing but that no other channel is left speaks for it.
+        Whether the only reason for the guess is that no other channel remains.
     """
 
     signal: str
@@ -46,7 +46,7 @@ class Guess:
 
     @property
     def is_clear(self) -> bool:
-        """True if the channel can be named."""
+        """True if the signal has a channel."""
         return self.channel is not None
 
 
@@ -62,25 +62,25 @@ class FileGuess:
 
     @property
     def open_questions(self) -> int:
-        """Number of signals without a channel that the rig is told by."""
+        """Number of characteristic signals of the rig without a channel."""
         return sum(not guess.is_clear for guess in self.signals if guess.signal in telling(self.rig))
 
 
 def telling(rig: Rig) -> tuple[str, ...]:
-    """Return the signals by which a rig is told from others: of one with one motion those of every record, else all."""
+    """Return the signals that distinguish a rig from others: those of every record on a rig of one motion, else all."""
     outputs = rig.required_outputs or tuple(signal.name for signal in rig.outputs)
     return (*(signal.name for signal in rig.inputs), *outputs)
 
 
 def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) -> FileGuess:
-    """Return the rig that the channels fit best, and which channels its signals are.
+    """Return the rig that matches the channels best, with the channel of each signal.
 
     Parameters
     ----------
     channels
         Of an open file; none is read.
     is_text
-        True for delimited text, whose row of units a reading does not apply.
+        True for delimited text, whose row of units is not applied when the file is read.
     rigs
         Those that come into question.
     """
@@ -91,7 +91,7 @@ def guess_file(channels: Sequence[Channel], is_text: bool, rigs: Iterable[Rig]) 
 
 
 def _guess_reference(found: FileGuess, channels: Sequence[Channel]) -> Guess:
-    """Return which channel that is no signal of the rig is called like the reference of a controller; its unit says nothing."""
+    """Return a channel that is no signal of the rig and has the name of a controller's reference; its unit is ignored."""
     none = Guess(REFERENCE, "")
     if any(one.signal == REFERENCE for one in found.signals):
         return none
@@ -101,7 +101,7 @@ def _guess_reference(found: FileGuess, channels: Sequence[Channel]) -> Guess:
 
 
 def _unlikely(guess: FileGuess) -> tuple[int, bool, bool, float, int]:
-    """Return what decides between rigs: one motion before several, then the better and the more telling names."""
+    """Return the sort key of rigs: one motion before several, then the better and the more specific names."""
     return (
         guess.open_questions,
         not guess.rig.has_one_motion,
@@ -112,7 +112,7 @@ def _unlikely(guess: FileGuess) -> tuple[int, bool, bool, float, int]:
 
 
 def _is_spoken_of(guess: FileGuess) -> bool:
-    """Return True unless nothing but letters that any signal may have speaks of a rig whose motion drives more: u and y.
+    """Return False if the only evidence for a rig with a downstream motion are the common names u and y.
 
     The running gear is one, and most files whose output is called y are of something else.
     """
@@ -127,16 +127,16 @@ def _is_spoken_of(guess: FileGuess) -> bool:
 
 
 def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: bool) -> tuple[Guess, ...]:
-    """Return the guesses; a signal without any takes the one channel left that has its unit, in whatever language it is named.
+    """Return the guesses; a signal without a match takes the only remaining channel with its unit, whatever its name.
 
-    An output that is the only signal open takes the only channel left without a unit as well; an input may be none of them.
+    The only output without a channel also takes the only remaining channel without a unit; an input may have no channel.
     """
     guesses = list(found.signals)
     for i, guess in enumerate(guesses):
         if guess.is_clear or guess.candidates:
             continue
         taken = [found.time.channel, found.reference.channel, *(own.channel for own in guesses)]
-        # A drive has the unit of its amplifier.
+        # The input of a drive has the unit of its amplifier.
         units = [guess.si] if has_si(guess.si) else DRIVES
         fitting = [c for c in channels if c not in taken and any(is_a(_unit_of(c) or "", u) for u in units)]
         rivals = [own for own in guesses if not own.is_clear and own.si == guess.si]
@@ -155,7 +155,7 @@ def _completed_by_unit(found: FileGuess, channels: Sequence[Channel], is_text: b
 
 
 def _of_channel(guess: Guess, channel: Channel, is_text: bool) -> Guess:
-    # A row of units in delimited text is not applied by a reading, so that it does not count as stated.
+    # A row of units in delimited text is not applied when the file is read, so it does not count as stated.
     is_stated = channel.unit is not None and not is_text
     return Guess(guess.signal, guess.si, channel, _unit_of(channel), is_stated)
 
@@ -169,7 +169,7 @@ def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGues
     taken = [time.channel] if time.channel is not None else []
     signals = (*rig.inputs, *rig.outputs)
     found, score = {}, 0.0
-    # Whose name is clear comes first, so that no other signal takes its channel.
+    # Signals with a clear name come first, so that no other signal takes their channel.
     for signal in sorted(
         signals, key=lambda s: -max((closeness(c.name, s.name) for c in channels), default=0.0)
     ):
@@ -184,7 +184,7 @@ def _guess_rig(rig: Rig, channels: Sequence[Channel], is_text: bool) -> FileGues
 def _guess(
     signal: str, si: str, channels: Sequence[Channel], taken: Sequence[Channel], is_text: bool
 ) -> tuple[Guess, float]:
-    """Return where a signal may stand, and how well it fits there."""
+    """Return the possible channels of a signal, and how well they match."""
     scores: list[tuple[float, Channel]] = []
     for channel in channels:
         score = 0.0 if channel in taken else closeness(channel.name, signal)
@@ -197,7 +197,7 @@ def _guess(
         return Guess(signal, si), 0.0
     best = max(score for score, _ in scores)
     closest = [channel for score, channel in scores if score == best]
-    # The times of several groups are told apart by the groups of the signals.
+    # With several groups, the time channel is the one in the group of the signals.
     if len(closest) > 1 and not (signal == TIME and len({channel.short_name for channel in closest}) == 1):
         return Guess(signal, si, candidates=tuple(channel.name for channel in closest)), 0.0
     channel = closest[0]

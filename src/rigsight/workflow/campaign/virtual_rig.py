@@ -1,6 +1,6 @@
-"""What does a measurement on the built-in virtual rig give: true motion, disturbed, seen by noisy sensors?
+"""Simulated measurements on the built-in virtual rig, with disturbance and sensor noise.
 
-The rig is the published set `iwan_tables`, the one model behind the thesis's tables.
+The rig is the published set `iwan_tables`, the model behind the tables of the thesis.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def _default_noise() -> Mapping[str, float]:
 
 @dataclass(frozen=True)
 class VirtualRig:
-    """A running gear whose truth is known.
+    """A running gear with known true parameters.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class VirtualRig:
         amplitude: float | None = None,
         hold: Hold = "foh",
     ) -> Record:
-        """Drive the rig with a current and return what its instruments record.
+        """Drive the rig with a current and return the measured record.
 
         Parameters
         ----------
@@ -82,7 +82,7 @@ class VirtualRig:
         rng
             Source of noise and disturbance.
         kind, role, amplitude, hold
-            As in a campaign; `hold` is how the current runs between samples.
+            As in a campaign; `hold` is the behavior of the current between samples.
         """
         torque = self._torque_disturbance(u.size, rng)
         values = self.truth.values()

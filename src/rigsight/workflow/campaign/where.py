@@ -1,4 +1,4 @@
-"""How does a message call the place of what is wrong: by file, line and key, or by the title of a campaign in memory?"""
+"""The location of an error in messages: file, line and key, or the title of a campaign in memory."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Location = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Where:
-    """Where keys stand.
+    """The locations of keys.
 
     Attributes
     ----------
     name
-        The file, or what a campaign in memory is called.
+        The file, or the name of a campaign in memory.
     data
-        What the file holds, to call a record by its file.
+        The contents of the file, so that a record can be named by its file.
     places
-        Line and column of each value by its keys; empty where nobody knows them.
+        Line and column of each value by its keys; empty if unknown.
     """
 
     name: str
@@ -34,15 +34,15 @@ class Where:
 
     @classmethod
     def of_toml(cls, name: str, text: str, data: Mapping[str, Any]) -> Where:
-        """Return where the keys of a TOML file stand."""
+        """Return the locations of the keys of a TOML file."""
         return cls(name, data, value_places(text))
 
     def at(self, *location: str | int) -> str:
-        """Return how a message begins: ``campaign.toml, line 7, column 5: rig.constants.v``."""
+        """Return the beginning of a message: ``campaign.toml, line 7, column 5: rig.constants.v``."""
         return f"{self.name}{self._place(location)}: {self.called(location)}"
 
     def called(self, location: Location) -> str:
-        """Return a location as a user reads it: ``rig.constants.v``, ``record 2 (step.csv): role``."""
+        """Return a location as text: ``rig.constants.v``, ``record 2 (step.csv): role``."""
         if len(location) < 2 or location[0] not in LISTS or not isinstance(location[1], int):
             return ".".join(map(str, location))
         listed = self.data.get(location[0])
@@ -55,7 +55,7 @@ class Where:
         return f"{record}: {rest}" if rest else record
 
     def _place(self, location: Location) -> str:
-        """Return the line of what stands there; of what is missing, that of the table that lacks it."""
+        """Return the line of a key; for a missing key, the line of its table."""
         for length in range(len(location), 0, -1):
             own = location[:length]
             place = self.places.get(own) or next(

@@ -1,1 +1,1 @@
-"""What an identification finds beyond one record, and how it reaches the disk."""
+"""Identification over several records, and its result files."""

@@ -1,4 +1,4 @@
-"""What does `rigsight identify` find on a rig of any shape: responses, one fit over time, poles, and what is identifiable?"""
+"""`rigsight identify` on general rigs: frequency responses, one fit in the time domain, poles, and identifiability."""
 
 from __future__ import annotations
 
@@ -51,17 +51,17 @@ from rigsight.workflow.run.progress import Listener, Stage
 
 IDENTIFYING = "Identifying"
 METHODS = ("local_rational", "local_polynomial")
-"""Those that tell several inputs apart."""
+"""Estimators for several inputs."""
 _STEPS_AFTER_RECORDS = 3
 _GROWTHS = 3.0
-"""Time constants of its growth in a window of a rig that is unstable: errors of the start grow twentyfold."""
+"""Length of a window on an unstable rig, in time constants of its growth: initial errors grow twentyfold."""
 
 
 def has_transfer_forms(campaign: Campaign) -> bool:
     """Return True for rigs with the equations of a built-in one of one motion: their transfer functions are fitted by record.
 
-    A rig of the same shape from a file has names of its own; records of different constants have no such form together, and one
-    in which nothing drives the rig has none. Offsets that differ from record to record are found over time alone.
+    A rig with the same equations from a file has other names. Records with different constants have no common transfer function,
+    and records without excitation have none. Offsets that differ between records are estimated only in the time domain.
     """
     rig = campaign.rig
     if not is_built_in_motion(rig) or any(
@@ -90,9 +90,9 @@ def identify_any_rig(
     Raises
     ------
     InputError
-        If the method cannot tell inputs apart.
+        If the method cannot separate several inputs.
     """
-    check_option("The method for a rig of several inputs or sensors", options.method, METHODS)
+    check_option("The method for a rig with several inputs or sensors", options.method, METHODS)
     rig, structure = campaign.rig, compose(campaign.rig)
     records = campaign.estimation
     prepare_kernels([structure], n_jobs, listener)
@@ -112,7 +112,7 @@ def identify_any_rig(
         stage.finished("one set for all records")
         known, joint = _with_errors(joint, structure, cut(records, length), factor)
         found = [_with_own(record, joint, rig) for record in found]
-        stage.finished("what is identifiable")
+        stage.finished("identifiability")
         views = tuple(_views(structure, joint.fit.fit.values, records, options, known))
     units = {p.name: p.unit for p in structure.parameters}
     units |= {signal.name: signal.unit for signal in (*rig.inputs, *rig.outputs)}
@@ -148,7 +148,7 @@ def identify_any_rig(
 
 
 def _record(record: Record, rig: Rig, options: EstimationOptions) -> RecordIdentification:
-    """Return what one record shows by itself of the responses to the inputs that move in it."""
+    """Return the responses that one record alone shows, to the inputs that move in it."""
     measured = measured_responses([record], rig, options.method, options.resolution)
     paths = [
         PathIdentification(
@@ -167,7 +167,7 @@ def _record(record: Record, rig: Rig, options: EstimationOptions) -> RecordIdent
 
 
 def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | None) -> dict[str, float]:
-    """Return parameters that these records say nothing about, and of those that they tell up to a common factor one."""
+    """Return parameters that these records do not determine; of parameters determined up to a common factor, one."""
     rig = campaign.rig
     held = {}
     if is_built_in_motion(rig):
@@ -179,7 +179,7 @@ def _held(campaign: Campaign, records: Sequence[Record], factor: OpenFactor | No
 def _begin(
     campaign: Campaign, structure: Structure, records: Sequence[Record], held: Mapping[str, float]
 ) -> tuple[dict[str, float], float | None]:
-    """Return start values, and the length of windows if the rig runs away from where it was [s]."""
+    """Return start values, and the length of windows [s] if the rig drifts or diverges."""
     rig, constants = campaign.rig, campaign.constants
     starts = [linear_start(rig, records, constants, held)]
     given = rig.in_own_parameters(campaign.parameters, constants)
@@ -199,7 +199,7 @@ def _begin(
 def _swallowed(
     structure: Structure, windows: Sequence[Record], values: Mapping[str, float], held: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Return the parameters that say the same as offsets of sensors that are free in each record."""
+    """Return the parameters that cannot be distinguished from sensor offsets that are free in each record."""
     scales = characteristic_scales(structure.rig, windows, values)
     asked = [p.name for p in structure.rig.parameters if p.name not in held]
     return swallowed_by_offsets(structure, windows, scales, _sizes(structure, windows), values, asked)
@@ -225,7 +225,7 @@ def _sizes(structure: Structure, records: Sequence[Record]) -> dict[str, float]:
 def _window_length(
     structure: Structure, values: Mapping[str, float], records: Sequence[Record]
 ) -> float | None:
-    """Return how long a free run may be [s]; None where every record may be run as a whole."""
+    """Return the longest possible free run [s]; None if every record can be simulated as a whole."""
     try:
         linear = near_rest(structure, values, records)
     except SimulationError:
@@ -237,7 +237,7 @@ def _window_length(
 
 
 def _drifts_in_sight(linear: Linearization, records: Sequence[Record]) -> bool:
-    """Return True if what nothing holds shows in a sensor: of a shaft without a spring the angle drifts, the speed does not."""
+    """Return True if a motion without restoring force is measured: the angle of a free shaft drifts, its speed does not."""
     seen = [name for name in linear.outputs if any(name in record for record in records)]
     return linear.stability == "drifts" and any(
         np.any(linear.transfer_function(source, response).poles == 0.0)
@@ -249,7 +249,7 @@ def _drifts_in_sight(linear: Linearization, records: Sequence[Record]) -> bool:
 def _with_errors(
     joint: JointIdentification, structure: Structure, windows: Sequence[Record], factor: OpenFactor | None
 ) -> tuple[Information | None, JointIdentification]:
-    """Return what the records say of the parameters, and the fits with errors that are infinite where that is nothing."""
+    """Return what the records determine, and the fits with infinite standard errors for undetermined parameters."""
     fit = joint.fit
 
     def corrected(result: FitResult, records: Sequence[Record]) -> tuple[Information | None, FitResult]:
@@ -269,7 +269,7 @@ def _with_errors(
             covariance=covariance,
         )
 
-    # Fits of single records hold the same number: to one another they can be compared.
+    # Fits of single records hold the same value, so that they can be compared with each other.
     whole = fit.fit if factor is None else _with_unknown(fit.fit, factor.held)
     known, together = corrected(whole, windows)
     kinds = tuple(
@@ -280,7 +280,7 @@ def _with_errors(
 
 
 def _with_unknown(result: FitResult, name: str) -> FitResult:
-    """Return a fit as if a parameter that was held had been fitted and not been found."""
+    """Return a fit in which a held parameter counts as fitted, with an infinite standard error."""
     free = tuple(n for n in result.structure.names if n in (*result.free, name))
     place = [free.index(n) for n in result.free]
     covariance = np.zeros((len(free), len(free)))

@@ -1,4 +1,4 @@
-"""Which figures does an identification leave, and in which files?"""
+"""The figures of an identification and their files."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ def identification_figures(identification: Identification) -> dict[str, tuple[st
             found[file] = (what, svg_text(drawing, file))
     drawing = None if identification.views else responses_figure(identification)
     if drawing is not None:
-        what = "Magnitudes of all records over each other, measured and fitted (as the thesis's Figures 5.6 and 5.7)"
+        what = "Magnitudes of all records in one plot, measured and fitted (as Figures 5.6 and 5.7 of the thesis)"
         found[RESPONSES_FILE] = (what, svg_text(drawing, RESPONSES_FILE))
     drawing = amplitudes_figure(identification)
     if drawing is not None:
-        what = "Parameters of each record over its amplitude, with 95 % intervals (as the thesis's Figures 5.8 and 5.9)"
+        what = "Parameters of each record over its amplitude, with 95 % intervals (as Figures 5.8 and 5.9 of the thesis)"
         found[AMPLITUDES_FILE] = (what, svg_text(drawing, AMPLITUDES_FILE))
     return found
 
@@ -148,7 +148,7 @@ def _grid(
                     ratio_unit(units.get(response, ""), units.get(source, "")),
                     paths[source, response].measured,
                     model.get((source, response)),
-                    "not shown by these records" if paths[source, response].measured is None else "",
+                    "not determined by these records" if paths[source, response].measured is None else "",
                 )
                 for source in sources
             ]
@@ -235,7 +235,7 @@ def _amplitude_label(identification: Identification) -> str:
 
 
 def _is_shown(record: RecordIdentification, name: str) -> bool:
-    """Return False for a number that a fit over time left where it began."""
+    """Return False for a parameter that a time-domain fit left at its start value."""
     return record.own is None or math.isfinite(record.estimates[name][1])
 
 

@@ -1,4 +1,4 @@
-"""Does one parameter set serve all estimation records, and how well does it follow the others in free run?"""
+"""Fit one parameter set to all estimation records, test whether it agrees with each record, and score free runs."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from rigsight.report.quantities import gap_percent
 from rigsight.simulate import Structure, compose
 
 _DIFFERENT = 0.01
-"""Probability of differences as large by chance below which records are said to need sets of their own."""
+"""Probability of equally large differences by chance, below which the records do not have a common parameter set."""
 _SMALL_LOSS = 0.01
 _UNSERVED = 0.9
-"""Share of a motion that is left where a fit has not followed it at all."""
+"""NRMSE from which a fit does not follow a motion at all."""
 _LATERAL = ("l_0", "c_y")
 _BELOW = 1e-6
 
@@ -156,12 +156,12 @@ def _pooled(found: Sequence[RecordIdentification]) -> PhysicalEstimates | None:
         _LATERAL,
         values,
         np.diag(np.square(errors)),
-        "mean of the records' own, with the measured psi as source",
+        "mean over the records, with the measured psi as input",
     )
 
 
 def _start(found: Sequence[RecordIdentification], known: Mapping[str, float]) -> dict[str, float]:
-    """Return the median of what the records show by themselves."""
+    """Return the median of the values of the single records."""
     names = {name for r in found if not r.motion.problem for name in r.estimates} - set(known)
     return {
         name: float(np.median([r.estimates[name][0] for r in found if name in r.estimates])) for name in names
@@ -174,7 +174,7 @@ def parent(record: Record) -> str:
 
 
 def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness: bool) -> dict[str, float]:
-    """Return what these records say nothing about: a spring that is not there, outputs that were not measured.
+    """Return values for parameters that these records do not determine: no spring, outputs that were not measured.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def held_parameters(campaign: Campaign, records: Sequence[Record], has_stiffness
     if not has_stiffness:
         known |= {"k": 0.0, "x_off": 0.0}
     elif rig.is_driven and "force_off" in names:
-        # A linear spring cannot tell a constant force from a shifted rest position.
+        # With a linear spring, a constant force and a shifted rest position cannot be distinguished.
         known["force_off"] = 0.0
     if rig.downstream and not any(symbol.name in r for symbol in rig.downstream for r in records):
         placeholders = {"l_0": 1.0, "c_y": 1.0, "y_off": 0.0}
@@ -252,16 +252,14 @@ def _validation_score(fit: JointFit, record: Record, campaign: Campaign, length:
 
 def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str]) -> str:
     if not fit.fit.success:
-        return f"The joint fit did not converge: {fit.fit.message}. Its numbers are to be doubted."
+        return f"The joint fit did not converge: {fit.fit.message}. Its parameter values are not reliable."
     if len(names) < 2:
         return (
-            "One estimation record was fitted, so there is nothing to compare its parameters with. A step beside a sweep, or "
-            "another amplitude, would test them."
+            "Only one estimation record was fitted, so its parameters cannot be compared with others. Another kind of record, "
+            "such as a step beside a sweep, or another amplitude would test them."
         )
     if not math.isfinite(fit.probability):
-        return (
-            "The records have no parameter in common that each of them determines; nothing can be compared."
-        )
+        return "There is no parameter that every record determines, so the records cannot be compared."
     unserved = [
         f"{gap_percent(score.nrmse[name])} of {name} in '{score.record}'"
         for score in scores
@@ -271,21 +269,23 @@ def _statement(fit: JointFit, scores: Sequence[RecordScore], names: Sequence[str
     ]
     if fit.probability >= _DIFFERENT and unserved:
         return (
-            "The joint fit follows the records too poorly to say whether one parameter set serves all: it leaves "
-            f"{', '.join(unserved[:3])}. Its numbers are to be doubted; look for a signal of the wrong sign, unit or column."
+            "The joint fit is too poor to judge whether one parameter set fits all records: its error is "
+            f"{', '.join(unserved[:3])}. Its parameter values are not reliable; check signals for wrong sign, unit or column."
         )
     if fit.probability >= _DIFFERENT:
         return (
-            f"One parameter set serves all {len(names)} estimation records: differences as large arise by chance with "
+            f"One parameter set fits all {len(names)} estimation records: equally large differences arise by chance with "
             f"probability {fit.probability:.2g}."
         )
     chance = f"below {_BELOW:g}" if fit.probability < _BELOW else f"{fit.probability:.1g}"
-    text = f"No single parameter set serves all {len(names)} estimation records (probability of chance {chance})."
+    text = (
+        f"No single parameter set fits all {len(names)} estimation records (probability of chance {chance})."
+    )
     return f"{text} {_pull(fit, scores)}"
 
 
 def _pull(fit: JointFit, scores: Sequence[RecordScore]) -> str:
-    """Say which record loses most by the common set, and what it wants instead."""
+    """Name the record whose error grows most with the common set, and its own parameter values."""
     losses = [
         (score.nrmse[name] - score.own_nrmse[name], score, name)
         for score in scores
@@ -297,13 +297,13 @@ def _pull(fit: JointFit, scores: Sequence[RecordScore]) -> str:
     own = next(kind for kind in fit.kinds if kind.kind == worst.record)
     shifts = {name: shift for name, shift in own.shift.items() if math.isfinite(shift)}
     joint_left, own_left = gap_percent(worst.nrmse[output]), gap_percent(worst.own_nrmse[output])
-    left = f"the common set leaves {joint_left} of {output}, its own {own_left}"
+    left = f"the error of {output} is {joint_left} with the common set, {own_left} with its own"
     if loss < _SMALL_LOSS:
-        return f"The differences are small, though: '{worst.record}' loses most, and {left}."
+        return f"The differences are small, though: they are largest for '{worst.record}', where {left}."
     if not shifts:
-        return f"'{worst.record}' pulls most: {left}."
+        return f"The difference is largest for '{worst.record}': {left}."
     name = max(shifts, key=lambda key: abs(shifts[key]))
     return (
-        f"'{worst.record}' pulls most: {left}; alone it has {name} = {own.fit.values[name]:.3g} instead of "
+        f"The difference is largest for '{worst.record}': {left}; alone it has {name} = {own.fit.values[name]:.3g} instead of "
         f"{fit.fit.values[name]:.3g}."
     )

@@ -1,4 +1,4 @@
-"""How does an identification stand in `identification.json`?"""
+"""The content of `identification.json`."""
 
 from __future__ import annotations
 

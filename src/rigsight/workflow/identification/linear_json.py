@@ -1,4 +1,4 @@
-"""How do poles, transfer functions, responses and what is identifiable stand in `identification.json`?"""
+"""Poles, transfer functions, responses and identifiability in `identification.json`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigsight.identify.linear_view import LinearView
 
 
 def finite(value: float | None) -> float | None:
-    """Return None for what JSON has no word for: infinite, or not a number."""
+    """Return None for infinite values and NaN, which JSON cannot represent."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 

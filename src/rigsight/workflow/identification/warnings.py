@@ -1,4 +1,4 @@
-"""What must a user of `rigsight identify` be told about the records beside the numbers?"""
+"""Warnings of `rigsight identify`, besides the parameter values."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from rigsight.rigs import evaluated
 from rigsight.workflow.identification.joint import parent
 
 _TOLERANCE = 0.02
-"""Share by which an amplitude may lie outside the identified ones and still count as one of them."""
+"""Relative tolerance with which an amplitude counts as inside the identified range."""
 _OF_EACH_RECORD = (
-    "It is the instrument of the frequency response of the motion to its input, record by record where nothing else is said "
-    "below: noise on the input, fed back or not, does not bias it."
+    "It serves as instrumental variable for the frequency responses of each record, unless a note below says otherwise, so that "
+    "noise on the input, fed back or not, does not bias them."
 )
 _NOT_OF_ANY_RIG = (
-    "It is not used: the frequency responses are those of all records and inputs together, and noise on a measured input makes "
-    "them too small."
+    "It is not used: the frequency responses are estimated from all records and inputs together, and noise on a measured input "
+    "makes them too small."
 )
 
 
 def out_of_band(
     found: RecordIdentification, campaign: Campaign, joint: JointIdentification
 ) -> RecordIdentification:
-    """Say of a record that could not be identified if it never drove the resonance that the others show."""
+    """Report if a record could not be identified because it does not excite the resonance that the other records show."""
     motion = found.motion
     omega_0 = _resonance(campaign, joint)
     if not motion.problem or motion.measured is None or omega_0 is None:
@@ -44,8 +44,8 @@ def out_of_band(
     if low <= omega_0 <= high:
         return found
     told = (
-        f"this record drives '{motion.source}' from {low:.3g} to {high:.3g} rad/s, and the resonance lies at {omega_0:.3g} "
-        "rad/s, as the other records show. Record it again with excitation there."
+        f"this record excites '{motion.source}' from {low:.3g} to {high:.3g} rad/s, but the other records show a resonance at "
+        f"{omega_0:.3g} rad/s. Measure again with excitation there."
     )
     path = replace(motion, problem=told)
     rest = tuple(text for text in found.warnings if motion.problem not in text)
@@ -70,7 +70,7 @@ def campaign_warnings(
     joint: JointIdentification,
     has_stiffness: bool,
 ) -> list[str]:
-    """Return what the records' own identifications, the joint fit and the reading have to tell, a sentence each."""
+    """Return the notes of the records, of their identifications and of the joint fit, a sentence each."""
     told = list(campaign.notes)
     told += [f"Record '{r.name}': {note}" for r in campaign.records for note in r.notes]
     told += closed_loop_notes(campaign.records, campaign.rig, _OF_EACH_RECORD)
@@ -80,7 +80,7 @@ def campaign_warnings(
     if not has_stiffness:
         told.append(
             "The campaign sets k = 0: the axis has no spring and no resonance, so m and d are fitted to the velocity, and "
-            "the axis is simulated over windows with their own initial states."
+            "the axis is simulated in windows with their own initial states."
         )
     if joint.pooled is None and campaign.rig.downstream and "c_y" not in joint.names:
         missing = ", ".join(symbol.name for symbol in campaign.rig.downstream)
@@ -99,7 +99,7 @@ def campaign_warnings(
 def any_rig_warnings(
     campaign: Campaign, views: Sequence[LinearView], joint: JointIdentification
 ) -> list[str]:
-    """Return what reading, responses, poles and the fit of a rig of any shape have to tell, a sentence each.
+    """Return the notes on records, responses, poles and fit of a general rig, a sentence each.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def any_rig_warnings(
 def offsets_of_records(
     campaign: Campaign, joint: JointIdentification, held: Mapping[str, float], length: float | None = None
 ) -> list[str]:
-    """Return the offsets of sensors that were estimated in each record, or that they should be where they were not.
+    """Return the sensor offsets that were estimated in each record, or a hint that they should be estimated.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def offsets_of_records(
     joint
         The fit.
     held
-        Parameters that say the same as such offsets, and the values at which they were held.
+        Parameters that cannot be distinguished from such offsets, and the values at which they were held.
     length
         Of the windows into which records were cut [s]; None where they were fitted whole.
     """
@@ -151,12 +151,12 @@ def offsets_of_records(
                 own.setdefault(names[index], []).append(fit.offsets(index)[output])
         listed = ", ".join(f"'{name}' {np.mean(values):.4g}" for name, values in own.items())
         told.append(
-            f"Offset of {output} by record [{units[output]}], estimated and no part of the model: {listed}."
+            f"Offset of {output} in each record [{units[output]}], estimated and not part of the model: {listed}."
         )
     if held:
         values = ", ".join(f"{name} = {value:.4g}" for name, value in held.items())
         told.append(
-            f"{values} {'are' if len(held) > 1 else 'is'} held: with an offset in each record nothing tells it."
+            f"{values} {'are' if len(held) > 1 else 'is'} held: not identifiable if each record has its own offset."
         )
     return told
 
@@ -171,12 +171,12 @@ def _of_view(view: LinearView) -> list[str]:
     near_rest = view.linearization
     if not near_rest.rests:
         told.append(
-            f"Nothing balances the mean input{where}: poles and responses are those of the place that comes nearest to rest."
+            f"The rig has no equilibrium at the mean input{where}: poles and responses are those of the state closest to rest."
         )
     if near_rest.stability == "unstable":
         told.append(
-            f"The rig is unstable where it rests{where}. Records are fitted in short windows with initial states of their own; "
-            "frequency responses of an unstable rig mean something only if a controller outside the rig keeps it there."
+            f"The equilibrium of the rig is unstable{where}. Records are fitted in short windows with their own initial states; "
+            "frequency responses of an unstable rig are meaningful only if an external controller stabilizes it."
         )
     if view.measured is None:
         return told
@@ -192,15 +192,15 @@ def _of_view(view: LinearView) -> list[str]:
     ]
     if beside:
         told.append(
-            f"The linearized equations leave more than noise explains{where}, as multiples of it: {', '.join(beside)}. Either "
-            "the motion is too large for one linear picture, or something is missing. The fit over time, which is not linear, "
-            "tells which; 'rigsight diagnose' looks for what is missing."
+            f"The residual of the linearized equations is larger than the noise{where}, by these factors: {', '.join(beside)}. "
+            "Either the motion is too large for a linear model, or an effect is missing. The nonlinear fit in the time domain "
+            "shows which; 'rigsight diagnose' finds missing effects."
         )
     return told
 
 
 def _not_the_whole(found: Sequence[RecordIdentification]) -> list[str]:
-    """Say of which paths the form leaves far more than noise."""
+    """Report the paths on which the residual of the fitted form is far above the noise."""
     told = []
     for first in {(path.source, path.response): path for r in found for path in r.paths}.values():
         misfits = [
@@ -213,14 +213,15 @@ def _not_the_whole(found: Sequence[RecordIdentification]) -> list[str]:
             form = "PT1" if first.response == "y" else "linear equation"
             span = f"{min(misfits):.3g} to {max(misfits):.3g}" if len(misfits) > 1 else f"{misfits[0]:.3g}"
             told.append(
-                f"{first.source} -> {first.response}: the {form} is not the whole of the rig. In {len(misfits)} of {len(found)} "
-                f"records it leaves {span} times what noise explains. 'rigsight diagnose' looks for what is missing."
+                f"{first.source} -> {first.response}: the model order of the {form} is too low, or an effect is missing. "
+                f"In {len(misfits)} of {len(found)} records its residual is {span} times the noise. 'rigsight diagnose' finds "
+                "missing effects."
             )
     return told
 
 
 def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification) -> list[str]:
-    """Say which validation records have an amplitude that no fitted record of the same signal had."""
+    """Report validation records with an amplitude outside the range of the fitted records."""
     fitted = [r for r in campaign.estimation if r.name not in joint.left_out]
     given = all(record.amplitude is not None for record in (*fitted, *campaign.validation))
     units = {signal.name: signal.unit for signal in (*campaign.rig.inputs, *campaign.rig.outputs)}
@@ -242,7 +243,7 @@ def beyond_identified_amplitudes(campaign: Campaign, joint: JointIdentification)
         one = math.isclose(low, high, rel_tol=_TOLERANCE)
         span = f"{low:.3g} {unit}" if one else f"{low:.3g} to {high:.3g} {unit}"
         told.append(
-            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, outside what was identified ({span}): its "
-            "score tells how far the model reaches, not how well it was identified."
+            f"Validation record '{record.name}' has an amplitude of {size:.3g} {unit}, outside the identified range ({span}): "
+            "its score shows how well the model extrapolates, not how well it was identified."
         )
     return told

@@ -1,1 +1,1 @@
-"""A user's own rigs and effects: declared, checked, found by name."""
+"""A user's own rigs, effects and simulators: loaded, checked and found by name."""

@@ -1,7 +1,7 @@
-"""Which checks must a simulated effect pass: does it vanish at null, stay finite, give no energy, and is it found again?
+"""Checks by simulation that an effect vanishes at null, stays finite, generates no energy and is recovered by a fit.
 
-Measured on one mass with a spring, lateral effects on the running gear, those of a prescribed motion on an element. Each function
-returns a sentence that says what is broken, or None.
+Effects are simulated on one mass with a spring, lateral effects on the running gear, effects of a prescribed motion on an
+element. Each function returns a sentence that describes the error, or None.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ FULL, SMALL = 1.0, 0.3
 """Amplitudes of sine tests."""
 _NEAR_NULL = 1e-6
 _CONTINUOUS = 1e-3
-"""Largest change of the response that far from null, in sizes of the motion."""
+"""Largest change of the response that close to null, relative to the motion."""
 _STEADY = 1e-3
 _ENERGY = 5e-3
 _NOISE = 1e-3
-"""Noise in shares of the motion: small enough for an effect to be seen, far above the integrator's error."""
+"""Noise relative to the motion: small enough for an effect to be seen, far above the error of the integrator."""
 _LEVELS = (1.0, 50.0)
 """Drive levels of the sweeps; the second is for effects that show at large angles only."""
 _WRONG = (1.05, 0.95)
-"""Factors on the true numbers from which fits start; play with memory makes ridges, over which only one way may lead."""
+"""Factors on the true values at which fits start; with backlash a fit may succeed from one side only."""
 _NOISE_ALONE = 0.05
 _SIGMAS = 4.5
 _SEEN = 0.3
-"""Largest standard error of a parameter that counts as determined, in sizes of the parameter."""
+"""Largest relative standard error of a parameter that counts as determined."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig with numbers on which an effect is tried.
+    """A rig with parameter values on which an effect is checked.
 
     Attributes
     ----------
@@ -56,9 +56,9 @@ class Bench:
     output
         The output that the effect acts on.
     swept
-        The rig's numbers in the sweeps in which the effect is to be found again.
+        The parameter values of the rig in the sweeps from which the effect must be recovered.
     free
-        Parameters of the rig that are found again with the effect's.
+        Parameters of the rig that are fitted together with those of the effect.
     """
 
     rig: Rig
@@ -135,8 +135,8 @@ def box_values(effect: Effect, rng: np.random.Generator) -> list[dict[str, float
         }
         held = [p for p in effect.parameters if not p.fitted]
         own |= {p.name: p.held_at(characteristic_value(p.dimension, scales)) for p in held}
-        # A search moves sum and difference themselves. A negative sum lets a memory grow without end; where the unloading branch
-        # is the steeper one, a saturated loop has nothing but its rounding to come back with.
+        # A search varies sum and difference themselves. With a negative sum the internal state grows without bound; with the
+        # steeper unloading branch a saturated loop returns only by rounding errors.
         if all(
             own[pair.first] + own[pair.second] >= 0.0
             and own[pair.first] - own[pair.second] >= min(pair.difference_range[0], 0.0)
@@ -155,11 +155,13 @@ def null_gives_the_rig(effect: Effect) -> str | None:
     with_effect = simulate(compose(bench.rig, [effect]), {**start_values(effect)[0], **null}, record)
     if np.array_equal(with_effect[bench.output], plain):
         return None
-    return f"with {_told(null)} the simulation differs from the rig's: {_difference(with_effect[bench.output], plain)}."
+    changed = _difference(with_effect[bench.output], plain)
+
+    return f"with {_told(null)} the simulation differs from that of the rig without the effect: {changed}."
 
 
 def vanishes_continuously(effect: Effect) -> str | None:
-    """Check that close to its null values the response is close to the rig's."""
+    """Check that close to its null values the response is close to that of the rig without the effect."""
     bench = bench_of(effect)
     record = sine_record(FULL, 3, bench=bench)
     start = start_values(effect)[0]
@@ -172,8 +174,8 @@ def vanishes_continuously(effect: Effect) -> str | None:
     if np.max(np.abs(with_effect - plain)) <= _CONTINUOUS * np.max(np.abs(plain)):
         return None
     return (
-        f"close to its null values ({_told(near)}) the simulation is not close to the rig's: "
-        f"{_difference(with_effect, plain)}. Null must be where the effect fades away."
+        f"close to its null values ({_told(near)}) the simulation is not close to that of the rig without the effect: "
+        f"it differs {_difference(with_effect, plain)}. The effect must vanish continuously at its null values."
     )
 
 
@@ -182,7 +184,7 @@ def _close(null: float, start: float) -> float:
 
 
 def gives_no_energy(effect: Effect) -> str | None:
-    """Check that in a steady cycle a dissipative effect takes energy, and a conservative one neither takes nor gives."""
+    """Check that in a steady cycle a dissipative effect dissipates energy, and a conservative one does no net work."""
     if effect.place is not Place.DYNAMICS or effect.energy is Energy.ACTIVE:
         return None
     bench = bench_of(effect)
@@ -203,10 +205,10 @@ def gives_no_energy(effect: Effect) -> str | None:
             size = abs(work) + damper
             taken = (work - damper) / size
             if taken < -_ENERGY or (effect.energy is Energy.CONSERVATIVE and taken > _ENERGY):
-                verb = "gives" if taken < 0.0 else "takes"
+                verb = "generates" if taken < 0.0 else "dissipates"
                 return (
                     f"it is declared {effect.energy.value}, but {verb} {abs(taken):.1%} of the work of a cycle "
-                    f"({_told({p.name: values[p.name] for p in effect.parameters})}). Mind the sign: a torque resists the motion."
+                    f"({_told({p.name: values[p.name] for p in effect.parameters})}). Check the sign: a torque opposes motion."
                 )
     return None
 
@@ -217,7 +219,7 @@ def last_period(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def finite_where_searched(effect: Effect) -> str | None:
-    """Check that the simulation stays finite wherever a search may go."""
+    """Check that the simulation stays finite in the whole search range."""
     bench = bench_of(effect)
     record = sine_record(FULL, 3, bench=bench)
     may_escape = effect.energy is Energy.CONSERVATIVE and any(
@@ -229,11 +231,11 @@ def finite_where_searched(effect: Effect) -> str | None:
                 np.all(np.isfinite(simulate(compose(bench.rig, [effect]), values, record)[bench.output]))
             )
         except SimulationError:
-            # A spring that softens to nothing lets the mass go: allowed only where the sign is free.
+            # A spring that softens to zero releases the mass: allowed only if the sign of the parameter is free.
             finite = may_escape
         if not finite:
             own = {p.name: values[p.name] for p in effect.parameters}
-            return f"it cannot be simulated at {_told(own)}, inside its search ranges; narrow them."
+            return f"it cannot be simulated at {_told(own)}, which is inside its search ranges; narrow them."
     return None
 
 
@@ -282,7 +284,7 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
     for wrong in _WRONG:
         start = {name: value * (wrong if name in free else 1.0) for name, value in truth.items()}
         if effect.place is Place.DISTURBANCE:
-            # A line that is off by more than a cycle over the record is another line to a fit over time.
+            # A time-domain fit does not find a frequency that is off by more than one cycle over the record.
             for p in own:
                 if p.dimension == "time^-1":
                     start[p.name] = truth[p.name] + 1.0 / float(t[-1])
@@ -291,14 +293,15 @@ def _recovered(effect: Effect, bench: Bench, amplitude: float) -> str | None:
             break
     else:
         return (
-            f"fits to its own simulation, started {_WRONG[0] - 1.0:.0%} off, leave {result.weighted_rms:.2f} times the noise; "
-            "the equation is too rough in its parameters, or starts and search do not suit it."
+            f"fits to its own simulation, with start values {_WRONG[0] - 1.0:.0%} off, have a residual of "
+            f"{result.weighted_rms:.2f} times the noise; the equation is not smooth enough in its parameters, or starts and "
+            "search are unsuitable."
         )
     for p in own:
         error = result.standard_errors[p.name]
         if not error < _SEEN * (abs(truth[p.name]) or size[p.name]):
             return (
-                f"records do not determine {p.name}: {truth[p.name]:.3g} comes back with a standard error of {error:.2g}. "
+                f"records do not determine {p.name}: {truth[p.name]:.3g} is estimated with a standard error of {error:.2g}. "
                 "Fix it (fitted=False with a default), or choose starts at which the effect is strong."
             )
     for name in free:
@@ -322,11 +325,11 @@ CHECKS: tuple[Callable[[Effect], str | None], ...] = (
     finite_where_searched,
     is_found_again,
 )
-"""In the order in which they are worth reading."""
+"""In the order in which their messages are most useful."""
 
 
 def failed_checks(effect: Effect) -> tuple[str, ...]:
-    """Return what an effect with a sound declaration does not pass, one sentence each."""
+    """Return the failed checks of an effect with a valid declaration, one sentence each."""
     found: list[str] = []
     for check in CHECKS:
         try:

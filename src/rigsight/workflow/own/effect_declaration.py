@@ -1,6 +1,6 @@
-"""Is an effect's declaration complete and consistent, so that a rig can be simulated and fitted with it?
+"""Check that the declaration of an effect is complete and consistent.
 
-What is checked here needs no simulation; `rigsight.workflow.own.effect_checks` holds the rest.
+These checks need no simulation; the others are in `rigsight.workflow.own.effect_checks`.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ _SMOOTH = (
 
 
 def declaration_faults(effect: Effect) -> tuple[str, ...]:
-    """Return what is wrong with a declaration, one sentence each; nothing where it is in order."""
+    """Return the errors of a declaration, one sentence each; empty if there are none."""
     wrong_types = tuple(type_faults(effect))
     if wrong_types:
-        # Nothing else can be looked at where a field does not hold what it should.
+        # Nothing else can be checked if a field has the wrong type.
         return wrong_types
     found = tuple(
         dict.fromkeys([*_name_faults(effect), *_parameter_faults(effect), *_equation_faults(effect)])
@@ -75,9 +75,9 @@ def _name_faults(effect: Effect) -> Iterator[str]:
         yield f"the name '{effect.name}' must consist of lower-case letters, digits and underscores."
     for symbol in (*(p.name for p in effect.parameters), *(state.symbol.name for state in effect.states)):
         if not symbol.isidentifier() or not symbol.isascii() or keyword.iskeyword(symbol):
-            yield f"the symbol '{symbol}' must consist of letters, digits and underscores, and not be a word of Python."
+            yield f"the symbol '{symbol}' must consist of letters, digits and underscores, and must not be a keyword of Python."
     if not effect.summary.strip():
-        yield "the summary is empty; say in one sentence what the effect does."
+        yield "the summary is empty; describe in one sentence what the effect does."
 
 
 def _parameter_faults(effect: Effect) -> Iterator[str]:
@@ -87,37 +87,37 @@ def _parameter_faults(effect: Effect) -> Iterator[str]:
     names = [p.name for p in effect.parameters]
     signals = {name for names in _STATES_MAY_READ.values() for name in names}
     if not effect.null_values():
-        yield "no parameter has a null value; give null=... to one at whose value the effect vanishes."
+        yield "no parameter has a null value; give null=..., the value at which the effect vanishes, for at least one."
     for p in effect.parameters:
         if names.count(p.name) > 1:
             yield f"parameter {p.name} is declared {names.count(p.name)} times."
         if p.name in signals:
-            yield f"parameter {p.name} has the name of a signal of the rig; name it otherwise."
+            yield f"parameter {p.name} has the name of a signal of the rig; choose another name."
         if p.name not in used:
-            yield f"parameter {p.name} is declared but stands in no equation.{nearest(p.name, used - set(names))}"
+            yield f"parameter {p.name} is declared but occurs in no equation.{nearest(p.name, used - set(names))}"
         if not p.description.strip():
-            yield f"parameter {p.name} is not explained; give a description."
+            yield f"parameter {p.name} has no description; give one."
         yield from _range_faults(p)
         yield from _dimension_faults(p)
     for name in effect.special_cases:
         if name not in names:
-            yield f"special_cases names {name}, which is no parameter.{nearest(name, names)}"
+            yield f"special_cases names {name}, which is not a parameter.{nearest(name, names)}"
     for searched in effect.searched_as:
         for name in {searched.first, searched.second} - set(names):
-            yield f"searched_as names {name}, which is no parameter.{nearest(name, names)}"
+            yield f"searched_as names {name}, which is not a parameter.{nearest(name, names)}"
     dimensions = {p.name: p.dimension for p in effect.parameters}
     for pair in effect.ordered:
         for name in set(pair) - set(names):
-            yield f"ordered names {name}, which is no parameter.{nearest(name, names)}"
+            yield f"ordered names {name}, which is not a parameter.{nearest(name, names)}"
         if set(pair) <= set(names) and dimensions[pair[0]] != dimensions[pair[1]]:
-            yield f"ordered compares {pair[0]} with {pair[1]}, whose dimension is another."
+            yield f"ordered compares {pair[0]} with {pair[1]}, which has a different dimension."
     for field in ("post_yield_stiffness_ratio", "pulsation", "wave_number"):
         name = getattr(effect, field)
         if name is not None and name not in names:
-            yield f"{field} names {name}, which is no parameter.{nearest(str(name), names)}"
+            yield f"{field} names {name}, which is not a parameter.{nearest(str(name), names)}"
     for start in effect.starts:
         for name in start.values.keys() - {*names, "k"}:
-            yield f"a start gives a value to {name}, which is no parameter.{nearest(name, names)}"
+            yield f"a start gives a value to {name}, which is not a parameter.{nearest(name, names)}"
 
 
 def _range_faults(p: Parameter) -> Iterator[str]:
@@ -138,7 +138,7 @@ def _range_faults(p: Parameter) -> Iterator[str]:
         if not p.search[0] <= start <= p.search[1]:
             yield f"parameter {p.name}: the start {start:g} lies outside search [{p.search[0]:g}, {p.search[1]:g}]."
     if p.logarithmic and not p.search[0] > 0.0:
-        yield f"parameter {p.name} is searched over decades; search must begin above 0."
+        yield f"parameter {p.name} is searched logarithmically; the lower end of search must be above 0."
 
 
 def _dimension_faults(p: Parameter) -> Iterator[str]:
@@ -156,12 +156,12 @@ def _equation_faults(effect: Effect) -> Iterator[str]:
     changed = equations(effect)
     fitting = _PLACES[effect.place]
     if len(changed) != 1:
-        told = f"are {', '.join(changed)}" if changed else "is none"
-        yield f"it must change one part of the rig, but there {told}; at {effect.place.value} that is {' or '.join(fitting)}."
+        got = ", ".join(changed) or "none"
+        yield f"it must define exactly one expression, got {got}; allowed at {effect.place.value}: {', '.join(fitting)}."
         return
     ((field, expression),) = changed.items()
     if field not in fitting:
-        yield f"{field} does not belong to the place {effect.place.value}; there it is {' or '.join(fitting)}."
+        yield f"{field} is not allowed at the place {effect.place.value}; allowed: {', '.join(fitting)}."
     if effect.states and field not in _WITH_STATES:
         yield f"{field} cannot have states; only {', '.join(_WITH_STATES)} can."
     yield from _expression_faults(effect, field, expression, _MAY_READ[field])
@@ -185,17 +185,18 @@ def _expression_faults(
             continue
         if symbol.name in readable:
             yield (
-                f"{what}: {symbol} is another symbol than the rig's; write "
+                f"{what}: {symbol} is a different symbol from that of the rig; write "
                 f"'from rigsight.effects.symbols import {symbol}'."
             )
             continue
         known = [*own, *map(str, states), *readable]
-        yield f"{what}: {symbol} is no parameter, state or signal here.{nearest(symbol.name, known)} Known: {', '.join(known)}."
+        hint = nearest(symbol.name, known)
+        yield f"{what}: {symbol} is not a parameter, state or signal here.{hint} Known: {', '.join(known)}."
     for function in sorted(expression.atoms(Application), key=str):
         if not isinstance(function, (*_KINKS, *_SMOOTH)):
             yield (
                 f"{what}: {type(function).__name__} cannot be simulated; write kinks with Abs, sign or positive_part "
-                f"(rigsight.effects.symbols), and else use {', '.join(f.__name__ for f in _SMOOTH)}."
+                f"(rigsight.effects.symbols), and otherwise use {', '.join(f.__name__ for f in _SMOOTH)}."
             )
 
 
@@ -204,10 +205,10 @@ def _composition_faults(effect: Effect) -> Iterator[str]:
         try:
             compose(rig, [effect])
         except Exception as error:
-            # An expression may be wrong in ways that only its use shows; whatever it raises is the declaration's fault.
-            yield f"it cannot be put into {rig.name}: {type(error).__name__}: {error}"
+            # Some errors of an expression show only when it is used; any exception here is an error of the declaration.
+            yield f"it cannot be combined with the rig {rig.name}: {type(error).__name__}: {error}"
 
 
 def _rigs() -> list[Rig]:
-    """Return the built-in rigs of one joint: what an effect does there, it does at each joint of larger ones."""
+    """Return the built-in rigs of one joint; an effect acts in the same way at each joint of larger rigs."""
     return [rig for rig in RIGS.values() if rig.has_one_motion]

@@ -1,4 +1,4 @@
-"""Which effect does a name mean, and at which place of a rig: ``coulomb_friction@load_bearing``?"""
+"""Find the effect and the place that a name means: ``coulomb_friction@load_bearing``."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> E
     rig
         Where it acts.
     name
-        Of an effect, or ``effect@place``; the place may be left out where the effect makes sense at no other.
+        Of an effect, or ``effect@place``; the place may be left out if the effect applies at no other place.
     known
         Effects by name, without places.
     where
@@ -56,7 +56,7 @@ def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> E
     Raises
     ------
     InputError
-        If the effect is unknown, makes no sense on the rig, or its place is unknown or left open.
+        If the effect is unknown or does not apply to the rig, or its place is unknown or missing.
     """
     kind, place = kind_of(name), name.partition(AT)[2]
     if kind not in known:
@@ -64,7 +64,7 @@ def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> E
     effect = known[kind]
     if AT in name:
         _check_place(rig, effect, place, where)
-        # On a rig of one motion results call an effect by its name alone.
+        # On a rig of one motion, results name an effect without its place.
         is_usual = rig.has_one_motion and place == rig.acts_at(effect)
         return effect if is_usual else placed(effect, place)
     if rig.has_one_motion:
@@ -74,7 +74,7 @@ def effect_on(rig: Rig, name: str, known: Mapping[str, Effect], where: str) -> E
     if len(offered) > 1:
         listed = ", ".join(one.name for one in offered)
         raise InputError(f"{where}: '{kind}' can act at several places of {rig.name}; name one: {listed}.")
-    # Where it makes no sense anywhere, the composition says so.
+    # If it applies nowhere, the composition raises the error.
     return offered[0] if offered else effect
 
 

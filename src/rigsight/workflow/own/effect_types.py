@@ -1,6 +1,6 @@
-"""Does every field of a declared effect hold what its annotation says, so that the rest of it can be looked at?
+"""Check that every field of a declared effect has the type of its annotation.
 
-Python does not check what a user's file puts into a field; what is wrong there would only show in the middle of a fit.
+Python itself does not check them, so that a wrong type would only show in the middle of a fit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rigsight.errors import shown
 from rigsight.parameters import Parameter
 
 _PARTS = (Parameter, Signature, Start, State, SumAndDifference)
-_BEHIND = "(with a comma behind a single one)"
+_BEHIND = "(a single one needs a comma after it)"
 _WANTED = {
     "str": "a text",
     "float": "a number",
@@ -41,7 +41,7 @@ _WANTED = {
 
 
 def _number(value: object) -> float:
-    # Pydantic takes whatever can be turned into a float, such as an array of one value.
+    # Pydantic accepts whatever can be converted to a float, such as an array of one value.
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise ValueError("no number")
     try:
@@ -52,7 +52,7 @@ def _number(value: object) -> float:
 
 @cache
 def _models() -> dict[type, type[BaseModel]]:
-    """Return for an effect and for each of its parts a model that takes in every field only what its annotation says."""
+    """Return a model for an effect and for each of its parts, whose fields accept only values of the annotated type."""
     instance: Any = InstanceOf
     # A part is checked field by field on its own, so that a sentence names its field.
     own = {part.__name__: instance[part] for part in _PARTS}
@@ -67,7 +67,7 @@ def _models() -> dict[type, type[BaseModel]]:
 
 
 def type_faults(effect: Effect) -> Iterator[str]:
-    """Yield a sentence for each field of an effect, and of its parts, that holds something else than it should."""
+    """Yield a sentence for each field of an effect, and of its parts, with a value of the wrong type."""
     yield from _faults("", Effect, effect)
 
 
@@ -83,7 +83,7 @@ def _faults(where: str, declared: type, holder: object) -> Iterator[str]:
         value = values[field.name]
         if field.name in wrong:
             got = wrong[field.name]
-            yield f"{where}{field.name} {'is' if got is value else 'holds'} {shown(got)}; give {_wanted(str(field.type))}."
+            yield f"{where}{field.name} {'is' if got is value else 'contains'} {shown(got)}; give {_wanted(str(field.type))}."
         for part in value if isinstance(value, tuple) else (value,):
             for kind in _PARTS:
                 if isinstance(part, kind):

@@ -1,6 +1,6 @@
-"""How do a user's own effects, from a Python file or an installed package, come to compete with the catalogue's?
+"""Load a user's own effects from Python files and installed packages.
 
-A file is code that the user chose to run: it is executed, and whatever it declares at its top level as an `Effect` is taken.
+A file is executed, as code that the user chose to run; every `Effect` at its top level is taken.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ ENTRY_POINTS = "rigsight.effects"
 """Entry point group of packages that bring effects; each entry is an `Effect` or a tuple of them."""
 CHECKING = "Checking own effects"
 _LONGEST_EQUATION = 160
-_MISSING = "--effects names a Python file. One effect of the catalogue alone is tried with --effect."
+_MISSING = "--effects expects a Python file. To try only one effect of the catalogue, use --effect NAME."
 
 
 @dataclass(frozen=True)
 class OwnEffect:
-    """An effect that is not of the catalogue, with where it was declared, as messages call it."""
+    """An effect that is not in the catalogue, with the place of its declaration for messages."""
 
     effect: Effect
     declared: str
@@ -46,8 +46,8 @@ def own_effects(
     files
         Python files that declare effects.
     check
-        Simulate and fit each of them, to see that it passes the checks of the catalogue's effects; False where a model that
-        was already fitted is only to be run.
+        Simulate and fit each of them, with the checks of the catalogue's effects; False if a fitted model is only to be
+        simulated.
     listener
         Told of every checked effect.
 
@@ -67,7 +67,7 @@ def own_effects(
             raise InputError(_message(own, faults))
         if own.effect.name in taken:
             raise InputError(
-                f"{own.declared}: the effect name '{own.effect.name}' is taken by {taken[own.effect.name]}; name it otherwise."
+                f"{own.declared}: the effect name '{own.effect.name}' is used by {taken[own.effect.name]}; choose another."
             )
         taken[own.effect.name] = own.declared
         found.append(own)
@@ -85,9 +85,9 @@ def own_effects(
 
 
 def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return the effects of the catalogue and `own` with these names, all of them where none is named.
+    """Return the effects of the catalogue and `own` with these names; all of them if no name is given.
 
-    A name may say where the effect acts, ``coulomb_friction@shaft``; whether a rig has this place is not known here.
+    A name may say where the effect acts, ``coulomb_friction@shaft``; whether the rig has this place is checked later.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def named(names: Sequence[str], own: Sequence[Effect]) -> tuple[Effect, ...]:
 
 
 def equation_text(effect: Effect) -> str:
-    """Return an effect's equation in one line of plain text, cut where it is long."""
+    """Return the equation of an effect in one line of plain text, shortened if it is long."""
     told = {
         "torque": "resisting torque = {}",
         "spring": "spring torque = {}",
@@ -131,7 +131,7 @@ def _check_parents(own: OwnEffect, taken: Iterable[str]) -> None:
     for parent in own.effect.parents:
         if parent not in taken:
             raise InputError(
-                f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is no known effect."
+                f"{own.declared}: effect '{own.effect.name}' starts from '{parent}', which is not a known effect."
             )
 
 
@@ -146,13 +146,13 @@ def _loaded(path: Path) -> list[OwnEffect]:
     ]
     if not declared:
         raise InputError(
-            f"{path.name}: declares no effect. Give it at least one: MY_EFFECT = Effect(name=..., ...) at the top level."
+            f"{path.name}: declares no effect. Declare at least one: MY_EFFECT = Effect(name=..., ...) at the top level."
         )
     return declared
 
 
 def _assignments(tree: ast.Module) -> dict[str, int]:
-    """Return the line in which each name of the top level is given its value last."""
+    """Return the line of the last assignment to each name of the top level."""
     lines = {}
     for statement in tree.body:
         targets: list[ast.expr] = []
@@ -177,13 +177,13 @@ def _installed() -> list[OwnEffect]:
             loaded = entry.load()
         except Exception as error:
             raise InputError(
-                f"{declared}: cannot be loaded: {type(error).__name__}: {error}. Mend or uninstall it."
+                f"{declared}: cannot be loaded: {type(error).__name__}: {error}. Fix or uninstall the package."
             ) from None
         effects = loaded if isinstance(loaded, tuple | list) else (loaded,)
         for effect in effects:
             if not isinstance(effect, Effect):
                 raise InputError(
-                    f"{declared}: gives a {type(effect).__name__}, not an Effect. Mend or uninstall it."
+                    f"{declared}: is a {type(effect).__name__}, not an Effect. Fix or uninstall the package."
                 )
             found.append(OwnEffect(effect, declared))
     return found

@@ -1,4 +1,4 @@
-"""Which rigs are there by name: the built-in ones, and those of a user's own files."""
+"""Find rigs by name: the built-in ones, and those of a user's own rig files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
     Parameters
     ----------
     files
-        Rig files; one that is named twice is read once.
+        Rig files; one that is given twice is read once.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def own_rigs(files: Iterable[str | Path]) -> dict[Path, Rig]:
         rig = read_rig_file(path)
         if rig.name in taken:
             raise InputError(
-                f"{path}: name: '{rig.name}' is the name of {taken[rig.name]}; give the rig a name of its own."
+                f"{path}: name: '{rig.name}' is the name of {taken[rig.name]}; give the rig another name."
             )
         taken[rig.name] = f"the rig of {path}"
         found[path] = rig

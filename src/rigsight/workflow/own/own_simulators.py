@@ -1,4 +1,4 @@
-"""How does a function of a user's own become the simulator of a rig? Named on the command line, never by a campaign alone."""
+"""Python functions of a user as simulators of rigs; only the command line can name them, never a campaign alone."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from rigsight.errors import InputError, nearest
 from rigsight.simulators import give_function
 from rigsight.workflow.own.python_file import run_python_file
 
-_WRITTEN = "--simulator names a Python file and a function in it, as arm.py:accelerations."
+_WRITTEN = "--simulator expects a Python file and a function in it, for instance arm.py:accelerations."
 
 
 def own_simulators(named: Iterable[str]) -> None:
-    """Run Python files, and let rigs be simulated by functions of theirs.
+    """Execute Python files and register functions of them as simulators.
 
     Parameters
     ----------
     named
-        ``FILE.py:FUNCTION`` each; a rig file calls it ``file = "FUNCTION"``.
+        ``FILE.py:FUNCTION`` each; a rig file refers to it by ``file = "FUNCTION"``.
 
     Raises
     ------
@@ -39,6 +39,8 @@ def own_simulators(named: Iterable[str]) -> None:
                 f"{file} has no function '{name}'.{nearest(name, functions)} It has: {', '.join(functions) or 'none'}."
             )
         if name in taken:
-            raise InputError(f"--simulator: {taken[name]} and {one} are called the same; rename one of them.")
+            raise InputError(
+                f"--simulator: {taken[name]} and {one} have the same function name; rename one of them."
+            )
         taken[name] = one
         give_function(name, getattr(module, name))

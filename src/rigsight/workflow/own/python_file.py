@@ -1,4 +1,4 @@
-"""A Python file that a user names -> what it declares, or one message with the line at which it failed."""
+"""Execute a user's Python file; errors become one message with the line."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _LARGEST_FILE = 1_000_000
 
 
 def run_python_file(path: Path, what: str, if_missing: str) -> tuple[ModuleType, ast.Module]:
-    """Run a file, and return its module and its syntax.
+    """Execute a file, and return its module and its syntax tree.
 
     Parameters
     ----------
     path
         The file: code that the user chose to run.
     what
-        How messages call it.
+        Its description in messages.
     if_missing
-        What a message says where there is none.
+        Hint in the message if the file does not exist.
 
     Raises
     ------
     InputError
-        If it cannot be read or is no Python, or with the line at which it failed.
+        If it cannot be read, is not valid Python or raises an exception; with the line of the error.
     """
     source = _source(path, what, if_missing)
     try:
@@ -39,7 +39,7 @@ def run_python_file(path: Path, what: str, if_missing: str) -> tuple[ModuleType,
     except ValueError as error:
         raise InputError(f"{path.name}: is not valid Python: {error}.") from None
     except (RecursionError, MemoryError):
-        raise InputError(f"{path.name}: is nested deeper than Python reads.") from None
+        raise InputError(f"{path.name}: is nested too deeply for Python.") from None
     module = ModuleType(f"rigsight_own_{path.stem}")
     module.__file__ = str(path)
     try:
@@ -54,7 +54,7 @@ def run_python_file(path: Path, what: str, if_missing: str) -> tuple[ModuleType,
 
 def _source(path: Path, what: str, if_missing: str) -> str:
     if path.exists() and file_size(path, what) > _LARGEST_FILE:
-        raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB: it is not {what}.")
+        raise InputError(f"{path.name} is larger than {_LARGEST_FILE / 1e6:g} MB, so it is not {what}.")
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:

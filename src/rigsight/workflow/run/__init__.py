@@ -1,1 +1,1 @@
-"""What every run of a command needs: progress, compiled kernels, and files written whole and together or not at all."""
+"""Shared by all commands: progress, compiled kernels, and result files that are written completely or not at all."""

@@ -1,7 +1,7 @@
-"""Where do the fits of a running diagnosis go, so that one that was interrupted goes on where it stopped?
+"""A journal of finished fits on disk, so that an interrupted diagnosis can be continued.
 
-A line of JSON per fit, appended as it ends, in a file beside the compiled kernels. A kill leaves at most a torn last line, which
-is not read. The file goes with the end of the diagnosis.
+One line of JSON per finished fit, in a file beside the compiled kernels. A kill leaves at most an incomplete last line, which is
+ignored. The file is removed at the end of the diagnosis.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from rigsight.simulate import cache_folder
 class FitJournal:
     """The fits of one diagnosis, kept on disk until it is done.
 
-    Used as a context: left without an error the file is removed, otherwise it stays.
+    Used as a context: the file is removed if the context ends without an error, otherwise it is kept.
 
     Parameters
     ----------
     campaign
-        The campaign's file or folder; its path names the journal. What was fitted there is told apart by the keys of the fits.
+        The campaign's file or folder; its path determines the journal's name. Fits are identified by their keys.
     going_on
-        Told how many fits are kept from before, once, when the first of them serves again.
+        Called once with the number of stored fits, when the first of them is reused.
     """
 
     def __init__(self, campaign: Path, going_on: Callable[[int], None] | None = None) -> None:
@@ -42,7 +42,7 @@ class FitJournal:
 
     @property
     def recalled(self) -> int:
-        """Fits that did not have to be done again; one that is asked for twice is one."""
+        """Number of reused fits; one that is asked for twice counts once."""
         return len(self._again)
 
     def __enter__(self) -> Self:
@@ -67,11 +67,11 @@ class FitJournal:
                 self._path.unlink()
 
     def recall(self, key: str) -> Mapping[str, Any] | None:
-        """Return the outcome that was remembered under a key, None if there is none."""
+        """Return the outcome stored under a key, None if there is none."""
         found = self._known.get(key)
         if found is not None:
             with self._lock:
-                # Not before: a campaign that was changed since has the same path, and none of these fits.
+                # Not earlier: a campaign that was changed since has the same path but none of these fits.
                 is_first = not self._again
                 self._again.add(key)
             if is_first and self._going_on is not None:
@@ -79,19 +79,19 @@ class FitJournal:
         return found
 
     def remember(self, key: str, outcome: Mapping[str, Any]) -> None:
-        """Append an outcome; where the disk does not take it, the diagnosis goes on without."""
+        """Append an outcome; if it cannot be written, the diagnosis continues without it."""
         line = json.dumps({"key": key, **outcome}) + "\n"
         with self._lock, contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
 
 
 def _checked(entry: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return an entry whose parts have the types that a fit relies on.
+    """Return an entry whose parts have the types that a fit needs.
 
     Raises
     ------
     KeyError, TypeError, ValueError
-        If they do not.
+        If they have not.
     """
     return {
         "theta": [float(value) for value in entry["theta"]],

@@ -1,4 +1,4 @@
-"""How is a JSON file read that somebody may have written by hand?"""
+"""Read a JSON file that may have been written by hand."""
 
 from __future__ import annotations
 
@@ -20,21 +20,23 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
     path
         The file.
     what
-        What it should be: ``"model"``.
+        The kind of file in messages: ``"model"``.
     mend
-        A sentence on where such a file comes from or what it holds.
+        A sentence on where such a file comes from or what it contains.
 
     Raises
     ------
     InputError
-        Naming the file, and line and column of what is no JSON; also for repeated keys and NaN, which Python would read.
+        Naming the file, and line and column of invalid JSON; also for repeated keys and NaN, which Python would accept.
     """
     try:
         if file_size(path) > LARGEST_FILE:
-            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB: it is no {what}.")
+            raise InputError(f"{path.name} is larger than {LARGEST_FILE / 1e6:g} MB, so it is not a {what}.")
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path.name} is not UTF-8 text (byte {error.start}); it is no {what}.") from None
+        raise InputError(
+            f"{path.name} is not UTF-8 text (byte {error.start}), so it is not a {what}."
+        ) from None
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     try:
@@ -44,26 +46,28 @@ def json_object(path: Path, what: str, mend: str) -> dict[str, Any]:
             f"{path.name}, line {error.lineno}, column {error.colno}: is not valid JSON: {error.msg}. {mend}"
         ) from None
     except RecursionError:
-        raise InputError(f"{path.name}: is nested deeper than a {what} ever is. {mend}") from None
+        raise InputError(f"{path.name}: is nested too deeply for a {what}. {mend}") from None
     except (_MeaninglessError, ValueError) as error:
         raise InputError(f"{path.name}: {error}") from None
     if not isinstance(data, dict):
-        raise InputError(f"{path.name}: must hold one object in braces, got a {type(data).__name__}. {mend}")
+        raise InputError(
+            f"{path.name}: must contain one object in braces, got a {type(data).__name__}. {mend}"
+        )
     return data
 
 
 class _MeaninglessError(Exception):
-    """JSON that Python would read but that means nothing."""
+    """JSON that Python accepts but that is meaningless here."""
 
 
 def _without_repeated_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content: dict[str, Any] = {}
     for key, value in pairs:
         if key in content:
-            raise _MeaninglessError(f"the key '{key}' stands twice in one table; remove one.")
+            raise _MeaninglessError(f"the key '{key}' occurs twice in one object; remove one.")
         content[key] = value
     return content
 
 
 def _refuse_constant(name: str) -> float:
-    raise _MeaninglessError(f"{name} is no number that a simulation can use; give finite numbers.")
+    raise _MeaninglessError(f"{name} is not a finite number; give finite numbers.")

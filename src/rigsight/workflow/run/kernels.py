@@ -1,4 +1,4 @@
-"""Which kernels a diagnosis needs, and how are they compiled before it starts?"""
+"""The kernels that a diagnosis needs, and their compilation before it starts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_JOBS = 1024
 
 
 def checked_jobs(n_jobs: int | None) -> int:
-    """Return the number of jobs to run side by side: one per processor that this process may use, unless it is given.
+    """Return the number of parallel jobs: one per processor that this process may use, unless it is given.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def structures_to_try(
 
 
 def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: Listener = silent) -> None:
-    """Compile what this machine does not hold yet, several at a time.
+    """Compile the kernels that are not in the cache of this machine yet, several at a time.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
     n_jobs
         Compilers side by side.
     listener
-        Told of every compiled kernel; not at all where there is nothing to compile.
+        Called for every compiled kernel; not at all if there is nothing to compile.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def prepare_kernels(structures: Sequence[Structure], n_jobs: int, listener: List
     if not missing:
         return
     stage = Stage(COMPILING, len(missing), listener)
-    # A compiler is a process of its own, so threads are enough to keep several at work.
+    # Each compiler is its own process, so threads are enough to run several of them.
     parallel = Parallel(
         n_jobs=min(n_jobs, len(missing)), backend="threading", return_as="generator_unordered", batch_size=1
     )

@@ -1,4 +1,4 @@
-"""What a command says while it works: finished steps of a known number, for whoever wants to listen."""
+"""Progress of a command: finished steps out of a known number, passed to a listener."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Step:
     detail
         What has just been finished; empty at the start of a stage.
     done, total
-        Steps of the stage that are finished, and all of them; both 0 for a remark, which is no work.
+        Steps of the stage that are finished, and all of them; both 0 for a remark.
     """
 
     stage: str
@@ -34,13 +34,13 @@ def silent(step: Step) -> None:
 
 
 def tell(remarks: Iterable[str], listener: Listener) -> None:
-    """Tell a listener what was noticed, while there is still time to stop."""
+    """Pass a note to a listener early, while the user can still stop."""
     for remark in remarks:
         listener(Step(remark, "", 0, 0))
 
 
 class Stage:
-    """Counts the steps of one stage and tells a listener; more steps than announced raise the total."""
+    """Counts the steps of one stage and reports them to a listener; more steps than announced raise the total."""
 
     def __init__(self, name: str, total: int, listener: Listener) -> None:
         self._name = name
@@ -50,7 +50,7 @@ class Stage:
         listener(Step(name, "", 0, total))
 
     def finished(self, detail: str) -> None:
-        """Tell that one more step is finished."""
+        """Report one more finished step."""
         self._done += 1
         self._total = max(self._total, self._done)
         self._listener(Step(self._name, detail, self._done, self._total))

@@ -1,4 +1,4 @@
-"""How does a person at a terminal see the progress of a command?"""
+"""Display of progress on the terminal."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from rigsight.workflow.run.progress import Listener, Step, silent
 _REMEMBERED = 24 * 3600.0
 """Time [s] over which the speed of steps is averaged."""
 _BETWEEN_LINES = 30.0
-"""Time [s] after which a log is told how far the work is: often enough to see that it goes on, and no more."""
+"""Interval [s] of progress lines in a log."""
 
 
 @contextlib.contextmanager
 def listening(quiet: bool) -> Iterator[Listener]:
-    """Show progress on stderr: a bar on a terminal, a line now and then where the output is kept, nothing if quiet."""
+    """Show progress on stderr: a bar on a terminal, a line at intervals in a log, nothing if quiet."""
     # A process without a terminal may have no stderr at all.
     if quiet or sys.stderr is None:
         yield silent
@@ -32,7 +32,7 @@ def listening(quiet: bool) -> Iterator[Listener]:
 
 
 def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time.monotonic) -> Listener:
-    """Return what says a line at the start of a stage, and later at most one in so many seconds."""
+    """Return a listener that prints a line at the start of a stage, and later at most one line per interval."""
     last = clock()
 
     def say(step: Step) -> None:
@@ -44,7 +44,7 @@ def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time
         line = f"{step.stage} ({step.done} of {step.total}){detail}" if step.done > 0 else f"{step.stage} ..."
         if step.total == 0:
             line = f"Note: {step.stage}"
-        # A log that is full, or a terminal that went away, ends no work of hours.
+        # A full disk or a closed terminal must not end hours of work.
         with contextlib.suppress(OSError):
             typer.echo(line, err=True)
 
@@ -52,7 +52,7 @@ def log_lines(between: float = _BETWEEN_LINES, clock: Callable[[], float] = time
 
 
 class _Lasting:
-    """A terminal that may go away: what can no longer be shown ends no work of hours and hides no error."""
+    """A terminal that may be closed: output that can no longer be shown neither ends the work nor hides an error."""
 
     def __init__(self, terminal: IO[str]) -> None:
         self._terminal = terminal
@@ -91,7 +91,7 @@ def _bar() -> Iterator[Listener]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[detail]}"),
     )
-    # Single steps take minutes, and the time left is told from all of them.
+    # Single steps take minutes, so the remaining time is estimated from all of them.
     with Progress(
         *columns,
         console=Console(file=cast("IO[str]", _Lasting(sys.stderr)), force_terminal=True),
@@ -99,7 +99,7 @@ def _bar() -> Iterator[Listener]:
         speed_estimate_period=_REMEMBERED,
     ) as progress:
         tasks = {}
-        # The first seconds go into importing sympy and scipy: say that something happens.
+        # Importing sympy and scipy takes the first seconds: show that something happens.
         starting = progress.add_task("Starting", total=None, detail="")
 
         def listener(step: Step) -> None:

@@ -1,4 +1,4 @@
-"""How result files reach the disk: whole and together, or not at all."""
+"""Write result files, all of them completely or none."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from rigsight.errors import InputError, MachineError
 from rigsight.workflow.run.unfinished_files import keep_locked, remove_left, temporary_path, write_locked
 
 _REASONS = {
-    errno.EACCES: "writing is not allowed there",
-    errno.EPERM: "writing is not allowed there",
+    errno.EACCES: "no permission to write there",
+    errno.EPERM: "no permission to write there",
     errno.EROFS: "the file system is read-only",
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
     errno.ENAMETOOLONG: "the name is too long",
-    errno.ENOENT: "the folder above it does not exist and cannot be made",
+    errno.ENOENT: "its parent folder does not exist and cannot be created",
 }
 ENDING_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-"""Ctrl-C, kill, and a terminal that goes away."""
+"""Ctrl-C, kill, and a closed terminal."""
 DIAGNOSIS_FILE, REPORT_FILE = "diagnosis.json", "report.html"
 """Results of a diagnosis; the bench reads one and links the other."""
 ELSEWHERE = "Name another place with --out."
@@ -40,7 +40,7 @@ _noted: ContextVar[list[Path] | None] = ContextVar("folders with results", defau
 
 @contextlib.contextmanager
 def noting_folders() -> Iterator[Sequence[Path]]:
-    """Give the folders into which results are written inside this block, for who says what is there when it is interrupted."""
+    """Collect the folders into which results are written inside this block, for the message after an interruption."""
     folders: list[Path] = []
     before = _noted.set(folders)
     try:
@@ -50,18 +50,18 @@ def noting_folders() -> Iterator[Sequence[Path]]:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """Return content as JSON in the order it was put together in, readable and with a line end.
+    """Return content as indented JSON in its own order, with a final line end.
 
     Raises
     ------
     ValueError
-        If a number is not finite: JSON has no word for it.
+        If a number is not finite, which JSON cannot represent.
     """
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def check_writable(folder: Path) -> None:
-    """Find out before long work whether results can be written into a folder, which may not exist yet.
+    """Check before long work that results can be written into a folder, which may not exist yet.
 
     Raises
     ------
@@ -81,12 +81,12 @@ def check_writable(folder: Path) -> None:
 
 
 def check_target(file: Path) -> None:
-    """Find out before long work whether one result file can be written, or replaced.
+    """Check before long work that one result file can be written or replaced.
 
     Raises
     ------
     InputError
-        If the name belongs to something that is no file, or its folder cannot be written.
+        If the name belongs to something other than a file, or its folder cannot be written.
     """
     check_writable(file.parent)
     _check_replaceable(file)
@@ -97,17 +97,17 @@ def write_together(
 ) -> tuple[Path, ...]:
     """Write files into a folder, all of them or none; files of these names are replaced.
 
-    Whatever ends it, Ctrl-C and kill included, the folder holds all old files or all new ones; only a process that is killed
-    outright while the finished files are given their names can leave some of each. What such a one left is removed.
+    Even after Ctrl-C or kill, the folder contains all old files or all new ones. Only SIGKILL during the final renaming can leave
+    a mixture. Temporary files of such a run are removed by the next one.
 
     Parameters
     ----------
     folder
-        Made, with the folders above it, if it does not exist.
+        Created, with its parent folders, if it does not exist.
     contents
         File name, or path inside the folder -> text, or bytes of a picture.
     mend
-        What can be done where the folder cannot be written, for the message.
+        Hint in the message if the folder cannot be written.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def write_together(
     InputError
         If the folder cannot be made or written, something is in the way, or the disk is full.
     """
-    # Links keep pointing where they do; what they point to is replaced.
+    # Links are kept; the files to which they point are replaced.
     token = secrets.token_hex(4)
     made: list[Path] = []
     parts: dict[Path, Path] = {}
@@ -135,7 +135,7 @@ def write_together(
                 locks.callback(file.close)
                 os.fsync(file.fileno())
                 if os.name == "nt":
-                    # An open file cannot be given another name there.
+                    # An open file cannot be renamed there.
                     file.close()
             with signals_held() as held:
                 _put_in_place(parts, token, held)
@@ -144,13 +144,13 @@ def write_together(
                     folders.append(folder)
     except BaseException as error:
         if is_in_place:
-            # A signal that waited; it came when all was done.
+            # A deferred signal that arrived after everything was done.
             raise
         with signals_held(), contextlib.suppress(OSError):
             for path in parts.values():
                 path.unlink(missing_ok=True)
             for path in reversed(made):
-                # Somebody else may have put a file there meanwhile.
+                # Another process may have put a file there meanwhile.
                 if path.is_dir() and not any(path.iterdir()):
                     path.rmdir()
         if isinstance(error, OSError):
@@ -160,7 +160,7 @@ def write_together(
 
 
 def _put_in_place(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -> None:
-    """Give finished files their names; if one cannot have it, or a signal waits, the old files are back at theirs."""
+    """Rename finished files to their final names; if that fails or a signal is waiting, restore the old files."""
     kept: dict[Path, Path] = {}
     fresh: list[Path] = []
     with contextlib.ExitStack() as locks:
@@ -175,7 +175,7 @@ def _put_in_place(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -
             for target, part in parts.items():
                 part.replace(target)
             if held:
-                # Who interrupts is told that nothing was written.
+                # The message after the interruption says that nothing was written.
                 raise KeyboardInterrupt
         except BaseException:
             for path in fresh:
@@ -184,23 +184,23 @@ def _put_in_place(parts: Mapping[Path, Path], token: str, held: Sequence[int]) -
                 old.replace(target)
             raise
         finally:
-            # Two names of one file stay two when one is to replace the other.
+            # Renaming one hard link of a file to another would do nothing.
             for old in kept.values():
-                # All is in place; the next run removes what is left here.
+                # All files are in place; the next run removes what remains here.
                 with contextlib.suppress(OSError):
                     old.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
 def signals_held() -> Iterator[Sequence[int]]:
-    """Let Ctrl-C and requests to end wait until this context is left; those that wait are listed."""
+    """Defer Ctrl-C and termination signals until this context ends; the result lists those that are waiting."""
     held: list[int] = []
     if threading.current_thread() is not threading.main_thread():
-        # Signals reach the main thread alone.
+        # Only the main thread receives signals.
         yield held
         return
     before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
-    # What was not set from Python cannot be set again; what is ignored stays so.
+    # Handlers that were not set from Python cannot be restored; ignored signals stay ignored.
     before = {number: old for number, old in before.items() if old not in (None, signal.SIG_IGN)}
     for number in before:
         signal.signal(number, lambda number, _: held.append(number))
@@ -214,14 +214,14 @@ def signals_held() -> Iterator[Sequence[int]]:
 
 
 def _make(folder: Path, made: list[Path]) -> None:
-    """Make a folder with those above it; the new ones are appended, outermost first, each before it is made."""
+    """Create a folder with its parents; new ones are appended to the list, outermost first, before they are created."""
     for path in reversed([path for path in (folder, *folder.parents) if not path.exists()]):
         made.append(path)
         path.mkdir(exist_ok=True)
 
 
 def _check_replaceable(file: Path) -> None:
-    """Refuse what must not be replaced by a file: folders, and devices such as /dev/stdout."""
+    """Refuse targets that must not be replaced by a file: folders, and devices such as /dev/stdout."""
     if file.is_dir():
         raise InputError(f"Cannot write {file}: it is a folder. Name a file, or remove the folder.")
     if file.exists() and not file.is_file():

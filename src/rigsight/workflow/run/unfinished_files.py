@@ -1,7 +1,7 @@
-"""Which temporary files hold results on their way to the disk, and which of them did a killed run leave?
+"""Temporary files of results that are being written, and removal of those that a killed run left.
 
-A file on its way to ``NAME`` is ``.NAME.TOKEN.part``, what it replaces waits as ``.NAME.TOKEN.old`` until all are in place. Both
-are locked as long as their writer lives, so that a later run removes what a killed one left, and nothing else.
+A file that becomes ``NAME`` is first ``.NAME.TOKEN.part``; the old file is kept as ``.NAME.TOKEN.old`` until all are in place.
+Both are locked while their writer lives, so that a later run removes only what a killed one left.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ fcntl: ModuleType | None
 try:
     import fcntl
 except ImportError:
-    # Windows: nothing can be told about a writer there, so nothing is removed.
+    # Windows: whether the writer lives cannot be determined, so nothing is removed.
     fcntl = None
 
 _TEMPORARY = re.compile(r"\.[0-9a-f]{8}\.(part|old)")
 
 
 def temporary_path(target: Path, token: str, ending: str) -> Path:
-    """Return where content on its way to a file, or the file's old content, waits; `ending` is ``part`` or ``old``."""
+    """Return the temporary path of the new or old content of a file; `ending` is ``part`` or ``old``."""
     return target.with_name(f".{target.name}.{token}.{ending}")
 
 
 def write_locked(path: Path, content: bytes) -> IO[bytes]:
-    """Write a new file and return it open, locked as long as it is.
+    """Write a new file and return it open; it is locked while it is open.
 
     Raises
     ------
@@ -48,12 +48,12 @@ def write_locked(path: Path, content: bytes) -> IO[bytes]:
 
 
 def keep_locked(target: Path, path: Path) -> IO[bytes]:
-    """Give a file a second name, or copy it where a file has only one; return it open, locked as long as it is.
+    """Give a file a second hard link, or copy it where that is not possible; return it open and locked.
 
     Raises
     ------
     OSError
-        If the disk does not take it.
+        If it cannot be written.
     """
     try:
         path.hardlink_to(target)
@@ -73,7 +73,7 @@ def keep_locked(target: Path, path: Path) -> IO[bytes]:
 
 
 def remove_left(target: Path) -> None:
-    """Remove what killed runs left of a file on its way."""
+    """Remove temporary files of a result that killed runs left."""
     if fcntl is None:
         return
     with contextlib.suppress(OSError):
@@ -92,6 +92,6 @@ def _remove_if_left(path: Path) -> None:
 
 def _lock(file: IO[bytes]) -> None:
     if fcntl is not None:
-        # A file system without locks takes results all the same.
+        # Results are written also on file systems without locks.
         with contextlib.suppress(OSError):
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""With which sweep is a model asked how it answers? A logarithmic one about its natural frequencies."""
+"""The sweep with which a model is simulated for its frequency response: logarithmic, about its natural frequencies."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _BAND = (1.0 / 12.0, 6.0)
 _GROWTH = math.log(640.0 / 1e-3) / 150.0 / 12.0
 """Rate of the thesis's sweep (section 4.2) per radian of the identified natural frequency, e-folds per radian."""
 _SAMPLES_PER_PERIOD = 10.0
-"""At the end of the sweep."""
+"""Fade-out at the end of the sweep."""
 _N_FREQUENCIES = 96
 _OSCILLATES = 0.1
 """Least share of the imaginary part of a pole that makes a natural frequency: a damping ratio below 0.995."""
@@ -37,7 +37,7 @@ _NUDGE = 1e-6
 
 @dataclass(frozen=True)
 class Pair:
-    """Names of an input and of the sensor that answers."""
+    """Names of an input and of an output."""
 
     source: str
     response: str
@@ -46,23 +46,23 @@ class Pair:
 def variation_sweep(
     model: Model, pair: Pair, amplitude: float, band: tuple[float, float] | None
 ) -> tuple[Record, SpectralRatio]:
-    """Return the sweep, the other inputs at rest, and what reads the response.
+    """Return the sweep, with the other inputs at rest, and the estimator of the response.
 
     Parameters
     ----------
     model
         The model.
     pair
-        What is swept and what answers.
+        Swept input and output.
     amplitude
         In the unit of the input.
     band
-        Angular frequencies [rad/s]; None for those about the model's own.
+        Angular frequencies [rad/s]; None for a band about the natural frequencies.
 
     Raises
     ------
     InputError
-        If the band is none, or the model has no natural frequency to put it about.
+        If the band is invalid, or the model has no natural frequency.
     """
     rig = model.structure.rig
     slowest = None
@@ -94,7 +94,7 @@ def variation_sweep(
         units=units,
         kind="sweep",
         amplitude=amplitude,
-        # A motion that is prescribed is smooth between its samples, whatever holds an input.
+        # A prescribed motion is smooth between its samples, whatever the hold of other inputs.
         hold="band_limited" if pair.source in prescribing else model.hold,
     )
     return record, SpectralRatio(pair.source, pair.response, np.geomspace(*band, _N_FREQUENCIES))
@@ -143,7 +143,7 @@ def _poles(model: Model) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
 def _natural_frequency(model: Model, amplitude: float) -> float:
     """Return the natural frequency [rad/s] with the stiffness that holds a constant input of this amplitude.
 
-    A hysteretic spring is much stiffer for small motion than where the resonance of a sweep lies.
+    A hysteretic spring is much stiffer for small motion than at the resonance of a sweep.
     """
     motion = model.structure.rig.motion
     drive, stiffness, inertia, rest = (

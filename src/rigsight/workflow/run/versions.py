@@ -1,4 +1,4 @@
-"""Which versions of packages do the figures of a result depend on?"""
+"""Versions of the packages on which the values of a result depend."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _VERSIONS_OF = ("rigsight", "numpy", "scipy")
 
 
 def versions() -> dict[str, str]:
-    """Return the versions on which figures depend, by package."""
+    """Return the versions of these packages, by name."""
     found = {"python": platform.python_version()}
     for package in _VERSIONS_OF:
         try:

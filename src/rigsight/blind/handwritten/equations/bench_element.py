@@ -50,7 +50,7 @@ class Element:
         Raises
         ------
         SimulationError
-            If events pile up.
+            If events accumulate.
         """
         self._motion = motion
         samples = dt * np.arange(n_samples, dtype=np.float64)

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 
 class DriveLaw:
-    """What lies between command and force; as it stands here, nothing.
+    """The law between command and force; the base class is ideal.
 
     `u` is the command in its own unit, `v` the rate along which the drive acts, `z` the law's own states.
     """
@@ -24,7 +24,7 @@ class DriveLaw:
     """[s]."""
 
     def output(self, u: float, v: float, z: Sequence[float]) -> float:  # noqa: ARG002
-        """Return what acts, in the unit of the command."""
+        """Return the output, in the unit of the command."""
         return u
 
     def rates(self, u: float, z: Sequence[float]) -> list[float]:  # noqa: ARG002
@@ -33,7 +33,7 @@ class DriveLaw:
 
 
 class DeadTime(DriveLaw):
-    """The command acts later.
+    """The command acts after a dead time.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Lag(DriveLaw):
 
 
 class RateLimit(DriveLaw):
-    """A valve or hoist that cannot change faster than so much (G. Stein, IEEE Control Syst. Mag. 23 (2003) 12).
+    """A valve or hoist with limited rate (G. Stein, IEEE Control Syst. Mag. 23 (2003) 12).
 
     It follows its command with a lag, and no faster than the limit.
 
@@ -96,7 +96,7 @@ class RateLimit(DriveLaw):
 
 
 class Saturation(DriveLaw):
-    """The output has a limit either way.
+    """The output is limited in both directions.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Saturation(DriveLaw):
 
 
 class DeadZone(DriveLaw):
-    """Small commands do nothing, larger ones as much less.
+    """A dead zone: small commands have no effect, larger ones are reduced by its half width.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class DeadZone(DriveLaw):
 
 
 class TorqueSpeedLine(DriveLaw):
-    """What can be given at most falls in proportion to the speed, and rises against it (Hughes and Drury, chapter 3).
+    """The largest output falls in proportion to the speed, and rises against it (Hughes and Drury, chapter 3).
 
     Parameters
     ----------

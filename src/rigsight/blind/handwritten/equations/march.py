@@ -78,7 +78,7 @@ def march(
     Raises
     ------
     SimulationError
-        If the motion has no end, or events pile up.
+        If the motion diverges, or events accumulate.
     """
     flow = _Flow(plant, max(b - a for a, b in pairwise(nodes)))
     current = list(state)
@@ -127,7 +127,7 @@ def _interval(plant: Moving, flow: _Flow, state: list[float], begin: float, end:
         plant.switch(which, t, state)
         if t >= end:
             return state
-    raise SimulationError(f"Events pile up at {t:.6g} s: the plant chatters.")
+    raise SimulationError(f"Events accumulate at {t:.6g} s: the plant chatters.")
 
 
 def _moment(plant: Moving, flow: _Flow, state: list[float], begin: float, end: float, which: int) -> float:

@@ -21,7 +21,7 @@ from rigsight.errors import SimulationError
 Floats = NDArray[np.float64]
 
 LOOK = 2.5e-3
-"""Longest time [s] between two looks at margins: a mode that ends and comes back in between is not seen."""
+"""Longest time [s] between two checks of the margins: a mode that ends and returns in between is missed."""
 _SAME = 1e-12
 """Distance of two nodes [s] that are one."""
 _AT_REST, _BALANCED = 1e-9, 1e-7
@@ -30,7 +30,7 @@ _AT_REST, _BALANCED = 1e-9, 1e-7
 
 @dataclass(frozen=True)
 class Response:
-    """What a plant did.
+    """The motion of a plant.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Plant:
         Raises
         ------
         SimulationError
-            If the motion has no end, events pile up, or there is no rest to begin from.
+            If the motion diverges, events accumulate, or there is no equilibrium to start from.
         """
         late = self.drive_law.dead_time
         self._inputs = [
@@ -181,7 +181,7 @@ class Plant:
             found = root(unbalanced, first, tol=1e-13).x
             if not np.max(np.abs(unbalanced(found))) < _BALANCED:
                 raise SimulationError(
-                    "The plant has no state of rest near that of the rig without an effect."
+                    "The plant has no equilibrium close to that of the rig without an effect."
                 )
             for i, value in zip(still, found, strict=True):
                 y[i] = float(value)
