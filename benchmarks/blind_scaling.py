@@ -282,9 +282,7 @@ def main() -> None:
                 f"{at_trials[0] / until_idle[0]:.1%}), which takes {at_trials[1] / at_trials[0]:.3f} times as long beside another"
             )
         empty, start = time_of_an_empty_trial(), time_of_a_start()
-        print(
-            f"  client and scheduler need for an empty trial {1e3 * empty:.2f} ms ({N_EMPTY} of them)"
-        )
+        print(f"  client and scheduler need for an empty trial {1e3 * empty:.2f} ms ({N_EMPTY} of them)")
         print(f"  start of a diagnosing process: {start:.2f} s (part of every trial)")
         ran, row, traffic = found[options.ways[-1], 2][-1].ran, 0.0, 0.0
         if ran[0].outcome is not None:

@@ -73,7 +73,9 @@ def campaign(effect: str, length: float) -> Campaign:
 def diagnosed(measured: Campaign, n_jobs: int) -> tuple[float, tuple[str, ...]]:
     start = time.perf_counter()
     with threadpool_limits(limits=1, user_api="blas"):
-        found = diagnose(measured, n_jobs=n_jobs, prepare=lambda s: prepare_kernels(s, n_jobs, lambda _: None))
+        found = diagnose(
+            measured, n_jobs=n_jobs, prepare=lambda s: prepare_kernels(s, n_jobs, lambda _: None)
+        )
     return time.perf_counter() - start, found.effects
 
 

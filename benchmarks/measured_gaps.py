@@ -24,7 +24,9 @@ def main(campaigns: list[str]) -> None:
             print(f"    not distinguished from {' and '.join(rivals)}")
         for candidate in diagnosis.candidates[:4]:
             name = " and ".join(candidate.effects) or "no effect"
-            print(f"    {name}: {candidate.error_over_noise:.3g} x floor, probability {candidate.probability:.3g}")
+            print(
+                f"    {name}: {candidate.error_over_noise:.3g} x floor, probability {candidate.probability:.3g}"
+            )
 
 
 if __name__ == "__main__":

@@ -130,9 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "--only", nargs="+", metavar="NAME", default=[], help="names of targets in the table"
-    )
+    parser.add_argument("--only", nargs="+", metavar="NAME", default=[], help="names of targets in the table")
     parser.add_argument("--seconds", type=int, default=60, help="seconds for each target, without its start")
     parser.add_argument(
         "--out", type=Path, default=OUT, help=f"default {OUT}; an existing corpus there is continued"

@@ -46,7 +46,6 @@ TOLERANCES = {
     "LOOK_ACCURACY": "of an integration",
     "_TURNS": "draws of a test",
     "_PORTIONS": "memory",
-    "_DRAWS": "draws of a test",
     "RESAMPLES": "draws of a bootstrap",
     "_MIN_BLOCKS": "draws of a bootstrap",
     "_FREE_MODES": "order of a subspace",

@@ -42,7 +42,7 @@ def loop(noise: float = 0.2, amplitude: float = 0.02, seed: int = 1) -> Record:
     return Record(f"loop_{amplitude}", DT, signals, {"u": "N", "x": "m"}, kind="multisine", hold="zoh")
 
 
-def read(record: Record, instrument: str | None = "reference", **options: str) -> RecordResponse:
+def read(record: Record, instrument: str | None = "reference", **options: object) -> RecordResponse:
     return record_response(record, "u", "x", "pt2", hold="zoh", instrument=instrument, **options)  # type: ignore[arg-type]
 
 
@@ -57,9 +57,18 @@ def errors(seen: RecordResponse) -> np.ndarray:
 
 @pytest.mark.parametrize("method", ["local_rational", "local_polynomial"])
 def test_noise_on_the_input_does_not_bias_what_the_instrument_shows(method: str) -> None:
-    direct, by_reference = (errors(read(loop(), name, method=method)) for name in (None, "reference"))
-    assert by_reference.size >= 10
-    assert np.max(by_reference) < 0.6 * np.max(direct)
+    """Noise on the input makes the direct estimate too small, by the same share in every draw."""
+    shown: dict[str | None, list[float]] = {None: [], "reference": []}
+    for seed in range(6):
+        record = loop(noise=2.0, seed=seed)
+        for name, ratios in shown.items():
+            found = read(record, name, method=method, least_clearness=0.0).response
+            near = [int(np.argmin(np.abs(found.omega - line))) for line in LINES[8:18]]
+            omega = found.omega[near]
+            ratios += list(np.real(found.values[near] * (K - M * omega**2 + 1j * D * omega)))
+    direct, by_reference = (abs(float(np.mean(ratios)) - 1.0) for ratios in shown.values())
+    assert direct > 0.1
+    assert by_reference < 0.5 * direct
 
 
 def test_without_noise_the_instrument_shows_the_rig() -> None:

@@ -283,7 +283,7 @@ def test_a_machine_that_lets_no_diagnosis_work_is_no_result_of_a_trial(
     in_the_way = tmp_path / "file"
     in_the_way.write_text("no folder", "utf-8")
     monkeypatch.setenv("RIGSIGHT_CACHE_DIR", str(in_the_way / "kernels"))
-    with pytest.raises(MachineError, match="on this machine: rigsight: Cannot keep compiled kernels"):
+    with pytest.raises(MachineError, match="on this machine: rigsight: Cannot write compiled kernels"):
         diagnose_trial(bench, NAME, START)
     assert not bench.diagnosed(NAME)
 

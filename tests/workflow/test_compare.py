@@ -179,7 +179,7 @@ def test_without_sweeps_the_steps_and_free_runs_are_compared(gear: Path, tmp_pat
     (tmp_path / "step.csv").write_bytes((gear / "step.csv").read_bytes())
     comparison = run_compare(tmp_path, ["nominal", "nominal"], n_jobs=1)
     assert {s.column.quantity for s in comparison.scores} == {"step_rmse", "free_run_nrmse"}
-    assert "no frequency responses" in comparison.notes[0]
+    assert any("no frequency responses" in note for note in comparison.notes)
     assert [c.name for c in comparison.competitors] == ["nominal", "nominal_2"]
 
 
@@ -189,8 +189,9 @@ def test_other_constants_than_the_campaign_has_are_told(gear: Path, tmp_path: Pa
     campaign = tmp_path / "campaign.toml"
     campaign.write_text(campaign.read_text().replace("v = 1.0", "v = 2.0"), encoding="utf-8")
     notes = run_compare(tmp_path, ["nominal"], n_jobs=1).notes
-    assert notes == (
-        "Model 'nominal' has other constants than the campaign: v = 1 (campaign: 2). It is compared with its own constants.",
+    assert (
+        "Model 'nominal' has other constants than the campaign: v = 1 (campaign: 2). It is compared with its own constants."
+        in notes
     )
 
 

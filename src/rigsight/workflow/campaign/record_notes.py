@@ -36,7 +36,7 @@ def record_notes(called: str, rig: Rig, records: Sequence[Record]) -> tuple[str,
     ]
     if all(record.role != "validation" for record in records):
         found.append(
-            f'{called}: no record has role = "validation"; all errors are of fitted records and therefore too small.'
+            f'{called}: no record has role = "validation"; errors of models that were fitted to these records are too small.'
         )
     return tuple(found)
 
