@@ -305,7 +305,8 @@ _KEY_WORDS = [
 _EFFECT_WORDS = [
     "name", "place", "summary", "parameters", "energy", "torque", "spring", "drive", "delay", "lateral", "measured", "states",
     "symbol", "rate", "limit", "starts", "searched_as", "special_cases", "post_yield_stiffness_ratio", "pulsation",
-    "x", "v", "t", "k", "m", "dynamics", "actuator", "sensor", "null", "default", "search", "dimension", "lower", "upper", "fitted", "Abs", "exp", "sign",
+    "x", "v", "t", "k", "m", "dynamics", "actuator", "sensor", "null", "default", "search", "dimension", "lower", "upper",
+    "fitted", "Abs", "exp", "sign",
 ]  # fmt: skip
 
 TARGETS: dict[str, Target] = {
