@@ -217,6 +217,7 @@ def _response(
         method,
         hold=hold,
         least_clearness=least_clearness,
+        clear_alone=True,
         with_coherence=False,
         wanted=wanted,
     ).response

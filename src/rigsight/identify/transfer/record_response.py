@@ -37,7 +37,7 @@ _PEAK_LINES = {"local_rational": 2.0, "local_polynomial": 13.0, "h1": 4.0, "thes
 """Lines (or distances of averaged frequencies) that the half-power width of a peak must hold for a method to follow it."""
 _CLEAR = 100.0
 """Power over variance (20 dB) from which a local model of a noisy response can be trusted."""
-_MOSTLY = 0.8
+_MOSTLY, _LEAST_SHARE = 0.8, 0.05
 _THESIS_CUTS = {"pt2": 80.0, "pt1": 30.0}
 _THESIS_DROPS = {"pt2": math.pi, "pt1": math.pi / 2.0}
 
@@ -81,6 +81,7 @@ def record_response(
     hold: Hold = "band_limited",
     band: tuple[float, float] | None = None,
     least_clearness: float = _CLEAR,
+    clear_alone: bool = False,
     with_coherence: bool = True,
     wanted: NDArray[np.float64] | None = None,
     instrument: str | None = None,
@@ -106,6 +107,8 @@ def record_response(
         Limits [rad/s] inside which the response is kept; None keeps all that the source excites.
     least_clearness
         Power over variance from which a line of a local method counts as clear; 0 keeps all lines.
+    clear_alone
+        True to leave out other lines however few are clear: an error has no weights. A fit does, and takes all lines then.
     with_coherence
         False if the coherence is not needed: it takes a third of the time of a local model.
     wanted
@@ -130,7 +133,9 @@ def record_response(
         width = resolution or _SEGMENTS * _line(record)
         found, shared = averaged_response(record, source, response, width, hold=hold), _HANN_LINES
     else:
-        local = partial(_local, record, source, response, method, resolution, hold, wanted, least_clearness)
+        local = partial(
+            _local, record, source, response, method, resolution, hold, wanted, least_clearness, clear_alone
+        )
         try:
             found, width, shared = local(instrument)
         except InputError as error:
@@ -157,6 +162,7 @@ def _local(
     hold: Hold,
     wanted: NDArray[np.float64] | None,
     least_clearness: float,
+    clear_alone: bool,
     instrument: str | None,
 ) -> tuple[FrequencyResponse, float, float]:
     """Return what a local method shows, its resolution [rad/s] and its lines per independent value."""
@@ -174,7 +180,7 @@ def _local(
         wanted=wanted,
         instrument=instrument,
     )
-    clear = _noted(_clear(found, lines, least_clearness), note)
+    clear = _noted(_clear(found, lines, least_clearness, 0.0 if clear_alone else _LEAST_SHARE), note)
     return clear, line * lines / _BAND_LINES[method], lines / _LOCAL_VALUES
 
 
@@ -215,7 +221,7 @@ def _thesis(record: Record, source: str, response: str, order: Order) -> Frequen
     return thesis_response(record, source, response, _THESIS_DROPS[order], upper, float(heard[0]))
 
 
-def _clear(found: FrequencyResponse, lines: int, least: float) -> FrequencyResponse:
+def _clear(found: FrequencyResponse, lines: int, least: float, least_share: float) -> FrequencyResponse:
     """Keep the lines between the outermost local bands in which most stand clearly out of their uncertainty.
 
     Single lines seem clear by chance, most of all where the begin of a sweep cannot be told from a transient.
@@ -228,7 +234,7 @@ def _clear(found: FrequencyResponse, lines: int, least: float) -> FrequencyRespo
         np.pad(clear.astype(np.float64), lines // 2, mode="edge"), np.ones(lines) / lines, "valid"
     )
     inside = np.flatnonzero(clear & (share[: clear.size] >= _MOSTLY))
-    if not inside.size:
+    if inside.size <= least_share * clear.size:
         return found
     kept = np.zeros(clear.size, dtype=np.bool_)
     kept[inside[0] : inside[-1] + 1] = True

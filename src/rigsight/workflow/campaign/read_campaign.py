@@ -74,7 +74,7 @@ def read_campaign(
     if table.offsets == "per_record":
         outputs = [signal.name for signal in rig.outputs]
         read = [(asked, record.with_free_offsets(outputs)) for asked, record in read]
-    records = tuple(record for _, record in read)
+    records = _with_distinct_names(read)
     constants, differing = of_first_record(rig, known_constants, records)
     notes = [note for note in (differing, *record_notes(path.name, rig, records)) if note]
     return Campaign(
@@ -82,7 +82,7 @@ def read_campaign(
         rig=rig,
         constants=constants,
         parameters=parameters,
-        records=_with_distinct_names(read),
+        records=records,
         modelled=tuple(modelled),
         path=path,
         notes=tuple(notes),
