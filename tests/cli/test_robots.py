@@ -64,7 +64,7 @@ def test_a_rig_that_does_not_move_as_mujoco_does_is_told_even_where_nothing_else
     assert (code, stdout) == (0, "")
     assert "the free run of the rig differs from MuJoCo" in stderr
     head = (tmp_path / "stage" / "robot.toml").read_text("utf-8")
-    assert "# - the option that switches damping of joints off: the rig has it" in head
+    assert "# - the option that switches off damping of joints, which the rig has" in head
 
 
 @pytest.mark.parametrize(

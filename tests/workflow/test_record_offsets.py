@@ -148,7 +148,7 @@ def test_identify_estimates_them_and_compare_scores_without_them() -> None:
     for name in ("m", "d", "k"):
         value, error = found.joint.fit.fit.values[name], found.joint.fit.fit.standard_errors[name]
         assert value == pytest.approx(AXIS_VALUES[name], abs=4.0 * error)
-    (said,) = [warning for warning in found.warnings if warning.startswith("Offset of x by record")]
+    (said,) = [warning for warning in found.warnings if warning.startswith("Offset of x in each record")]
     first, second = (float(number) for number in re.findall(r"'sweep_\d' ([^,]+?)[,.]?(?= |$)", said))
     # From the rest position, which nothing tells: their difference is what the records know.
     assert first - second == pytest.approx(OFFSETS["sweep_1"] - OFFSETS["sweep_3"], abs=2e-6)
