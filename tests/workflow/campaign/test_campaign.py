@@ -389,7 +389,7 @@ def test_time_is_no_signal(campaign: Callable[..., Path]) -> None:
 def test_a_fitted_record_that_is_to_validate_too_is_told(campaign: Callable[..., Path]) -> None:
     folder = campaign(HEAD + RECORDS.replace('"step.csv"', '"sweep.csv"'))
     (note,) = read_campaign(folder).notes
-    assert "the validation record 'sweep' has exactly the samples of 'sweep', which is fitted" in note
+    assert "the validation record 'sweep_2' has exactly the samples of 'sweep', which is fitted" in note
 
 
 def test_what_a_rig_does_not_know_is_told_with_line_and_column(campaign: Callable[..., Path]) -> None:
