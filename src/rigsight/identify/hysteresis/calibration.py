@@ -36,9 +36,7 @@ class Calibration:
     Attributes
     ----------
     fit
-        Values, covariance and residuals. Fitted to frequency responses, the residuals are per response of shape
-        (n_frequencies, 2): natural logarithm of the magnitude and phase [rad], measured less simulated; there are no initial
-        states.
+        Values, covariance and residuals.
     derived
         Saturation, pair and loop areas, with intervals.
     minima

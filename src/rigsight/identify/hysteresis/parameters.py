@@ -8,9 +8,7 @@ from rigsight.errors import InputError, check_option
 from rigsight.simulate import Structure, compose
 
 
-def free_parameters(
-    structure: Structure, outputs: Collection[str], *, with_rest: bool = True
-) -> tuple[str, ...]:
+def free_parameters(structure: Structure, outputs: Collection[str]) -> tuple[str, ...]:
     """Return what records of these outputs determine: no constants, nothing of an output that was not measured.
 
     Parameters
@@ -19,8 +17,6 @@ def free_parameters(
         Rig and effects.
     outputs
         Names of measured outputs.
-    with_rest
-        False where the response holds no mean, as a frequency response: the rest position then stays where it is.
     """
     rig = structure.rig
     motion = rig.motion
@@ -32,14 +28,11 @@ def free_parameters(
     }
     rest = {symbol.name for symbol in motion.rest.free_symbols}
     bias = {symbol.name for symbol in motion.bias.free_symbols}
-    if with_rest:
-        # With a spring a constant force is equivalent to a shifted rest position; a bench has no rest position.
-        moved |= rest or bias
+    # With a spring a constant force is equivalent to a shifted rest position; a bench has no rest position.
+    moved |= rest or bias
     for state, rate in rig.downstream.items():
         if state.name in outputs:
-            # What a shift of the mean does not move stands in the slopes.
-            slopes = [rate] if with_rest else [rate.diff(state), rate.diff(motion.displacement)]
-            moved |= {symbol.name for slope in slopes for symbol in slope.free_symbols}
+            moved |= {symbol.name for symbol in rate.free_symbols}
     of_rig = {p.name for p in rig.parameters}
     fixed = dict(structure.fixed)
     of_effects = {
