@@ -8,13 +8,18 @@ from collections.abc import Iterator
 from rigsight.diagnose.result import Estimate
 from rigsight.identify.hysteresis.derived import LEVEL, Derived
 from rigsight.identify.identification import HysteresisIdentification
-from rigsight.report.quantities import UNDETERMINED, estimate_text, gap_percent
+from rigsight.report.quantities import UNDETERMINED, Written, estimate_text, gap_percent, written
 
 HEADING = "Hysteresis"
+_WIDTHS = 3.92
+"""Standard deviations between the ends of a 95 % interval."""
+
+
+ERROR_HEADS = ("record", "role", "NRMSE without the effects", "with the effects")
 
 
 def hysteresis_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
-    """Yield subject and words: parameters, what follows from them, and the errors of each record.
+    """Yield subject and words: parameters, and what follows from them.
 
     Parameters
     ----------
@@ -23,8 +28,6 @@ def hysteresis_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]
     """
     yield from parameter_rows(found)
     yield from derived_rows(found)
-    for record, role, without, with_effects in error_rows(found):
-        yield record, f"{role}, NRMSE {without} without, {with_effects} with the effects"
 
 
 def parameter_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str]]:
@@ -59,18 +62,14 @@ def error_rows(found: HysteresisIdentification) -> Iterator[tuple[str, str, str,
 
 
 def derived_text(one: Derived) -> str:
-    """Return a value with its interval, e.g. ``"0.0318 J (95 %: 0.0317 to 0.0319)"``."""
+    """Return a value with its interval, e.g. ``"0.0318 J (95 %: 0.0316 to 0.0320)"``."""
     if not (math.isfinite(one.lower) and math.isfinite(one.upper)):
         return UNDETERMINED
     unit = "" if one.unit in ("", "1") else f" {one.unit}"
-    width = one.upper - one.lower
-    value, lower, upper = (_as_fine_as(number, width) for number in (one.value, one.lower, one.upper))
+    spread = (one.upper - one.lower) / _WIDTHS
+    value, lower, upper = (_plain(written(number, spread)) for number in (one.value, one.lower, one.upper))
     return f"{value}{unit} ({100.0 * LEVEL:.0f} %: {lower} to {upper})"
 
 
-def _as_fine_as(value: float, width: float) -> str:
-    """Return a number with two significant digits of the width of its interval."""
-    if value == 0.0 or width <= 0.0:
-        return f"{value:.4g}"
-    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2
-    return f"{value:.{min(max(digits, 2), 10)}g}"
+def _plain(number: Written) -> str:
+    return f"{number.value}e{number.exponent:+d}" if number.exponent else number.value

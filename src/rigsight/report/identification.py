@@ -13,7 +13,7 @@ from rich.text import Text
 
 from rigsight.diagnose.result import Estimate
 from rigsight.identify.identification import Identification, RecordIdentification, RecordScore
-from rigsight.report.hysteresis import HEADING, hysteresis_rows
+from rigsight.report.hysteresis import ERROR_HEADS, HEADING, error_rows, hysteresis_rows
 from rigsight.report.quantities import ERRORS_HOLD, estimate_text, gap_percent, written
 from rigsight.report.terminal import plain_text
 
@@ -63,6 +63,12 @@ class IdentificationSummary:
             for subject, words in hysteresis_rows(found.hysteresis):
                 rows.add_row(text(subject, "bold"), text(words))
             yield Padding(rows, (0, 0, 0, 2), expand=False)
+            errors = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+            for head in ERROR_HEADS:
+                errors.add_column(text(head))
+            for row in error_rows(found.hysteresis):
+                errors.add_row(*map(text, row))
+            yield Padding(errors, (0, 0, 0, 2), expand=False)
         if found.warnings:
             yield text("")
             yield text("Worth knowing", "bold yellow")

@@ -83,8 +83,8 @@ def run_identify(
     Raises
     ------
     InputError
-        If the campaign cannot be used, the effects cannot be calibrated on its rig, a record is too short for the resolution asked for, no record shows the motion, or the
-        results cannot be written; nothing is written then.
+        If the campaign cannot be used, the effects cannot be calibrated on its rig, a record is too short for the resolution
+        asked for, no record shows the motion, or the results cannot be written; nothing is written then.
     """
     options = checked_options(method, resolution)
     jobs = checked_jobs(n_jobs)

@@ -136,7 +136,7 @@ def derived_quantities(
         LoopArea(
             a,
             _derived(
-                f"energy per cycle at {a:.3g}",
+                f"energy per cycle at {a:.3g} {structure.rig.units['x']}",
                 _energy_unit(structure),
                 loop_area(structure, draws, a),
                 determined,

@@ -65,6 +65,11 @@ def structure_with_memory(campaign: Campaign, effects: Sequence[Effect]) -> Stru
             f"None of the effects ({', '.join(effect.name for effect in chosen)}) gives the spring a memory; name one that does: "
             f"{known}. 'rigsight diagnose {names}' fits the others alone."
         )
+    of_spring = [effect.name for effect in chosen if effect.spring is not None and effect.states]
+    if len(of_spring) > 1:
+        raise InputError(
+            f"The records do not tell {' and '.join(of_spring)} of the same spring apart; name one of them, and compare the models."
+        )
     beside = [effect for effect in campaign.modelled if all(effect.name != one.name for one in chosen)]
     return compose(rig, (*beside, *chosen))
 
@@ -155,7 +160,9 @@ def with_hysteresis(
 
 
 def _has_memory(effect: Effect) -> bool:
-    return effect.place is Place.DYNAMICS and bool(effect.states)
+    # A force of several states is a motion of its own, as that of a flexible mode.
+    has_state = len(effect.states) == 1 or (effect.spring is not None and bool(effect.states))
+    return effect.place is Place.DYNAMICS and has_state
 
 
 def _of_rig(rig: Rig) -> set[str]:
