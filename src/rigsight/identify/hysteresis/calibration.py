@@ -40,8 +40,8 @@ class Calibration:
     derived
         Saturation, pair and loop areas, with intervals.
     minima
-        Where the refinements of the search's ends arrived, best first, before special values were released: several of like
-        cost say that the data allow several sets.
+        Where the refinements of the search's ends, and of the effects' own starts, arrived, best first, before special values
+        were released: several of like cost say that the data allow several sets.
     n_simulated
         Parameter sets that the search simulated.
     """

@@ -17,7 +17,9 @@ from rigsight.identify.hysteresis.calibration import BEYOND, RELEASE_GAIN, Calib
 from rigsight.identify.hysteresis.derived import derived_quantities, record_amplitudes
 from rigsight.identify.hysteresis.parameters import (
     checked_free,
+    declared_starts,
     free_parameters,
+    neighbors,
     special_structure,
     start_values,
 )
@@ -119,19 +121,25 @@ def calibrate_to_records(
         n_ends=n_ends,
         progress=lambda generation: tell(f"generation {generation}"),
     )
+
+    def refined(values: Mapping[str, float]) -> FitResult:
+        return look.fit(
+            values,
+            simple_free,
+            max_evaluations=_ROUGH_EVALUATIONS,
+            tolerance=_ROUGH_TOLERANCE,
+            finish=False,
+        )
+
     rough = []
     for theta in ends.usable:
         values = dict(zip(simple.names, map(float, coordinates.to_parameters(theta)), strict=True))
-        rough.append(
-            look.fit(
-                values,
-                simple_free,
-                max_evaluations=_ROUGH_EVALUATIONS,
-                tolerance=_ROUGH_TOLERANCE,
-                finish=False,
-            )
-        )
+        rough.append(refined(values))
         tell("refined an end of the search")
+    rough += map(refined, declared_starts(simple, {n: begin[n] for n in simple.names}, scales))
+    tell("refined the starts of the effects")
+    rough += map(refined, neighbors(simple, min(rough, key=lambda fit: fit.cost).values))
+    tell("refined the neighbors of the best")
     rough.sort(key=lambda fit: fit.cost)
     fit = _refined(structure, chosen, simple, records, scales, noise, rough[0], rng, threads)
     tell("refined the best")

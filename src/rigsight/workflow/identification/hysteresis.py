@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -12,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from rigsight.campaign import Campaign
 from rigsight.effects import CATALOGUE, Effect, Place
 from rigsight.errors import InputError
-from rigsight.identify import GreyBoxFit, calibrate_to_records, characteristic_scales
+from rigsight.identify import FitResult, GreyBoxFit, calibrate_to_records, characteristic_scales
 from rigsight.identify.hysteresis.parameters import free_parameters, special_structure
 from rigsight.identify.identification import EffectScore, HysteresisIdentification, Identification
 from rigsight.metrics import nrmse
@@ -27,7 +26,7 @@ from rigsight.workflow.run.progress import Listener, Stage, Step
 
 CALIBRATING = "Calibrating hysteresis"
 _GENERATIONS, _ENDS = 100, 8
-_STEPS = _GENERATIONS + _ENDS + 1
+_STEPS = _GENERATIONS + _ENDS + 3
 _HARDLY = 0.9
 """Share of the error from which effects are said to explain hardly anything."""
 
@@ -65,12 +64,13 @@ def structure_with_memory(campaign: Campaign, effects: Sequence[Effect]) -> Stru
             f"None of the effects ({', '.join(effect.name for effect in chosen)}) gives the spring a memory; name one that does: "
             f"{known}. 'rigsight diagnose {names}' fits the others alone."
         )
-    of_spring = [effect.name for effect in chosen if effect.spring is not None and effect.states]
+    beside = [effect for effect in campaign.modelled if all(effect.name != one.name for one in chosen)]
+    of_spring = [effect.name for effect in (*beside, *chosen) if effect.spring is not None and effect.states]
     if len(of_spring) > 1:
         raise InputError(
-            f"The records do not tell {' and '.join(of_spring)} of the same spring apart; name one of them, and compare the models."
+            f"The records do not tell {' and '.join(of_spring)} of the same spring apart; name one of them, then compare the "
+            "models."
         )
-    beside = [effect for effect in campaign.modelled if all(effect.name != one.name for one in chosen)]
     return compose(rig, (*beside, *chosen))
 
 
@@ -150,9 +150,7 @@ def with_hysteresis(
         held={p.name: values[p.name] for p in of_effects if p.name not in calibration.fit.free},
         units={p.name: p.unit for p in structure.parameters},
         meanings={p.name: p.description for p in structure.parameters},
-        statement=_statement(
-            structure.effect_names, calibration.fit.success, calibration.fit.message, scores
-        ),
+        statement=_statement(structure.effect_names, calibration.fit, scores),
         scores=scores,
     )
     model = Model.of(calibration.fit.structure, calibration.fit.values, campaign.estimation[0].hold)
@@ -212,26 +210,28 @@ def _score(
     )
 
 
-def _statement(effects: Sequence[str], success: bool, message: str, scores: Sequence[EffectScore]) -> str:
+def _statement(effects: Sequence[str], fit: FitResult, scores: Sequence[EffectScore]) -> str:
     """Say how much closer the records are followed, on the motion of the rig."""
     label = " and ".join(effects)
-    if not success or not scores:
-        return f"The calibration with {label} did not converge: {message}. Its numbers are to be doubted."
+    doubt = f"The calibration with {label} did not converge ({fit.message.rstrip('.')}): its numbers are to be doubted."
+    if not scores:
+        return doubt
     motion = next(iter(scores[0].nrmse))
     parts, worst = [], 0.0
     for role, called in (("estimation", "the fitted records"), ("validation", "the held-out records")):
-        pairs = [
-            (s.without[motion], s.nrmse[motion])
-            for s in scores
-            if s.role == role and motion in s.without and motion in s.nrmse
-        ]
-        if pairs:
+        seen = [s for s in scores if s.role == role and motion in s.without and motion in s.nrmse]
+        if seen:
             before, after = (
-                math.sqrt(float(np.mean(np.square(column)))) for column in zip(*pairs, strict=True)
+                _rms([errors[motion] for errors in of])
+                for of in zip(*((s.without, s.nrmse) for s in seen), strict=True)
             )
             parts.append(f"from {gap_percent(before)} to {gap_percent(after)} on {called}")
             worst = max(worst, after / before if before > 0.0 else 1.0)
     text = f"With {label} the error of {motion} (NRMSE) goes {', '.join(parts)}."
     if worst > _HARDLY:
-        text += " The effects explain hardly anything: 'rigsight diagnose' looks for another cause."
-    return text
+        return f"{text} That is hardly less: the rig lacks none of these effects. 'rigsight diagnose' says what it lacks."
+    return text if fit.success else f"{text} {doubt}"
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
